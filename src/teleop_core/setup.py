@@ -1,0 +1,44 @@
+"""Install teleop_core with pip or colcon; dependencies are pinned by constraints.txt at the top."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NODES = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "recorder")
+
+
+def files(folder: str, pattern: str) -> tuple[str, list[str]]:
+    """Share files of one folder, as (destination, sources)."""
+    return f"share/teleop_core/{folder}", sorted(map(str, Path(folder).glob(pattern)))
+
+
+setup(
+    name="teleop_core",
+    version="0.1.0",
+    description="Master-slave teleoperation stack for ROS 2 Jazzy",
+    license="Apache-2.0",
+    packages=find_packages(include=["teleop_core", "teleop_core.*"]),
+    package_data={"teleop_core": ["py.typed"]},
+    python_requires=">=3.11",
+    install_requires=["numpy", "numba", "mcap", "rosbags", "lz4", "zstandard", "pyyaml", "plotly", "rich"],
+    extras_require={
+        "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
+        "test": [
+            "pytest", "hypothesis", "scipy", "pin", "roboticstoolbox-python", "mcap-ros2-support",
+            "ruff", "mypy", "types-PyYAML", "psutil", "colcon-common-extensions", "colcon-ros",
+        ],
+        "bench": ["EAIK", "ikpy"],
+    },
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/teleop_core"]),
+        ("share/teleop_core", ["package.xml"]),
+        files("config", "*.yaml"),
+        files("launch", "*.launch.py"),
+    ],
+    entry_points={
+        "console_scripts": [
+            "teleop = teleop_core.cli:main",
+            *(f"{node} = teleop_core.nodes.{node}:main" for node in NODES),
+        ]
+    },
+)

@@ -1,0 +1,52 @@
+"""Errors: every wrong use of the package raises a child of :class:`TeleopError`.
+
+Expected events (a joint limit, a stale command, an unreachable pose) are never errors; they come
+back as a status beside the value.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class TeleopError(Exception):
+    """Base of all errors of this package; its text is one line that a user can act on."""
+
+
+class ParameterError(TeleopError, ValueError):
+    """A value is not allowed: carries ``name``, ``value`` and ``requirement``."""
+
+    def __init__(self, name: str, value: object, requirement: str) -> None:
+        self.name, self.value, self.requirement = name, value, requirement
+        super().__init__(f"{name} is {value!r}, must be {requirement}")
+
+
+class UnknownNameError(ParameterError):
+    """A name is not in its list: carries the ``alternatives`` too."""
+
+    def __init__(self, kind: str, value: object, alternatives: Iterable[str]) -> None:
+        self.alternatives = tuple(alternatives)
+        super().__init__(kind, value, "one of: " + ", ".join(self.alternatives))
+
+
+class ShapeError(TeleopError, ValueError):
+    """An array has the wrong shape: carries ``name``, ``expected`` and ``received``."""
+
+    def __init__(self, name: str, expected: object, received: object) -> None:
+        self.name, self.expected, self.received = name, expected, received
+        super().__init__(f"{name} must have shape {expected}, has {received}")
+
+
+class RecordingError(TeleopError):
+    """A recording cannot be written or read: carries its ``path`` and the ``reason``."""
+
+    def __init__(self, path: Path | str, reason: str) -> None:
+        self.path, self.reason = Path(path), reason
+        super().__init__(f"{path}: {reason}")
+
+
+class EvaluationError(TeleopError):
+    """A recording lacks what a score needs; the text says what is missing."""
+
+
+class SessionError(TeleopError):
+    """A live session failed; the text names the node and the reason."""

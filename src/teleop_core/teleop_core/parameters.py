@@ -1,0 +1,171 @@
+"""Parameters: declared once as dataclass fields with unit, bounds and text, checked without ROS."""
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from types import UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+
+from teleop_core.errors import ParameterError, UnknownNameError
+
+Group = TypeVar("Group")
+Scalar = bool | int | float | str
+Value = Scalar | tuple[Scalar, ...]
+
+
+def parameter(
+    default: Any,
+    *,
+    unit: str = "",
+    doc: str,
+    lower: float | None = None,
+    upper: float | None = None,
+    choices: tuple[str, ...] = (),
+    length: int | None = None,
+    fixed: bool = False,
+) -> Any:
+    """Dataclass field that describes one parameter.
+
+    Args:
+        default: Value when nothing else is said; its type is the parameter's type.
+        unit: SI unit, empty for pure numbers and names.
+        doc: One line for the README's table and the ROS descriptor.
+        lower: Smallest allowed number, itself allowed; each element of a tuple.
+        upper: Largest allowed number, itself allowed; each element of a tuple.
+        choices: Allowed names; empty for any.
+        length: Number of elements of a tuple; None for any.
+        fixed: Whether it can only be set before the stage is built.
+
+    Returns:
+        The dataclass field.
+    """
+    meta = {
+        "unit": unit, "doc": doc, "lower": lower, "upper": upper,
+        "choices": choices, "length": length, "fixed": fixed,
+    }  # fmt: skip
+    return field(default=default, metadata=meta)
+
+
+@dataclass(frozen=True)
+class Spec:
+    """Declaration of one parameter: ``name`` is dotted for nested groups."""
+
+    name: str
+    kind: type
+    element: type
+    default: Value
+    unit: str
+    doc: str
+    lower: float | None
+    upper: float | None
+    choices: tuple[str, ...]
+    length: int | None
+    fixed: bool
+
+    def check(self, value: object) -> None:
+        """Refuse a value of another type, length, bound or choice.
+
+        Raises:
+            ParameterError: Names the parameter, the value and what is allowed.
+        """
+        if self.kind is not tuple:
+            self._check_element(value)
+            return
+        if not isinstance(value, tuple):
+            raise ParameterError(self.name, value, f"a list of {self.element.__name__}")
+        if self.length is not None and len(value) != self.length:
+            raise ParameterError(self.name, value, f"a list of {self.length} values")
+        for element in value:
+            self._check_element(element)
+
+    def _check_element(self, value: object) -> None:
+        if type(value) is not self.element:
+            hint = " (write 1.0, not 1)" if self.element is float else ""
+            raise ParameterError(self.name, value, f"of type {self.element.__name__}{hint}")
+        if self.choices and value not in self.choices:
+            raise UnknownNameError(self.name, value, self.choices)
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ParameterError(self.name, value, f"finite, {self.bounds()}")
+        if isinstance(value, int | float) and not self._is_inside(value):
+            raise ParameterError(self.name, value, self.bounds())
+
+    def _is_inside(self, value: float) -> bool:
+        return (self.lower is None or value >= self.lower) and (
+            self.upper is None or value <= self.upper
+        )
+
+    def bounds(self) -> str:
+        """Allowed range in words, with the unit."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.lower is not None and self.upper is not None:
+            return f"between {self.lower:g} and {self.upper:g}{unit}"
+        if self.lower is not None:
+            return f"at least {self.lower:g}{unit}"
+        return f"at most {self.upper:g}{unit}" if self.upper is not None else f"any value{unit}"
+
+
+def specs(group: type, prefix: str = "") -> Iterator[Spec]:
+    """Declarations of a group in order, nested groups with dotted names."""
+    hints = get_type_hints(group)
+    for entry in dataclasses.fields(group):
+        hint = hints[entry.name]
+        if dataclasses.is_dataclass(hint):
+            yield from specs(hint, f"{prefix}{entry.name}.")  # type: ignore[arg-type]
+            continue
+        kind = get_origin(hint) or hint
+        if kind is UnionType or kind not in {bool, int, float, str, tuple}:
+            raise TypeError(f"{group.__name__}.{entry.name}: a parameter cannot be a {hint}")
+        element = get_args(hint)[0] if kind is tuple else kind
+        yield Spec(prefix + entry.name, kind, element, entry.default, **entry.metadata)
+
+
+def build(group: type[Group], values: Mapping[str, object], prefix: str = "") -> Group:
+    """Group with ``values`` in place of its defaults, checked.
+
+    Args:
+        group: Dataclass whose fields come from :func:`parameter` or are such groups.
+        values: Dotted names to values; lists count as tuples.
+        prefix: Dotted path of this group, put before names in errors.
+
+    Returns:
+        The group.
+
+    Raises:
+        UnknownNameError: A name is not declared; the alternatives are listed.
+        ParameterError: A value breaks its declaration, or a relation between values.
+    """
+    declared = {spec.name: spec for spec in specs(group)}
+    for name, value in values.items():
+        if name not in declared:
+            raise UnknownNameError(f"parameter {prefix}", name, declared)
+        checked = tuple(value) if isinstance(value, list) else value
+        dataclasses.replace(declared[name], name=prefix + name).check(checked)
+    return _make(group, values)
+
+
+def _make(group: type[Group], values: Mapping[str, object]) -> Group:
+    hints = get_type_hints(group)
+    made: dict[str, object] = {}
+    for entry in dataclasses.fields(group):  # type: ignore[arg-type]
+        inner = hints[entry.name]
+        if dataclasses.is_dataclass(inner):
+            start = entry.name + "."
+            nested = {k[len(start) :]: v for k, v in values.items() if k.startswith(start)}
+            made[entry.name] = _make(inner, nested)  # type: ignore[arg-type]
+        elif entry.name in values:
+            value = values[entry.name]
+            made[entry.name] = tuple(value) if isinstance(value, list) else value
+    return group(**made)
+
+
+def values_of(group: object, prefix: str = "") -> dict[str, Value]:
+    """Dotted names to values of a group: what :func:`build` would need to make it again."""
+    out: dict[str, Value] = {}
+    for entry in dataclasses.fields(group):  # type: ignore[arg-type]
+        value = getattr(group, entry.name)
+        if dataclasses.is_dataclass(value):
+            out |= values_of(value, f"{prefix}{entry.name}.")
+        else:
+            out[prefix + entry.name] = value
+    return out
