@@ -1,40 +1,46 @@
 """Compiled kernels: one decorator, so that every kernel is compiled in the same way.
 
-Kernels are cached on disk. numba invalidates a cached kernel when *its* file changes, not when a
-kernel that it calls changes; a stale caller would silently go on with old formulas. Here the
-stamp of a cached kernel therefore covers every source file of the package.
+Kernels are cached on disk. numba compiles a cached kernel again when *its* file changes, not when
+a kernel that it calls changes; a stale caller would silently go on with old formulas. Here the
+stamp of a cached kernel therefore covers the files of all kernels it calls.
 """
 
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba.core.caching import NullCache
 
-
-@cache
-def _package_stamp() -> tuple[float, int]:
-    """Newest change and total size of the package's sources, in the form numba stores."""
-    stats = [path.stat() for path in Path(__file__).parent.rglob("*.py")]
-    return max(s.st_mtime for s in stats), sum(s.st_size for s in stats)
+_sources: dict[Any, frozenset[str]] = {}
 
 
-def _cover_whole_package(kernel_cache: Any) -> None:
-    if not isinstance(kernel_cache, NullCache):
-        kernel_cache._cache_file._source_stamp = _package_stamp()
+def _stamped(compiled: Any, function: Callable[..., Any]) -> Any:
+    """Let the disk cache of a compiled function depend on every file its kernels come from."""
+    code, names = function.__code__, function.__globals__
+    called = (names.get(name) for name in code.co_names)
+    inner = [_sources[value.py_func] for value in called if _is_kernel(value)]
+    files = frozenset([code.co_filename]).union(*inner)
+    _sources[function] = files
+    if not isinstance(compiled._cache, NullCache):
+        stats = [Path(file).stat() for file in sorted(files)]
+        stamp = (max(s.st_mtime for s in stats), sum(s.st_size for s in stats))
+        compiled._cache._cache_file._source_stamp = stamp
+    return compiled
+
+
+def _is_kernel(value: object) -> bool:
+    return callable(value) and getattr(value, "py_func", None) in _sources
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a pure function over float64 arrays and records.
 
     No ``fastmath``: results are the same on every machine and in every run mode. The kernel
-    releases the interpreter lock, so that other threads run beside it.
+    releases the interpreter lock, so that other threads run beside it. Arrays must be writable:
+    numba compiles a second time for read-only ones.
     """
-    dispatcher = numba.njit(cache=True, nogil=True)(function)
-    _cover_whole_package(dispatcher._cache)
-    return dispatcher
+    return _stamped(numba.njit(cache=True, nogil=True)(function), function)
 
 
 def pointer(compiled: Any, signature: Any) -> Any:

@@ -1,0 +1,331 @@
+"""RCRT-1: the R-R-P-R-R-R slave with a spherical wrist, reach 458 mm.
+
+Standard Denavit-Hartenberg table (the source heads its columns as if modified): alpha = -90, 90,
+0, -90, 90, 0 degrees, d = 0, d2, d3, 0, 0, L6. With R2 = Rz(q1) Ry(q2) and
+R = R2 Rz(q4) Ry(q5) Rz(q6) the tip is at R2 (0, d2, d3) + L6 R z.
+
+Source:
+    Vongbunyong 2008, sections 3.3, 4.4, 4.5, 6.3 and tables 3.6, 6.2; misprints corrected.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.compiled import kernel
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import Array
+from teleop_core.robots import rcrt1_dynamics
+from teleop_core.robots.robot import (
+    IkStatus,
+    Kernels,
+    Robot,
+    geometry_of,
+    is_askable,
+    pose_residual,
+)
+
+JOINTS = ("theta1", "theta2", "d3", "theta4", "theta5", "theta6")
+GEOMETRY = {"L6": 0.037, "d2": 0.0}
+_DEGREES = math.pi / 180.0
+LOWER = np.array([-80.0, 50.0, 0.0, -170.0, -80.0, -170.0]) * _DEGREES
+UPPER = np.array([80.0, 160.0, 0.0, 170.0, 80.0, 170.0]) * _DEGREES
+UPPER[2] = 0.421
+HOME = np.array([0.0, 113.4 * _DEGREES, 0.421, 0.0, 0.0, 0.0])
+
+# Below this sine the wrist axes 4 and 6 count as one line and joint 4 keeps its value: rounding
+# in T (1e-16) turned by 1/sine stays under 1e-6 rad.
+_COLLINEAR = 1e-10
+# Sine of joint 5, and wrist distance over full reach, under which small moves need large joint
+# moves (more than 50 rad of joint per rad of tool).
+_NEAR = 0.02
+_REACH = 0.421
+_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+
+
+@kernel
+def fk(q: Array, geometry: Array, T: Array) -> None:
+    """Write ``T_base_tip``, (4, 4), of joints (6,).
+
+    Source:
+        Vongbunyong 2008, eq. 4.4.1, corrected.
+    """
+    c1, s1 = math.cos(q[0]), math.sin(q[0])
+    c2, s2 = math.cos(q[1]), math.sin(q[1])
+    c4, s4 = math.cos(q[3]), math.sin(q[3])
+    c5, s5 = math.cos(q[4]), math.sin(q[4])
+    c6, s6 = math.cos(q[5]), math.sin(q[5])
+    # Columns of the wrist rotation Rz(q4) Ry(q5) Rz(q6), turned into the base column by column.
+    for column in range(3):
+        if column == 0:
+            x, y, z = c4 * c5 * c6 - s4 * s6, s4 * c5 * c6 + c4 * s6, -s5 * c6
+        elif column == 1:
+            x, y, z = -c4 * c5 * s6 - s4 * c6, -s4 * c5 * s6 + c4 * c6, s5 * s6
+        else:
+            x, y, z = c4 * s5, s4 * s5, c5
+        h = c2 * x + s2 * z
+        T[0, column] = c1 * h - s1 * y
+        T[1, column] = s1 * h + c1 * y
+        T[2, column] = c2 * z - s2 * x
+    L6, d2 = geometry[0], geometry[1]
+    T[0, 3] = c1 * s2 * q[2] - s1 * d2 + L6 * T[0, 2]
+    T[1, 3] = s1 * s2 * q[2] + c1 * d2 + L6 * T[1, 2]
+    T[2, 3] = c2 * q[2] + L6 * T[2, 2]
+    T[3, 0] = T[3, 1] = T[3, 2] = 0.0
+    T[3, 3] = 1.0
+
+
+@kernel
+def jacobian(q: Array, geometry: Array, J: Array) -> None:
+    """Write the geometric Jacobian (6, 6): rows linear, then angular, in base axes.
+
+    Its determinant is d3² sin(q2) sin(q5) for d2 = 0.
+    """
+    T = np.empty((4, 4))
+    fk(q, geometry, T)
+    c1, s1 = math.cos(q[0]), math.sin(q[0])
+    c2, s2 = math.cos(q[1]), math.sin(q[1])
+    c4, s4 = math.cos(q[3]), math.sin(q[3])
+    L6 = geometry[0]
+    axes = np.empty((6, 3))
+    axes[0] = (0.0, 0.0, 1.0)
+    axes[1] = (-s1, c1, 0.0)
+    axes[2] = (c1 * s2, s1 * s2, c2)
+    axes[3] = axes[2]
+    axes[4] = (-c1 * c2 * s4 - s1 * c4, -s1 * c2 * s4 + c1 * c4, s2 * s4)
+    axes[5] = (T[0, 2], T[1, 2], T[2, 2])
+    for j in range(6):
+        a = axes[j]
+        # Joints 1 and 2 turn the tip about the base origin, the wrist joints about its centre.
+        x, y, z = T[0, 3], T[1, 3], T[2, 3]
+        if j > 2:
+            x, y, z = L6 * T[0, 2], L6 * T[1, 2], L6 * T[2, 2]
+        is_prismatic = j == 2
+        J[0, j] = a[0] if is_prismatic else a[1] * z - a[2] * y
+        J[1, j] = a[1] if is_prismatic else a[2] * x - a[0] * z
+        J[2, j] = a[2] if is_prismatic else a[0] * y - a[1] * x
+        for i in range(3):
+            J[3 + i, j] = 0.0 if is_prismatic else a[i]
+
+
+@kernel
+def _bounded(wanted: float, seed: float, lower: float, upper: float, step: float) -> float:
+    """Nearest value to ``wanted`` within a step of the seed and inside the limits."""
+    near = min(max(wanted, seed - step), seed + step)
+    return min(max(near, lower), upper)
+
+
+@kernel
+def _wrapped(angle: float) -> float:
+    """Same angle in (-pi, pi]; every joint limit of the arm lies inside."""
+    if angle > math.pi:
+        return angle - 2.0 * math.pi
+    return angle + 2.0 * math.pi if angle <= -math.pi else angle
+
+
+@kernel
+def _arm_branch(T: Array, geometry: Array, is_front: bool, seed: float, arm: Array) -> bool:
+    """Write q1, q2, d3 (3,) of one arm branch; whether the wrist centre can be reached at all.
+
+    On the axis of joint 1, where every q1 will do, the seed's is kept.
+    """
+    L6, d2 = geometry[0], geometry[1]
+    x, y, z = T[0, 3] - L6 * T[0, 2], T[1, 3] - L6 * T[1, 2], T[2, 3] - L6 * T[2, 2]
+    square = x * x + y * y - d2 * d2
+    is_reachable = square >= 0.0
+    radius = math.sqrt(max(square, 0.0))
+    if not is_front:
+        radius = -radius
+    arm[0] = seed
+    if abs(radius) > 1e-12 or d2 > 0.0:
+        arm[0] = _wrapped(math.atan2(y, x) - math.atan2(d2, radius))
+    arm[1] = math.atan2(radius, z)
+    arm[2] = math.sqrt(radius * radius + z * z)
+    return is_reachable
+
+
+@kernel
+def _wrist_frame(T: Array, q1: float, q2: float, M: Array) -> None:
+    """Write M (3, 3) = (Rz(q1) Ry(q2))ᵀ R, the rotation that is left to the wrist."""
+    c1, s1, c2, s2 = math.cos(q1), math.sin(q1), math.cos(q2), math.sin(q2)
+    for j in range(3):
+        h = c1 * T[0, j] + s1 * T[1, j]
+        M[0, j] = c2 * h - s2 * T[2, j]
+        M[1, j] = -s1 * T[0, j] + c1 * T[1, j]
+        M[2, j] = s2 * h + c2 * T[2, j]
+
+
+@kernel
+def _joint5(M: Array, q4: float) -> float:
+    """Joint 5 that brings the tool axis next to its wanted direction, given joint 4."""
+    return math.atan2(math.cos(q4) * M[0, 2] + math.sin(q4) * M[1, 2], M[2, 2])
+
+
+@kernel
+def _joint6(M: Array, q4: float, q5: float) -> float:
+    """Joint 6 that turns the tool next to its wanted attitude, given joints 4 and 5."""
+    c4, s4, c5, s5 = math.cos(q4), math.sin(q4), math.cos(q5), math.sin(q5)
+    sine = cosine = 0.0
+    for j in range(2):
+        h = c4 * M[0, j] + s4 * M[1, j]
+        x, y = c5 * h - s5 * M[2, j], -s4 * M[0, j] + c4 * M[1, j]
+        sine += y if j == 0 else -x
+        cosine += x if j == 0 else y
+    return math.atan2(sine, cosine)
+
+
+@kernel
+def _wrist_branch(M: Array, is_flipped: bool, seed: float, wrist: Array) -> None:
+    """Write q4, q5, q6 (3,) of one wrist branch; with axes 4 and 6 in line q4 keeps the seed."""
+    q4 = seed
+    if math.hypot(M[0, 2], M[1, 2]) > _COLLINEAR:
+        q4 = math.atan2(M[1, 2], M[0, 2])
+        if is_flipped:
+            q4 = _wrapped(q4 + math.pi)
+    wrist[0] = q4
+    wrist[1] = _joint5(M, q4)
+    wrist[2] = _joint6(M, q4, wrist[1])
+
+
+@kernel
+def _cost(q: Array, seed: Array, limits: Array) -> float:
+    """Largest joint move from the seed; branches outside the limits come after all others.
+
+    In a path (finite steps) limits do not count, so that the branch never changes.
+    """
+    worst, outside = 0.0, 0.0
+    for i in range(6):
+        worst = max(worst, abs(q[i] - seed[i]))
+        outside = max(outside, limits[0, i] - q[i], q[i] - limits[1, i])
+    is_path = math.isfinite(limits[2, 0])
+    return worst if is_path or outside <= 1e-12 else 100.0 + worst
+
+
+@kernel
+def _choose(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
+    """Write the best of the four branches; whether the wrist centre can be reached at all."""
+    best, is_reachable = math.inf, True
+    M, trial = np.empty((3, 3)), np.empty(6)
+    for arm in range(2):
+        is_reachable = _arm_branch(T, geometry, arm == 0, seed[0], trial)
+        _wrist_frame(T, trial[0], trial[1], M)
+        for wrist in range(2):
+            _wrist_branch(M, wrist == 1, seed[3], trial[3:])
+            cost = _cost(trial, seed, limits)
+            if cost < best:
+                best = cost
+                for i in range(6):
+                    q[i] = trial[i]
+    return is_reachable
+
+
+@kernel
+def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
+    """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
+
+    Where a limit or step holds a joint back, the joints after it make the best of it: the wrist
+    turns the tool as wanted from where the arm really is, joint 5 and then 6 from where joint 4
+    really is. At the wrist singularity joint 4 lags, joint 5 passes through zero with its sign,
+    and motion goes on at the other side.
+
+    Source:
+        Vongbunyong 2008, eqs. 4.5.1-4.5.9, atan2 throughout, and its rule for q5 = 0.
+    """
+    if not is_askable(T, seed):
+        return -1
+    is_reachable = _choose(T, seed, limits, geometry, q)
+    is_reachable = is_reachable and limits[0, 2] - 1e-9 <= q[2] <= limits[1, 2] + 1e-9
+    M = np.empty((3, 3))
+    for i in range(3):
+        q[i] = _bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+    _wrist_frame(T, q[0], q[1], M)
+    q[3] = _bounded(q[3], seed[3], limits[0, 3], limits[1, 3], limits[2, 3])
+    q[4] = _bounded(_joint5(M, q[3]), seed[4], limits[0, 4], limits[1, 4], limits[2, 4])
+    q6 = _joint6(M, q[3], q[4])
+    q[5] = _bounded(q6, seed[5], limits[0, 5], limits[1, 5], limits[2, 5])
+    reached = np.empty((4, 4))
+    fk(q, geometry, reached)
+    if not pose_residual(reached, T, residual):
+        return _LIMITED if is_reachable else _UNREACHABLE
+    is_near = abs(math.sin(q[4])) < _NEAR or q[2] * math.sin(q[1]) < _NEAR * _REACH
+    return _NEAR_SINGULAR if is_near else _FOLLOWED
+
+
+@kernel
+def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
+    """Write the four branches (4, 6), arm in front first, wrist not flipped first; their number.
+
+    On a singularity, where a joint is free, it is zero and branches may coincide.
+    """
+    M = np.empty((3, 3))
+    for arm in range(2):
+        for wrist in range(2):
+            q = solutions[2 * arm + wrist]
+            if not _arm_branch(T, geometry, arm == 0, 0.0, q):
+                return 0
+            _wrist_frame(T, q[0], q[1], M)
+            _wrist_branch(M, wrist == 1, 0.0, q[3:])
+    return 4
+
+
+def tendon_motor_angles(
+    joints: Array, *, ratio5: float = 1.0, ratio6: float = 1.0, coupling: float = 0.0
+) -> Array:
+    """Motor-side angles of tendon joints 5 and 6: q5* = ratio5 q5, q6* = ratio6 q6 + coupling q5.
+
+    The joint-6 tendon runs over an idler on axis 5, so a move of joint 5 pulls it. The defaults
+    are what the published numbers were computed with: no coupling. With the printed radii
+    ratio5 = r5/r5* = 0.7143, ratio6 = r6/r6* = 1.3889 and coupling = r5/r6* = 1.3889.
+
+    Args:
+        joints: Joint angles 5 and 6, (..., 2) [rad].
+        ratio5: Pulley ratio of joint 5, not 0.
+        ratio6: Pulley ratio of joint 6, not 0.
+        coupling: Motor-6 turn per joint-5 turn; its sign depends on the routing.
+
+    Returns:
+        Motor-side angles (..., 2) [rad].
+
+    Raises:
+        ParameterError: A ratio is zero.
+
+    Source:
+        Vongbunyong 2008, eqs. 3.5-3.7, completed by the balance of tendon travel.
+    """
+    return np.asarray(joints) @ _tendon_matrix(ratio5, ratio6, coupling).T
+
+
+def tendon_joint_angles(
+    motors: Array, *, ratio5: float = 1.0, ratio6: float = 1.0, coupling: float = 0.0
+) -> Array:
+    """Joint angles 5 and 6, (..., 2) [rad]: the inverse of :func:`tendon_motor_angles`."""
+    inverse = np.linalg.inv(_tendon_matrix(ratio5, ratio6, coupling))
+    return np.asarray(motors) @ inverse.T
+
+
+def _tendon_matrix(ratio5: float, ratio6: float, coupling: float) -> NDArray[np.float64]:
+    for name, ratio in (("ratio5", ratio5), ("ratio6", ratio6)):
+        if ratio == 0.0 or not math.isfinite(ratio):
+            raise ParameterError(name, ratio, "finite and not 0")
+    return np.array([[ratio5, 0.0], [coupling, ratio6]])
+
+
+def make(**geometry: float) -> Robot:
+    """RCRT-1 with published lengths; ``L6`` tool length, ``d2`` shoulder offset [m]."""
+    row = geometry_of(GEOMETRY, geometry)
+    for symbol, value in row.items():
+        if not 0.0 <= value <= 1.0:
+            raise ParameterError(symbol, value, "between 0 and 1 m")
+    return Robot(
+        name="rcrt1",
+        joint_names=JOINTS,
+        lower=LOWER.copy(),
+        upper=UPPER.copy(),
+        home=HOME.copy(),
+        geometry=row,
+        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        drives=rcrt1_dynamics.DRIVES,
+        dynamics=rcrt1_dynamics.DYNAMICS,
+    )

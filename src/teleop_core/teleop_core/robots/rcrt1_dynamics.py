@@ -1,0 +1,135 @@
+"""Dynamics of the RCRT-1: closed form for the first three axes, drive table for all six.
+
+The wrist is dominated by its motors: its axes are independent inertias. Parameters that the
+source does not print (friction, motor inertia of the wrist) are marked *assumed*.
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.compiled import kernel
+from teleop_core.geometry import Array
+from teleop_core.robots.robot import Drives, Dynamics
+
+# Symbols as in the source: moments about the link-frame origins [kg·m²], centres of mass G [m].
+LINKS = {
+    "I1yy": 0.012, "I2xx": 0.011, "I2yy": 0.013, "I2zz": 0.004, "I2xz": 3.0e-3,
+    "I3xx": 0.061, "I3yy": 0.061, "I3zz": 5.378e-4, "I3xz": 3.0e-3,
+    "m2": 1.704, "m3": 0.789, "G2x": 0.031842, "G2z": 0.03594, "G3x": 0.014664,
+    # The wrist centre has only the tool ahead of it, so the mass of link 3 lies behind it.
+    "G3z": -0.264245,
+    "m2b_L0b": 0.0,  # static moment of the four-bar's link 2b [kg·m], not given
+    # Reflected motor inertias: 81.6 taken as 1e-3 kg·m² at the output, as the catalogue does.
+    "J1": 0.0816, "J2": 0.0816,
+    "J3": 6.627e-7 * (2.0 * math.pi / 1e-3) ** 2,  # motor and screw through a 1 mm lead [kg]
+    "J4": 6.5e-8 * 141.0**2, "J5": 6.5e-8 * 76.0**2, "J6": 6.5e-8 * 76.0**2,  # assumed rotor
+    "g": 9.81,
+}  # fmt: skip
+_ORDER = {symbol: index for index, symbol in enumerate(LINKS)}
+_I1YY, _I2XX, _I2YY, _I2ZZ, _I2XZ = (_ORDER[s] for s in ("I1yy", "I2xx", "I2yy", "I2zz", "I2xz"))
+_I3XX, _I3YY, _I3ZZ, _I3XZ = (_ORDER[s] for s in ("I3xx", "I3yy", "I3zz", "I3xz"))
+_M2, _M3, _G2X, _G2Z, _G3X, _G3Z = (_ORDER[s] for s in ("m2", "m3", "G2x", "G2z", "G3x", "G3z"))
+_M2B, _J1, _G = _ORDER["m2b_L0b"], _ORDER["J1"], _ORDER["g"]
+
+
+def link_row(**symbols: float) -> Array:
+    """Parameter row of the kernels: :data:`LINKS` with the given symbols in their place."""
+    return np.array(list({**LINKS, **symbols}.values()), dtype=np.float64)
+
+
+@kernel
+def inertia_matrix(q: Array, p: Array, D: Array) -> None:
+    """Write the inertia (3, 3) of axes 1-3, reflected motors included.
+
+    Source:
+        Vongbunyong 2008, eqs. 4.6.1-4.6.3, derived again; D12 = D13 = 0 for this geometry.
+    """
+    s2, c2, d3 = math.sin(q[1]), math.cos(q[1]), q[2]
+    reach = p[_M3] * d3 * (d3 + 2.0 * p[_G3Z])
+    P = p[_I2XZ] + p[_I3XZ] + p[_M3] * d3 * p[_G3X]
+    D[0, 0] = p[_I1YY] + (p[_I2XX] + p[_I3XX] + reach) * s2 * s2 + p[_J1]
+    D[0, 0] += (p[_I2ZZ] + p[_I3ZZ]) * c2 * c2 + 2.0 * P * s2 * c2
+    D[0, 1] = D[1, 0] = D[0, 2] = D[2, 0] = 0.0
+    D[1, 1] = p[_I2YY] + p[_I3YY] + reach + p[_J1 + 1]
+    D[1, 2] = D[2, 1] = -p[_M3] * p[_G3X]
+    D[2, 2] = p[_M3] + p[_J1 + 2]
+
+
+@kernel
+def velocity_effort(q: Array, dq: Array, p: Array, h: Array) -> None:
+    """Write the Coriolis and centrifugal effort (3,) of axes 1-3.
+
+    Source:
+        Vongbunyong 2008, eq. 4.6.5, derived again from the Lagrangian.
+    """
+    s2, c2, d3 = math.sin(q[1]), math.cos(q[1]), q[2]
+    s22, c22 = 2.0 * s2 * c2, c2 * c2 - s2 * s2
+    m3, G3x, lever = p[_M3], p[_G3X], q[2] + p[_G3Z]
+    B = p[_I2XX] - p[_I2ZZ] + p[_I3XX] - p[_I3ZZ] + m3 * d3 * (d3 + 2.0 * p[_G3Z])
+    P = p[_I2XZ] + p[_I3XZ] + m3 * d3 * G3x
+    radial = m3 * (lever * (1.0 - c22) + G3x * s22)
+    h[0] = (B * s22 + 2.0 * P * c22) * dq[0] * dq[1] + radial * dq[0] * dq[2]
+    h[1] = 2.0 * m3 * lever * dq[1] * dq[2] - (0.5 * B * s22 + P * c22) * dq[0] * dq[0]
+    h[2] = -0.5 * radial * dq[0] * dq[0] - m3 * lever * dq[1] * dq[1]
+
+
+@kernel
+def gravity_effort(q: Array, p: Array, c: Array) -> None:
+    """Write the effort (6,) that holds the arm against gravity; wrist neglected.
+
+    Source:
+        Vongbunyong 2008, eqs. 4.6.6-4.6.8.
+    """
+    s2, c2 = math.sin(q[1]), math.cos(q[1])
+    along = p[_M2] * p[_G2Z] + p[_M3] * (p[_G3Z] + q[2]) + p[_M2B]
+    across = p[_M2] * p[_G2X] + p[_M3] * p[_G3X]
+    c[0] = 0.0
+    c[1] = -p[_G] * (along * s2 + across * c2)
+    c[2] = p[_M3] * p[_G] * c2
+    for i in range(3, 6):
+        c[i] = 0.0
+
+
+@kernel
+def acceleration(q: Array, dq: Array, effort: Array, p: Array, ddq: Array) -> None:
+    """Write joint accelerations (6,) under the net joint effort (drive less friction)."""
+    D, h, c = np.empty((3, 3)), np.empty(3), np.empty(6)
+    inertia_matrix(q, p, D)
+    velocity_effort(q, dq, p, h)
+    gravity_effort(q, p, c)
+    ddq[0] = (effort[0] - h[0] - c[0]) / D[0, 0]
+    a, b = effort[1] - h[1] - c[1], effort[2] - h[2] - c[2]
+    determinant = D[1, 1] * D[2, 2] - D[1, 2] * D[1, 2]
+    ddq[1] = (D[2, 2] * a - D[1, 2] * b) / determinant
+    ddq[2] = (D[1, 1] * b - D[1, 2] * a) / determinant
+    for i in range(3, 6):
+        ddq[i] = effort[i] / p[_J1 + i]
+
+
+DYNAMICS = Dynamics(
+    acceleration=acceleration,
+    gravity=gravity_effort,
+    parameters=link_row(),
+    compensated=np.array([False, True, False, False, False, False]),
+)
+
+_RPM = 2.0 * math.pi / 60.0
+DRIVES = Drives(
+    # Motors plus, at home, the links on axes 1-3.
+    inertia=np.array([0.115, 0.12, 26.95, LINKS["J4"], LINKS["J5"], LINKS["J6"]]),
+    viscous=np.array([0.4, 0.4, 30.0, 0.004, 0.002, 0.002]),  # assumed
+    coulomb=np.array([0.15, 0.15, 1.0, 0.010, 0.005, 0.005]),  # assumed
+    friction_speed=np.array([2e-3, 2e-3, 2e-4, 2e-2, 2e-2, 2e-2]),  # assumed
+    # Axis 3: 0.0056 N·m at the screw over the lifting factor 2.184e-4 N·m/N.
+    effort_limit=np.array([5.9, 5.9, 0.0056 / 2.184e-4, 0.3525, 0.19, 0.19]),
+    speed_limit=np.array(
+        [30.0 * _RPM, 30.0 * _RPM, 3719.677 / 60.0 * 1e-3, 70.213 * _RPM, 130.263 * _RPM,
+         130.263 * _RPM]
+    ),
+    encoder_step=np.array(
+        [2 * math.pi / (90 * 4000), 2 * math.pi / (90 * 4000), 1e-3 / (3.71 * 2048),
+         2 * math.pi / (141 * 2048), 2 * math.pi / (76 * 2048), 2 * math.pi / (76 * 2048)]
+    ),
+    bandwidth=np.array([60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),
+)  # fmt: skip
