@@ -1,0 +1,156 @@
+"""Messages: the one place that knows what a message's fields and bytes mean.
+
+Inside the package a message is a stamp and a row of numbers (:class:`~teleop_core.bags.topics.Kind`
+says which). Three ways lead from one to the other: :func:`layout` for whole streams and for single
+messages of a known stream (fast), :func:`read_values` and :func:`write_values` for messages of any
+other sender, :func:`report` and :func:`read_reports` for reports. Quaternions are w, x, y, z in
+values and x, y, z, w in messages.
+"""
+
+import math
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from teleop_core.bags.layouts import (
+    SECOND_NS,
+    Layout,
+    Stamps,
+    Values,
+    discover,
+    layout,
+    layout_of,
+)
+from teleop_core.bags.reports import Report, read_reports, report
+from teleop_core.bags.topics import Kind
+
+__all__ = [
+    "SECOND_NS", "Layout", "Refusal", "Report", "Stamps", "Values", "check", "discover", "layout",
+    "layout_of", "read_reports", "read_values", "report", "write_values",
+]  # fmt: skip
+
+QUATERNION_TOLERANCE = 1e-3
+
+
+class Refusal(Enum):
+    """Why a live message is not used."""
+
+    NOT_FINITE = "holds NaN or infinite numbers"
+    NOT_UNIT = "its quaternion is not of unit length"
+    NOT_NEWER = "its stamp is not newer than the last one"
+    WRONG_NAMES = "lacks a joint name of the robot"
+    WRONG_LENGTH = "has too few or too many numbers"
+
+
+def check(kind: Kind, stamp_ns: int, values: Values, last_stamp_ns: int | None) -> Refusal | None:
+    """Reason to refuse a live message, None if it is sound.
+
+    Args:
+        kind: What the values are.
+        stamp_ns: Stamp of the message, [ns].
+        values: Its numbers, shape (width,).
+        last_stamp_ns: Stamp of the last message used; None before the first.
+    """
+    numbers = values.tolist()
+    if not math.isfinite(sum(numbers)):
+        return Refusal.NOT_FINITE
+    if kind is Kind.POSE:
+        norm = math.hypot(*numbers[3:])
+        if abs(norm - 1.0) > QUATERNION_TOLERANCE:
+            return Refusal.NOT_UNIT
+    if last_stamp_ns is not None and stamp_ns <= last_stamp_ns:
+        return Refusal.NOT_NEWER
+    return None
+
+
+def read_values(
+    kind: Kind, message: Any, joint_names: tuple[str, ...] = ()
+) -> tuple[int, Values] | Refusal:
+    """Stamp [ns] and values of any message of a kind, read by attribute.
+
+    Args:
+        kind: What the values are.
+        message: From rclpy, or deserialised by rosbags.
+        joint_names: Wanted order of the joints; others in the message are left out. Empty takes
+            them as they come.
+
+    Returns:
+        Stamp and values, shape (width,); or why the message cannot be used. Velocities or efforts
+        that the message leaves empty are NaN.
+    """
+    stamp = message.header.stamp
+    values = _row(kind, message, joint_names)
+    if isinstance(values, Refusal):
+        return values
+    return stamp.sec * SECOND_NS + stamp.nanosec, np.array(values, dtype=np.float64)
+
+
+def _row(kind: Kind, message: Any, joint_names: tuple[str, ...]) -> list[float] | Refusal:
+    if kind is Kind.POSE:
+        p, q = message.pose.position, message.pose.orientation
+        return [p.x, p.y, p.z, q.w, q.x, q.y, q.z]
+    if kind is Kind.TWIST:
+        return _six(message.twist.linear, message.twist.angular)
+    if kind is Kind.WRENCH:
+        return _six(message.wrench.force, message.wrench.torque)
+    if kind is Kind.BUTTONS:
+        buttons = list(message.buttons)
+        return buttons if len(buttons) == kind.width(0) else Refusal.WRONG_LENGTH
+    return _joints(kind, message, joint_names)
+
+
+def _six(first: Any, second: Any) -> list[float]:
+    return [first.x, first.y, first.z, second.x, second.y, second.z]
+
+
+def _joints(kind: Kind, message: Any, joint_names: tuple[str, ...]) -> list[float] | Refusal:
+    names = list(message.name)
+    if any(name not in names for name in joint_names):
+        return Refusal.WRONG_NAMES
+    order = [names.index(name) for name in joint_names] or range(len(names))
+    parts = [message.position]
+    if kind is Kind.STATE:
+        parts += [message.velocity, message.effort]
+    row: list[float] = []
+    for index, part in enumerate(parts):
+        if len(part) != len(names) and (index == 0 or len(part) > 0):
+            return Refusal.WRONG_LENGTH
+        row += [part[i] for i in order] if len(part) else [math.nan] * len(order)
+    return row
+
+
+def write_values(
+    kind: Kind,
+    message: Any,
+    stamp_ns: int,
+    values: Values,
+    *,
+    frame_id: str = "",
+    joint_names: tuple[str, ...] = (),
+) -> Any:
+    """Fill a message with a stamp [ns] and values, shape (width,); returns the message."""
+    header, row = message.header, values.tolist()
+    header.stamp.sec, header.stamp.nanosec = divmod(stamp_ns, SECOND_NS)
+    header.frame_id = frame_id
+    if kind is Kind.POSE:
+        _set(message.pose.position, "xyz", row[:3])
+        _set(message.pose.orientation, "wxyz", row[3:])
+    elif kind is Kind.TWIST:
+        _set(message.twist.linear, "xyz", row[:3])
+        _set(message.twist.angular, "xyz", row[3:])
+    elif kind is Kind.WRENCH:
+        _set(message.wrench.force, "xyz", row[:3])
+        _set(message.wrench.torque, "xyz", row[3:])
+    elif kind is Kind.BUTTONS:
+        message.buttons = [int(number) for number in row]
+    else:
+        count = len(joint_names)
+        message.name, message.position = list(joint_names), row[:count]
+        message.velocity, message.effort = row[count : 2 * count], row[2 * count :]
+    return message
+
+
+def _set(target: Any, names: str, numbers: list[float]) -> None:
+    for name, number in zip(names, numbers, strict=True):
+        setattr(target, name, number)

@@ -1,0 +1,241 @@
+"""Reading recordings, our own and those of others, as columns or message by message."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from teleop_core.bags.messages import Report, read_reports
+from teleop_core.bags.ordered import in_order
+from teleop_core.bags.series import Column, Series, join, kind_of
+from teleop_core.bags.source import McapSource, Records
+from teleop_core.bags.topics import Kind, Topic
+from teleop_core.bags.writer import METADATA_NAME
+from teleop_core.errors import RecordingError
+
+__all__ = ["Bag", "Series", "TopicInfo"]
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """Message type of a topic, and how many messages there are."""
+
+    type: str
+    count: int
+
+
+def _name(topic: Topic | str) -> str:
+    return topic.name if isinstance(topic, Topic) else topic.removeprefix("/")
+
+
+class Bag:
+    """A recording, opened for reading.
+
+    Topics are named as in :mod:`teleop_core.bags.topics`, without the leading slash.
+
+    Args:
+        path: Directory of a recording, or one ``.mcap`` file.
+
+    Attributes:
+        topics: Topics in it, with type and count.
+        metadata: Names and texts stored by our writer; empty if others recorded it.
+        start_ns: First log time, [ns].
+        end_ns: Last log time, [ns].
+
+    Raises:
+        RecordingError: The path is missing, or is no recording, or was cut off, or is empty.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self._sources = [McapSource(file) for file in _files(self.path)]
+        counts: Counter[str] = Counter()
+        types: dict[str, str] = {}
+        self.metadata: dict[str, str] = {}
+        for source in self._sources:
+            found = source.contents
+            for number, channel in found.channels.items():
+                name = _name(channel.topic)
+                counts[name] += found.counts[number]
+                schema = found.schemas.get(channel.schema_id)
+                types[name] = schema.name if schema else ""
+            for record in found.metadata:
+                self.metadata |= record.metadata if record.name == METADATA_NAME else {}
+        self.topics = {name: TopicInfo(types[name], counts[name]) for name in types}
+        places = [place for source in self._sources for place in source.contents.places]
+        if not counts.total() or not places:
+            raise RecordingError(self.path, "holds no messages; record it again")
+        self.start_ns = min(place.start_ns for place in places)
+        self.end_ns = max(place.end_ns for place in places)
+
+    def require(self, topics: Iterable[Topic | str]) -> None:
+        """Insist on topics with at least one message.
+
+        Raises:
+            RecordingError: Lists what is missing and what there is.
+        """
+        missing = []
+        for topic in topics:
+            info = self.topics.get(_name(topic))
+            if info is None or not info.count:
+                missing.append(_name(topic))
+            elif isinstance(topic, Topic) and info.type != topic.kind.ros_type:
+                missing.append(f"{topic.name} as {topic.kind.ros_type}, not {info.type}")
+        if missing:
+            present = ", ".join(sorted(n for n, info in self.topics.items() if info.count))
+            raise RecordingError(self.path, f"lacks {', '.join(missing)}; it has {present}")
+
+    # -- columns ---------------------------------------------------------------------------------
+
+    def read(self, topic: Topic | str, joint_names: tuple[str, ...] | None = None) -> Series:
+        """All messages of one topic; see :meth:`read_many`."""
+        return self.read_many([topic], joint_names)[_name(topic)]
+
+    def read_many(
+        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
+    ) -> dict[str, Series]:
+        """All messages of some topics, in one pass over the file.
+
+        Args:
+            topics: Streams; reports are read with :meth:`reports`.
+            joint_names: Wanted order of joints; None for that in the recording.
+
+        Returns:
+            Topic names to series.
+
+        Raises:
+            RecordingError: A topic is missing or cannot be read as numbers, or the file is damaged.
+        """
+        columns = self._columns(topics, joint_names)
+        parts: dict[str, list[Series]] = {name: [] for name in columns}
+        for block in self._blocks(columns):
+            for name, series in block.items():
+                parts[name].append(series)
+        return {name: join(parts.pop(name), column) for name, column in columns.items()}
+
+    def blocks(
+        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
+    ) -> Iterator[dict[str, Series]]:
+        """As :meth:`read_many`, chunk by chunk: memory does not grow with the recording.
+
+        Chunks come as they stand in the file; topics without messages in a chunk are left out.
+        """
+        yield from self._blocks(self._columns(topics, joint_names))
+
+    def _columns(
+        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None
+    ) -> dict[str, Column]:
+        wanted = list(topics)
+        self.require(wanted)
+        columns = {}
+        for name in map(_name, wanted):
+            kind = kind_of(name, self.topics[name].type)
+            if kind is None or kind is Kind.REPORT:
+                reason = f"{name} is a {self.topics[name].type}, which is not read as numbers"
+                raise RecordingError(self.path, reason)
+            columns[name] = Column(name, kind, joint_names or ())
+        return columns
+
+    def _blocks(self, columns: dict[str, Column]) -> Iterator[dict[str, Series]]:
+        for source, records in self._records(columns):
+            block = {}
+            for name, column in columns.items():
+                own = np.flatnonzero(np.isin(records.channel, _numbers(source, name)))
+                if not len(own):
+                    continue
+                try:
+                    block[name] = column.read(
+                        records.data, records.begin[own], records.size[own], records.log_ns[own]
+                    )
+                except ValueError as error:
+                    raise RecordingError(self.path, f"{name} {error}") from error
+            yield block
+
+    def _records(self, names: Iterable[str]) -> Iterator[tuple[McapSource, Records]]:
+        for source in self._sources:
+            numbers = {number for name in names for number in _numbers(source, name)}
+            places = [
+                place
+                for place in source.contents.places
+                if place.channels is None or place.channels & numbers
+            ]
+            for records in source.records(places):
+                yield source, records
+
+    # -- single messages -------------------------------------------------------------------------
+
+    def reports(self, topic: Topic | str) -> list[Report]:
+        """All reports of a topic.
+
+        Raises:
+            RecordingError: The topic is missing or carries something else.
+        """
+        self.require([topic])
+        out = []
+        for _, _, _, data in self.raw([topic]):
+            try:
+                out += read_reports(data)
+            except ValueError as error:
+                raise RecordingError(self.path, f"{_name(topic)}: {error}") from error
+        return out
+
+    def raw(
+        self, topics: Iterable[Topic | str] | None = None
+    ) -> Iterator[tuple[str, str, int, bytes]]:
+        """Topic name, ROS type, log time [ns] and CDR bytes of messages in log-time order.
+
+        Args:
+            topics: Topics; None for all.
+        """
+        wanted = list(self.topics) if topics is None else [_name(topic) for topic in topics]
+        self.require(wanted if topics is not None else ())
+        for source in self._sources:
+            names = {number: name for name in wanted for number in _numbers(source, name)}
+            for number, log_ns, data in in_order(source, frozenset(names)):
+                name = names[number]
+                yield name, self.topics[name].type, log_ns, data
+
+
+def _numbers(source: McapSource, name: str) -> list[int]:
+    """Channels of a topic in one file; several publishers may have made several."""
+    return [n for n, channel in source.contents.channels.items() if _name(channel.topic) == name]
+
+
+def _files(path: Path) -> list[Path]:
+    """MCAP files of a recording, in order.
+
+    Raises:
+        RecordingError: There are none.
+    """
+    if not path.exists():
+        raise RecordingError(path, "does not exist; give a recording's directory or .mcap file")
+    if path.is_file():
+        return [path]
+    mcaps, others = sorted(path.glob("*.mcap")), sorted(path.glob("*.db3"))
+    index = path / "metadata.yaml"
+    if not mcaps and others:
+        raise RecordingError(path, "has the storage sqlite3, must be mcap: `ros2 bag convert` it")
+    if not mcaps:
+        raise RecordingError(path, "is no recording: it holds no .mcap file")
+    if not index.exists():
+        reason = f"was not finished (no metadata.yaml); `teleop recover {path}` saves what is there"
+        raise RecordingError(path, reason)
+    return _listed(path, index)
+
+
+def _listed(path: Path, index: Path) -> list[Path]:
+    try:
+        information = yaml.safe_load(index.read_text(encoding="utf-8"))
+        information = information["rosbag2_bagfile_information"]
+        files = [path / Path(name).name for name in information["relative_file_paths"]]
+        mode = information.get("compression_mode") or "none"
+    except (yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
+        raise RecordingError(index, "is damaged; read the .mcap file beside it") from error
+    if str(mode).lower() != "none":
+        raise RecordingError(path, f"is compressed by {mode}; `ros2 bag convert` it to plain mcap")
+    if missing := [file.name for file in files if not file.exists()]:
+        raise RecordingError(path, f"lacks its files {', '.join(missing)}")
+    return files

@@ -1,0 +1,52 @@
+"""Recording parameters: which topics are recorded, at what rate and how compressed."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from teleop_core.bags import compression
+from teleop_core.bags.topics import BY_NAME, Kind, Topic
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.parameters import parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingParameters:
+    """Parameters of :class:`~teleop_core.bags.writer.BagWriter`."""
+
+    compression: str = parameter(
+        "zstd", doc="compression of the bag", choices=compression.NAMES, fixed=True
+    )
+    compression_level: int = parameter(
+        1, doc="effort of the compression: more is slower", lower=1, upper=16, fixed=True
+    )
+    topics: tuple[str, ...] = parameter((), doc="topics to record; empty for all", fixed=True)
+    every: int = parameter(
+        1, doc="record every n-th sample of the streams", lower=1, upper=1_000_000, fixed=True
+    )
+    every_of: tuple[str, ...] = parameter(
+        (), doc="exceptions from every, as topic=n, e.g. slave/measured_js=10", fixed=True
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse unknown names and entries that are not topic=n."""
+        if self.compression not in compression.NAMES:
+            raise UnknownNameError("compression", self.compression, compression.NAMES)
+        if self.every < 1:
+            raise ParameterError("every", self.every, "at least 1")
+        for name in (*self.topics, *(entry.partition("=")[0] for entry in self.every_of)):
+            if name not in BY_NAME:
+                raise UnknownNameError("recorded topic", name, BY_NAME)
+        for entry in self.every_of:
+            number = entry.partition("=")[2]
+            if not (number.isascii() and number.isdigit() and int(number) > 0):
+                raise ParameterError("every_of", entry, "topic=n with a whole number n >= 1")
+
+    def every_nth(self, topics: Iterable[Topic]) -> dict[str, int]:
+        """Of which samples one is recorded, for each topic; 0 if the topic is not recorded."""
+        exceptions = dict(entry.split("=") for entry in self.every_of)
+        out = {}
+        for topic in topics:
+            number = 1 if topic.kind is Kind.REPORT else self.every
+            is_wanted = not self.topics or topic.name in self.topics
+            out[topic.name] = int(exceptions.get(topic.name, number)) * is_wanted
+        return out

@@ -1,0 +1,44 @@
+"""ROS types: definitions, hashes and serialisation of Jazzy messages without a ROS installation."""
+
+from functools import cache
+from typing import Any
+
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_typestore
+
+DISTRIBUTION = "jazzy"
+
+
+@cache
+def typestore() -> Any:
+    """All message types of the distribution; loaded on first use (60 ms)."""
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+@cache
+def definition(ros_type: str) -> str:
+    """Text of a message type and of all types in it, as a ``ros2msg`` schema."""
+    return str(typestore().generate_msgdef(ros_type, ros_version=2)[0])
+
+
+@cache
+def type_hash(ros_type: str) -> str:
+    """RIHS01 hash of a message type."""
+    return str(typestore().hash_rihs01(ros_type))
+
+
+def deserialise(data: bytes, ros_type: str) -> Any:
+    """Message with the attributes of its ROS type.
+
+    Raises:
+        ValueError: The bytes are no such message.
+    """
+    try:
+        return typestore().deserialize_cdr(data, ros_type)
+    except (SerdeError, AssertionError, IndexError, ValueError) as error:
+        raise ValueError(f"{len(data)} bytes are no {ros_type}: {error!r}") from error
+
+
+def serialise(message: Any) -> bytes:
+    """CDR of a message made of the types of :func:`typestore`."""
+    return bytes(typestore().serialize_cdr(message, message.__msgtype__))

@@ -1,0 +1,131 @@
+"""The rosbag2 side of a recording: topics as MCAP records, and ``metadata.yaml``."""
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+from mcap.records import Channel, Schema, Statistics
+
+from teleop_core.bags import ros_types
+from teleop_core.bags.topics import Quality, Topic
+
+VERSION = 9
+_FOREVER = {"sec": 9223372036, "nsec": 854775807}
+_QUALITIES = {
+    Quality.STREAM: ("best_effort", "volatile", 1),
+    Quality.LATCHED: ("reliable", "transient_local", 1),
+    Quality.REPORT: ("reliable", "volatile", 10),
+}
+
+
+def offered_qos(quality: Quality) -> list[dict[str, Any]]:
+    """Quality of service of a topic's publisher, as rosbag2 writes it since version 9."""
+    reliability, durability, depth = _QUALITIES[quality]
+    profile = {
+        "history": "keep_last", "depth": depth, "reliability": reliability,
+        "durability": durability, "deadline": dict(_FOREVER), "lifespan": dict(_FOREVER),
+        "liveliness": "automatic", "liveliness_lease_duration": dict(_FOREVER),
+        "avoid_ros_namespace_conventions": False,
+    }  # fmt: skip
+    return [profile]
+
+
+def records_of(topics: list[Topic]) -> tuple[list[Schema], list[Channel]]:
+    """MCAP schemas and channels of topics; a topic's channel is its place in the list plus one."""
+    names = list(dict.fromkeys(topic.kind.ros_type for topic in topics))
+    schemas = [
+        Schema(number, ros_types.definition(name).encode(), "ros2msg", name)
+        for number, name in enumerate(names, start=1)
+    ]
+    channels = []
+    for number, topic in enumerate(topics, start=1):
+        entries = {
+            "offered_qos_profiles": _text(offered_qos(topic.quality)),
+            "topic_type_hash": ros_types.type_hash(topic.kind.ros_type),
+        }
+        schema = 1 + names.index(topic.kind.ros_type)
+        channels.append(Channel(number, "/" + topic.name, "cdr", entries, schema))
+    return schemas, channels
+
+
+class _Plain(yaml.SafeDumper):
+    """Writes equal parts in full instead of as references."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _text(value: Any) -> str:
+    return yaml.dump(value, Dumper=_Plain, sort_keys=False, allow_unicode=True)
+
+
+def _topic_entry(channel: Channel, type_name: str, count: int) -> dict[str, Any]:
+    return {
+        "topic_metadata": {
+            "name": channel.topic,
+            "type": type_name,
+            "serialization_format": channel.message_encoding,
+            "offered_qos_profiles": yaml.safe_load(
+                channel.metadata.get("offered_qos_profiles") or "[]"
+            ),
+            "type_description_hash": channel.metadata.get("topic_type_hash", ""),
+        },
+        "message_count": count,
+    }
+
+
+def metadata_text(
+    file: Path,
+    schemas: list[Schema],
+    channels: list[Channel],
+    statistics: Statistics,
+    start_ns: int,
+) -> str:
+    """Content of ``metadata.yaml`` of a directory with one finished file.
+
+    Args:
+        file: The MCAP file.
+        schemas: Its message types.
+        channels: Its topics.
+        statistics: Its numbers of messages.
+        start_ns: Starting time if there are no messages, [ns].
+    """
+    types = {schema.id: schema.name for schema in schemas}
+    begin = statistics.message_start_time if statistics.message_count else start_ns
+    end = statistics.message_end_time if statistics.message_count else start_ns
+    span = {
+        "starting_time": {"nanoseconds_since_epoch": begin},
+        "duration": {"nanoseconds": end - begin},
+        "message_count": statistics.message_count,
+    }
+    counts = statistics.channel_message_counts
+    information = {
+        "version": VERSION,
+        "storage_identifier": "mcap",
+        **span,
+        "topics_with_message_count": [
+            _topic_entry(c, types.get(c.schema_id, ""), counts.get(c.id, 0)) for c in channels
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file.name],
+        "files": [{"path": file.name, **span}],
+        "custom_data": None,
+        "ros_distro": ros_types.DISTRIBUTION,
+    }
+    return _text({"rosbag2_bagfile_information": information})
+
+
+def write_metadata(directory: Path, text: str) -> None:
+    """Write ``metadata.yaml`` as a whole or not at all.
+
+    Raises:
+        OSError: Not written.
+    """
+    draft = directory / "metadata.yaml.part"
+    try:
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(directory / "metadata.yaml")
+    except OSError:
+        draft.unlink(missing_ok=True)
+        raise

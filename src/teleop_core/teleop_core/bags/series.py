@@ -1,0 +1,126 @@
+"""Series: the messages of one topic as columns, collected stretch by stretch."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.bags import ros_types
+from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values, discover
+from teleop_core.bags.messages import Refusal, read_values
+from teleop_core.bags.topics import BY_NAME, Kind
+from teleop_core.bags.walk import gather
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Messages of one topic in the order of their log times.
+
+    Attributes:
+        stamp_ns: Stamps of the headers, shape (N,), [ns].
+        log_ns: Times of recording, shape (N,), [ns].
+        values: Columns as in :class:`~teleop_core.bags.topics.Kind`, shape (N, width).
+        names: Joint names in the order of the columns; empty without joints.
+        frame_id: Frame in the header of the first message.
+    """
+
+    stamp_ns: Stamps
+    log_ns: Stamps
+    values: Values
+    names: tuple[str, ...] = ()
+    frame_id: str = ""
+
+    def __len__(self) -> int:
+        return len(self.stamp_ns)
+
+
+def kind_of(name: str, ros_type: str) -> Kind | None:
+    """What the values of a topic are; None if messages of its type are not read."""
+    topic = BY_NAME.get(name)
+    if topic is not None and topic.kind.ros_type == ros_type:
+        return topic.kind
+    return next((kind for kind in reversed(Kind) if kind.ros_type == ros_type), None)
+
+
+class Column:
+    """Reader of one topic's messages.
+
+    Args:
+        name: Topic.
+        kind: What its values are; for joints of a foreign topic the first message decides.
+        joint_names: Wanted order of the joints; empty for that of the first message.
+    """
+
+    def __init__(self, name: str, kind: Kind, joint_names: tuple[str, ...]) -> None:
+        self.name, self.kind, self._wanted = name, kind, joint_names
+        self._layout: Layout | None = None
+        self.names: tuple[str, ...] = ()
+        self.frame_id = ""
+        self._is_new = True
+
+    def read(self, data: Bytes, begins: Stamps, sizes: Stamps, log_ns: Stamps) -> Series:
+        """Series of messages ``data[begins[i] : begins[i] + sizes[i]]``.
+
+        Raises:
+            ValueError: A message is not what its topic promises; the text says why.
+        """
+        if self._is_new and len(begins):
+            self._learn(bytes(data[begins[0] : begins[0] + sizes[0]]))
+        stamps, values = self._fast(data, begins, sizes) or self._slow(data, begins, sizes)
+        return Series(stamps, log_ns.copy(), values, self.names, self.frame_id)
+
+    def _learn(self, first: bytes) -> None:
+        self._is_new = False
+        if self.kind is Kind.STATE and self.name not in BY_NAME:
+            message = ros_types.deserialise(first, self.kind.ros_type)
+            self.kind = Kind.STATE if len(message.velocity) else Kind.JOINTS
+        self._layout = discover(self.kind, first)
+        if self._layout is not None:
+            names, self.frame_id = self._layout.joint_names, self._layout.frame_id
+        else:
+            message = ros_types.deserialise(first, self.kind.ros_type)
+            names, self.frame_id = tuple(getattr(message, "name", ())), message.header.frame_id
+        self.names = (self._wanted or names) if names else ()
+        if missing := [name for name in self.names if name not in names]:
+            raise ValueError(f"lacks joints {', '.join(missing)}; it has {', '.join(names)}")
+
+    def _fast(self, data: Bytes, begins: Stamps, sizes: Stamps) -> tuple[Stamps, Values] | None:
+        """Stamps and values if all messages are alike."""
+        form = self._layout
+        if form is None or not len(sizes) or sizes.min() != sizes.max() or sizes[0] < form.size:
+            return None
+        rows = gather(data, begins, form.size)
+        if not form.matches(rows):
+            return None
+        stamps, values = form.decode(rows)
+        if self.names != form.joint_names:
+            count = len(form.joint_names)
+            joints = [form.joint_names.index(name) for name in self.names]
+            columns = [part + joint for part in range(0, form.width, count) for joint in joints]
+            values = values[:, columns]
+        return stamps, values
+
+    def _slow(self, data: Bytes, begins: Stamps, sizes: Stamps) -> tuple[Stamps, Values]:
+        """Stamps and values message by message."""
+        stamps = np.empty(len(begins), np.int64)
+        values = np.empty((len(begins), self.kind.width(len(self.names))))
+        for i, (begin, size) in enumerate(zip(begins.tolist(), sizes.tolist(), strict=True)):
+            message = ros_types.deserialise(bytes(data[begin : begin + size]), self.kind.ros_type)
+            result = read_values(self.kind, message, self.names)
+            if isinstance(result, Refusal):
+                raise ValueError(f"has a message that {result.value}")
+            stamps[i], values[i] = result
+        return stamps, values
+
+
+def join(parts: list[Series], column: Column) -> Series:
+    """One series of all parts, in the order of log times."""
+    if not parts:
+        width = column.kind.width(len(column.names))
+        return Series(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, width)))
+    stamps = np.concatenate([part.stamp_ns for part in parts])
+    logs = np.concatenate([part.log_ns for part in parts])
+    values = np.concatenate([part.values for part in parts])
+    if (np.diff(logs) < 0).any():
+        order = np.argsort(logs, kind="stable")
+        stamps, logs, values = stamps[order], logs[order], values[order]
+    return Series(stamps, logs, values, column.names, column.frame_id)

@@ -1,0 +1,86 @@
+"""Walking through MCAP records: compiled, since every message of a recording passes here."""
+
+import numpy as np
+from mcap.opcode import Opcode
+from numpy.typing import NDArray
+
+from teleop_core.bags.layouts import Bytes, Stamps
+from teleop_core.compiled import kernel
+
+Rows = NDArray[np.int64]
+_MESSAGE = int(Opcode.MESSAGE)
+_MESSAGE_HEAD = 22
+OPCODE, BEGIN, SIZE, CHANNEL, LOG = range(5)
+
+
+@kernel
+def _little_endian(data, at, count):  # type: ignore[no-untyped-def]
+    """Unsigned number of ``count`` bytes; of eight bytes as a signed one."""
+    number = np.int64(0)
+    for i in range(count):
+        number |= np.int64(data[at + i]) << (8 * i)
+    return number
+
+
+@kernel
+def _walk(data, at, end, rows):  # type: ignore[no-untyped-def]
+    """Fill rows with opcode, begin, size, channel, log time; number filled and where it ended."""
+    count = 0
+    while at + 9 <= end and count < len(rows):
+        size = _little_endian(data, at + 1, 8)
+        if size < 0 or size > end - at - 9:
+            break
+        rows[count, 0] = data[at]
+        rows[count, 1] = at + 9
+        rows[count, 2] = size
+        rows[count, 3] = -1
+        rows[count, 4] = -1
+        if data[at] == _MESSAGE:
+            if size < _MESSAGE_HEAD:
+                break
+            rows[count, 1] = at + 9 + _MESSAGE_HEAD
+            rows[count, 2] = size - _MESSAGE_HEAD
+            rows[count, 3] = _little_endian(data, at + 9, 2)
+            rows[count, 4] = _little_endian(data, at + 15, 8)
+        count += 1
+        at += 9 + size
+    return count, at
+
+
+@kernel
+def _gather(data, begins, out):  # type: ignore[no-untyped-def]
+    """Copy pieces of equal size from anywhere into rows."""
+    for i in range(len(begins)):
+        begin = begins[i]
+        for j in range(out.shape[1]):
+            out[i, j] = data[begin + j]
+
+
+def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
+    """Whole records between two places.
+
+    Args:
+        data: Read-only bytes.
+        begin: Where the first record begins.
+        end: Where the last one ends at the latest.
+
+    Returns:
+        Rows of (opcode, begin of the payload, its size, channel, log time [ns]), shape (n, 5),
+        where the payload of a message is its CDR, and other records have channel and time -1; and
+        where the last whole record ends.
+    """
+    parts = []
+    while True:
+        rows = np.empty(((end - begin) // (9 + _MESSAGE_HEAD) + 16, 5), np.int64)
+        count, at = _walk(data, begin, end, rows)
+        parts.append(rows[:count])
+        if count < len(rows):
+            return np.concatenate(parts) if len(parts) > 1 else parts[0], at
+        begin = at
+
+
+def gather(data: Bytes, begins: Stamps, size: int) -> Bytes:
+    """Pieces of one size that begin at these places, shape (n, size)."""
+    out = np.empty((len(begins), size), np.uint8)
+    _gather(data, np.ascontiguousarray(begins), out)
+    return out

@@ -1,0 +1,312 @@
+"""Writing recordings: streams in blocks and single messages become a rosbag2 directory.
+
+Building, compressing and writing happen in a thread of their own, in the order of the calls, so
+that the same calls give the same bytes. Everything given to the writer is copied first.
+"""
+
+import queue
+import threading
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.bags import compression as compressions
+from teleop_core.bags import rosbag2
+from teleop_core.bags.chunks import Single, Stretch, assemble
+from teleop_core.bags.layouts import SECOND_NS, Layout, Stamps, Values, layout
+from teleop_core.bags.mcap_file import McapFile
+from teleop_core.bags.recording import RecordingParameters
+from teleop_core.bags.topics import Kind, Topic
+from teleop_core.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
+
+CHUNK_BYTES = 1 << 20
+METADATA_NAME = "teleop_core"
+Block = Mapping[Topic, tuple[Stamps, Values, Stamps]]
+
+
+class _Job(NamedTuple):
+    """What becomes one or more chunks."""
+
+    stretches: list[Stretch]
+    singles: list[Single]
+
+
+class _Channel:
+    """A topic being recorded: ``every`` is 0 if it is not, ``seen`` counts what came."""
+
+    __slots__ = ("every", "layout", "number", "recorded", "seen")
+
+    def __init__(self, number: int, every: int, form: Layout | None) -> None:
+        self.number, self.every, self.layout = number, every, form
+        self.seen = self.recorded = 0
+
+
+class BagWriter:
+    """Recorder of one session, to be used with ``with``.
+
+    Args:
+        path: Directory to make.
+        topics: Topics that may be written; those that the parameters deselect are passed over.
+        joint_names: Joints of the robot, in the order of the columns.
+        parameters: Which topics are recorded, at what rate and how compressed.
+        compression: Takes the place of ``parameters.compression``.
+        metadata: Names and texts stored with the recording: configuration, seed.
+        start_ns: Log time at which the session starts, [ns].
+
+    Raises:
+        RecordingError: The path exists already or cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        topics: Iterable[Topic],
+        joint_names: tuple[str, ...],
+        *,
+        parameters: RecordingParameters | None = None,
+        compression: str | None = None,
+        metadata: Mapping[str, str] | None = None,
+        start_ns: int = 0,
+    ) -> None:
+        self.path, self._start_ns = Path(path), start_ns
+        self.parameters = parameters or RecordingParameters()
+        if compression is not None:
+            self.parameters = replace(self.parameters, compression=compression)
+        declared = list(topics)
+        every = self.parameters.every_nth(declared)
+        self._topics = [topic for topic in declared if every[topic.name]]
+        numbers = {topic.name: i for i, topic in enumerate(self._topics, start=1)}
+        self._channels = {
+            topic.name: _Channel(
+                numbers.get(topic.name, 0), every[topic.name],
+                None if topic.kind is Kind.REPORT else layout(topic, joint_names),
+            )
+            for topic in declared
+        }  # fmt: skip
+        self._singles: list[Single] = []
+        self._bytes, self._first_ns = 0, 0
+        self._failure: BaseException | None = None
+        self._is_open = True
+        self._mcap = self._create({METADATA_NAME: dict(metadata or {})})
+        self._jobs: queue.Queue[_Job | None] = queue.Queue(maxsize=4)
+        self._worker = threading.Thread(target=self._work, name="bag writer", daemon=True)
+        self._worker.start()
+
+    def _create(self, metadata: dict[str, dict[str, str]]) -> McapFile:
+        name = self.parameters.compression
+        compress = compressions.compressor(name, self.parameters.compression_level)
+        schemas, channels = rosbag2.records_of(self._topics)
+        try:
+            self.path.mkdir(parents=True)
+            file = self.path / f"{self.path.resolve().name}_0.mcap"
+            return McapFile(
+                file, schemas, channels, metadata, "" if name == "none" else name, compress
+            )
+        except FileExistsError as error:
+            raise RecordingError(self.path, "exists already; choose another --out") from error
+        except OSError as error:
+            raise RecordingError(self.path, f"cannot be written: {error.strerror}") from error
+
+    # -- what callers do -------------------------------------------------------------------------
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages given for recording so far, per recorded topic, decimation applied."""
+        return {topic.name: self._channels[topic.name].recorded for topic in self._topics}
+
+    def write(self, topic: Topic, log_ns: int, data: bytes, publish_ns: int | None = None) -> None:
+        """Record one message.
+
+        Args:
+            topic: Its topic.
+            log_ns: Time at which it came, [ns].
+            data: Its CDR bytes.
+            publish_ns: Time at which it was sent, [ns]; None if unknown.
+
+        Raises:
+            RecordingError: Writing has failed, now or earlier.
+            UnknownNameError: The topic was not announced.
+        """
+        channel = self._channels.get(topic.name) or self._unknown(topic)
+        if channel.every != 1:
+            channel.seen += 1
+            if channel.every == 0 or (channel.seen - 1) % channel.every:
+                return
+        sequence = channel.recorded
+        channel.recorded = sequence + 1
+        singles = self._singles
+        if not singles:
+            self._first_ns = log_ns
+        singles.append(
+            Single(
+                channel.number, sequence, log_ns, log_ns if publish_ns is None else publish_ns, data
+            )
+        )
+        self._bytes += len(data)
+        if self._bytes > CHUNK_BYTES or log_ns - self._first_ns >= SECOND_NS:
+            self.flush()
+
+    def write_block(self, block: Block) -> None:
+        """Record samples of streams, at best about a second of them at a time.
+
+        Args:
+            block: Per topic stamps [ns], shape (N,); values, shape (N, width); and log times
+                [ns], shape (N,), which do not decrease. N may differ between topics.
+
+        Raises:
+            RecordingError: Writing has failed, now or earlier.
+            ShapeError: Arrays of a topic do not fit each other or the topic.
+            UnknownNameError: A topic was not announced.
+        """
+        stretches = []
+        for topic, (stamp_ns, values, log_ns) in block.items():
+            channel = self._channels.get(topic.name) or self._unknown(topic)
+            stretch = _stretch(topic, channel, stamp_ns, values, log_ns)
+            channel.seen += len(values)
+            channel.recorded += len(stretch.log_ns)
+            if len(stretch.log_ns):
+                stretches.append(stretch)
+        self._hand_over(stretches)
+
+    def flush(self) -> None:
+        """Hand single messages that wait for more of them to the disk.
+
+        Raises:
+            RecordingError: Writing has failed, now or earlier.
+        """
+        self._hand_over([])
+
+    def close(self) -> None:
+        """Write what is left and finish the recording; further calls do nothing.
+
+        Raises:
+            RecordingError: Writing has failed, now or earlier.
+        """
+        if not self._is_open:
+            return
+        self._is_open = False
+        if self._singles and self._failure is None:
+            self._jobs.put(_Job([], self._singles))
+        self._jobs.put(None)
+        self._worker.join()
+        self._raise_failure()
+
+    def __enter__(self) -> "BagWriter":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is not None and error is self._failure:
+            self._failure = None  # on its way already
+        self.close()
+
+    # -- between the threads ---------------------------------------------------------------------
+
+    def _unknown(self, topic: Topic) -> _Channel:
+        raise UnknownNameError("topic", topic.name, self._channels)
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+
+    def _hand_over(self, stretches: list[Stretch]) -> None:
+        self._raise_failure()
+        if not self._is_open:
+            raise RecordingError(self.path, "is closed; nothing more can be recorded")
+        if stretches or self._singles:
+            self._jobs.put(_Job(stretches, self._singles))
+            self._singles, self._bytes = [], 0
+
+    # -- the writing thread ----------------------------------------------------------------------
+
+    def _work(self) -> None:
+        try:
+            while (job := self._jobs.get()) is not None:
+                for part in _parts(job):
+                    self._mcap.append(assemble(*part))
+            self._finish()
+        except OSError as error:
+            self._failure = self._salvage(error)
+        except BaseException as error:
+            self._failure = error
+        finally:
+            self._mcap.close()
+        if self._failure is not None and self._is_open:
+            while self._jobs.get() is not None:  # callers must never wait for a dead thread
+                pass
+
+    def _finish(self) -> None:
+        """End the file and the directory behind the last chunk for which there is room."""
+        while True:
+            try:
+                self._mcap.finish()
+                mcap = self._mcap
+                rosbag2.write_metadata(
+                    self.path,
+                    rosbag2.metadata_text(
+                        mcap.path, mcap.schemas, mcap.channels, mcap.statistics(), self._start_ns
+                    ),
+                )
+            except OSError:
+                if not self._mcap.drop_last():
+                    raise
+            else:
+                return
+
+    def _salvage(self, error: OSError) -> RecordingError:
+        reason = f"cannot be written any further ({error.strerror}); "
+        try:
+            self._finish()
+        except OSError:
+            return RecordingError(self.path, reason + "nothing could be saved")
+        safe = self._mcap.statistics()
+        seconds = max(0, safe.message_end_time - self._start_ns) / SECOND_NS
+        text = f"the first {seconds:.1f} s ({safe.message_count} messages) are safe"
+        return RecordingError(self.path, reason + text)
+
+
+def _stretch(
+    topic: Topic, channel: _Channel, stamp_ns: Stamps, values: Values, log_ns: Stamps
+) -> Stretch:
+    """Copy of the samples that are recorded."""
+    form = channel.layout
+    if form is None:
+        raise ParameterError("topic of a block", topic.name, "a stream; write() takes reports")
+    if values.shape != (len(log_ns), form.width) or stamp_ns.shape != log_ns.shape:
+        raise ShapeError(f"values of {topic.name}", (len(log_ns), form.width), values.shape)
+    part = slice(-channel.seen % channel.every, None, channel.every) if channel.every else slice(0)
+    return Stretch(
+        channel.number,
+        channel.recorded,
+        form,
+        np.array(stamp_ns[part], np.int64),
+        np.array(values[part], np.float64),
+        np.array(log_ns[part], np.int64),
+    )
+
+
+def _parts(job: _Job) -> list[_Job]:
+    """The job in pieces of about a chunk that follow each other in time."""
+    size = sum(s.size * len(s.log_ns) for s in job.stretches)
+    if size <= 2 * CHUNK_BYTES:
+        return [job]
+    logs = np.sort(np.concatenate([s.log_ns for s in job.stretches]))
+    pieces = -(-size // CHUNK_BYTES)
+    cuts = np.unique(logs[[len(logs) * i // pieces for i in range(1, pieces)]]).tolist()
+    bounds = [-(2**62), *cuts, 2**62]
+    out = []
+    for begin, end in pairwise(bounds):
+        singles = [s for s in job.singles if begin <= s.log_ns < end]
+        stretches = [s.between(begin, end) for s in job.stretches]
+        if singles or any(len(s.log_ns) for s in stretches):
+            out.append(_Job(stretches, singles))
+    return out
