@@ -16,13 +16,13 @@ def list_robots() -> tuple[str, ...]:
     return tuple(_MODULES)
 
 
-def load_robot(name: str, **geometry: float) -> Robot:
+def load_robot(name: str, **geometry: float | str) -> Robot:
     """Robot by name.
 
     Args:
         name: One of :func:`list_robots`.
         **geometry: Lengths and angles in place of the published ones [m, rad], by the symbols of
-            the robot's file.
+            the robot's file; a robot may take named options too, such as ``heading="carried"``.
 
     Returns:
         The robot.

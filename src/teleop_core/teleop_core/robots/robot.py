@@ -24,6 +24,8 @@ GRAVITY = types.void(_ROW, _ROW, _ROW)
 
 # A pose counts as reached within this distance [m] and angle [rad].
 REACHED = 1e-9
+# Most joint vectors that one pose can have: the three-fingered hand, four for each finger.
+MAX_BRANCHES = 64
 
 
 class IkStatus(IntEnum):
@@ -362,7 +364,7 @@ class Robot:
         pose = checked_array("T", T, (4, 4))
         if pose.ndim != 2 or not is_rigid(pose):
             raise ParameterError("T", pose.tolist(), _ASKABLE)
-        solutions = np.empty((16, self.n))
+        solutions = np.empty((MAX_BRANCHES, self.n))
         return solutions[: self.kernels.ik_all(pose, self.geometry_row, solutions)].copy()
 
 
@@ -380,16 +382,18 @@ def _is_ready(value: Any, shape: tuple[int, ...]) -> TypeGuard[Array]:
     )
 
 
-def geometry_of(defaults: Mapping[str, float], given: Mapping[str, float]) -> dict[str, float]:
+def geometry_of(
+    defaults: Mapping[str, float], given: Mapping[str, float | str]
+) -> dict[str, float]:
     """Published geometry with the given symbols in its place.
 
     Raises:
         UnknownNameError: A symbol the robot does not have.
-        ParameterError: A value that is not finite.
+        ParameterError: A value that is not a finite number.
     """
     for symbol, value in given.items():
         if symbol not in defaults:
             raise UnknownNameError("geometry", symbol, defaults)
-        if not math.isfinite(value):
-            raise ParameterError(symbol, value, "finite [m or rad]")
-    return {**defaults, **given}
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            raise ParameterError(symbol, value, "a finite number [m or rad]")
+    return {**defaults, **{symbol: float(value) for symbol, value in given.items()}}
