@@ -5,12 +5,19 @@ a kernel that it calls changes; a stale caller would silently go on with old for
 stamp of a cached kernel therefore covers the files of all kernels it calls.
 """
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba.core.caching import NullCache
+from numba.core.ccallback import CFunc
+from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.core.sigutils import normalize_signature
+
+# Function pointers as arguments are what lets one compiled graph run any robot.
+warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatureWarning)
 
 _sources: dict[Any, frozenset[str]] = {}
 
@@ -22,11 +29,15 @@ def _stamped(compiled: Any, function: Callable[..., Any]) -> Any:
     inner = [_sources[value.py_func] for value in called if _is_kernel(value)]
     files = frozenset([code.co_filename]).union(*inner)
     _sources[function] = files
+    _stamp(compiled, files)
+    return compiled
+
+
+def _stamp(compiled: Any, files: frozenset[str]) -> None:
     if not isinstance(compiled._cache, NullCache):
         stats = [Path(file).stat() for file in sorted(files)]
         stamp = (max(s.st_mtime for s in stats), sum(s.st_size for s in stats))
         compiled._cache._cache_file._source_stamp = stamp
-    return compiled
 
 
 def _is_kernel(value: object) -> bool:
@@ -53,4 +64,11 @@ def pointer(compiled: Any, signature: Any) -> Any:
     Returns:
         The callable to hand to a kernel.
     """
-    return numba.cfunc(signature, cache=True)(compiled.py_func)
+    # What numba.cfunc does, but with our stamp: both live in one cache file, and with different
+    # stamps each would throw the other away.
+    function = compiled.py_func
+    callback = CFunc(function, normalize_signature(signature), locals={}, options={})
+    callback.enable_caching()
+    _stamp(callback, _sources[function])
+    callback.compile()
+    return callback
