@@ -7,6 +7,7 @@ the order of the streams. So readers that ignore the index see them in the right
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from mcap.opcode import Opcode
 from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values
 
 HEADER = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
+_FOREVER = 2**62
 _LENGTH_OF_REST = HEADER.size - 9  # of the header, counted by the record's length
 _HEADER = np.dtype(
     {
@@ -39,22 +41,18 @@ class Chunk:
     index: dict[int, "np.ndarray[tuple[int, int], np.dtype[np.uint64]]"]
 
 
-class Single(NamedTuple):
-    """One message of any size on its way into a chunk."""
+# One message of any size on its way into a chunk: channel, sequence, log and publish time [ns],
+# CDR. A plain tuple, since one is made for every live message.
+Single = tuple[int, int, int, int, bytes]
 
-    channel: int
-    sequence: int
-    log_ns: int
-    publish_ns: int
-    data: bytes
 
-    def record(self) -> bytes:
-        """The whole MCAP record."""
-        length = _LENGTH_OF_REST + len(self.data)
-        head = HEADER.pack(
-            Opcode.MESSAGE, length, self.channel, self.sequence, self.log_ns, self.publish_ns
-        )
-        return head + self.data
+def _records(singles: Sequence[Single]) -> list[bytes]:
+    """Whole MCAP records."""
+    pack = HEADER.pack
+    return [
+        pack(Opcode.MESSAGE, _LENGTH_OF_REST + len(data), channel, sequence, log, publish) + data
+        for channel, sequence, log, publish, data in singles
+    ]
 
 
 class Stretch(NamedTuple):
@@ -92,12 +90,32 @@ class Stretch(NamedTuple):
         )  # fmt: skip
 
 
+Messages = tuple[list[Stretch], list[Single]]
+
+
+def split(stretches: list[Stretch], singles: list[Single], size: int) -> list[Messages]:
+    """Messages in parts of about ``size`` bytes of streams that follow each other in time."""
+    total = sum(s.size * len(s.log_ns) for s in stretches)
+    if total <= 2 * size:
+        return [(stretches, singles)]
+    logs = np.sort(np.concatenate([s.log_ns for s in stretches]))
+    count = -(-total // size)
+    cuts = np.unique(logs[[len(logs) * i // count for i in range(1, count)]]).tolist()
+    parts = []
+    for begin, end in pairwise([-_FOREVER, *cuts, _FOREVER]):
+        stretched = [s.between(begin, end) for s in stretches]
+        single = [s for s in singles if begin <= s[2] < end]
+        if single or any(len(s.log_ns) for s in stretched):
+            parts.append((stretched, single))
+    return parts
+
+
 def assemble(stretches: Sequence[Stretch], singles: Sequence[Single] = ()) -> Chunk:
     """Chunk of all these messages, of which there is at least one."""
     stretches = [stretch for stretch in stretches if len(stretch.log_ns)]
-    records = [single.record() for single in singles]
+    records = _records(singles)
     logs = np.concatenate(
-        [s.log_ns for s in stretches] + [np.array([s.log_ns for s in singles], np.int64)]
+        [s.log_ns for s in stretches] + [np.array([log for _, _, log, _, _ in singles], np.int64)]
     )
     sizes = np.concatenate(
         [np.full(len(s.log_ns), s.size) for s in stretches]
@@ -143,7 +161,7 @@ def _index(
         end = begin + len(stretch.log_ns)
         index[stretch.channel] = entries[begin:end]
         begin = end
-    channels = np.array([single.channel for single in singles], np.int64)
+    channels = np.array([channel for channel, *_ in singles], np.int64)
     for channel in np.unique(channels).tolist():
         own = entries[begin:][channels == channel]
         index[channel] = np.concatenate((index[channel], own)) if channel in index else own

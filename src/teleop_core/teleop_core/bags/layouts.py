@@ -9,12 +9,12 @@ it uninitialised, and pads the end of some messages too.
 """
 
 import struct
-from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.bags.cdr import NUMPY_CODES, Template, template
 from teleop_core.bags.topics import Kind, Topic
 from teleop_core.errors import ShapeError
 
@@ -23,83 +23,6 @@ Stamps = NDArray[np.int64]
 Values = NDArray[np.float64]
 
 SECOND_NS = 1_000_000_000
-_ENCAPSULATION = b"\x00\x01"  # plain CDR, little-endian; two bytes of options follow
-_QUATERNION = (3, 7)  # columns w, x, y, z of a pose; in the message x, y, z, w
-
-
-@dataclass
-class _Cdr:
-    """A message as it grows: constant bytes, and gaps for numbers.
-
-    Alignment counts from after the four bytes of the encapsulation header (XCDR1).
-    """
-
-    template: bytearray = field(default_factory=lambda: bytearray(_ENCAPSULATION + b"\0\0"))
-    mask: bytearray = field(default_factory=lambda: bytearray(b"\xff\xff\0\0"))
-    gaps: list[tuple[int, str, int, slice]] = field(default_factory=list)
-
-    def _extend(self, data: bytes, mask: bytes) -> None:
-        self.template += data
-        self.mask += mask * len(data)
-
-    def _align(self, size: int) -> None:
-        self._extend(bytes((4 - len(self.template)) % size), b"\0")
-
-    def length(self, count: int) -> None:
-        """Append the length of a sequence."""
-        self._align(4)
-        self._extend(struct.pack("<I", count), b"\xff")
-
-    def string(self, text: str) -> None:
-        """Append a constant string."""
-        data = text.encode() + b"\0"
-        self.length(len(data))
-        self._extend(data, b"\xff")
-
-    def gap(self, code: str, columns: slice) -> None:
-        """Append numbers of one struct code that vary: these columns of the values."""
-        self._align(struct.calcsize(code))
-        count = columns.stop - columns.start
-        self.gaps.append((len(self.template), code, count, columns))
-        self._extend(bytes(struct.calcsize(code) * count), b"\0")
-
-    def constants(self) -> list[tuple[int, int]]:
-        """Begin and end of each run of bytes between gaps."""
-        ends = [(at, at + struct.calcsize(code) * count) for at, code, count, _ in self.gaps]
-        begins = [0, *(end for _, end in ends)]
-        return list(zip(begins, [*(at for at, _ in ends), len(self.template)], strict=True))
-
-
-def _stamped(frame_id: str) -> _Cdr:
-    """Message with a header."""
-    cdr = _Cdr()
-    cdr.gap("i", slice(-2, -1))
-    cdr.gap("I", slice(-2, -1))
-    cdr.string(frame_id)
-    return cdr
-
-
-def _describe(kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> _Cdr:
-    cdr, count = _stamped(frame_id), len(joint_names)
-    if kind is Kind.POSE:
-        for columns in (slice(0, 3), slice(4, 7), slice(3, 4)):
-            cdr.gap("d", columns)
-    elif kind in {Kind.TWIST, Kind.WRENCH}:
-        cdr.gap("d", slice(0, 6))
-    elif kind is Kind.BUTTONS:
-        cdr.length(0)
-        cdr.length(3)
-        cdr.gap("i", slice(0, 3))
-    else:
-        cdr.length(count)
-        for name in joint_names:
-            cdr.string(name)
-        for part in range(3):
-            is_filled = part == 0 or kind is Kind.STATE
-            cdr.length(count * is_filled)
-            if is_filled and count:
-                cdr.gap("d", slice(part * count, (part + 1) * count))
-    return cdr
 
 
 class Layout:
@@ -114,7 +37,7 @@ class Layout:
     """
 
     def __init__(self, kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> None:
-        cdr = _describe(kind, joint_names, frame_id)
+        cdr = template(kind, joint_names, frame_id)
         self.kind, self.joint_names, self.frame_id = kind, joint_names, frame_id
         self.size, self.width = len(cdr.template), kind.width(len(joint_names))
         self.template: Bytes = np.frombuffer(bytes(cdr.template), np.uint8)
@@ -124,15 +47,15 @@ class Layout:
         self._dtype = np.dtype(
             {
                 "names": ["sec", "nanosec", *(f"part{i}" for i in range(len(self._columns)))],
-                "formats": [f"<{count}{code}" if i > 1 else f"<{code}"
-                            for i, (_, code, count, _) in enumerate(_numpy_codes(cdr.gaps))],
+                "formats": [f"<{count}{NUMPY_CODES[code]}" if i > 1 else f"<{NUMPY_CODES[code]}"
+                            for i, (_, code, count, _) in enumerate(cdr.gaps)],
                 "offsets": [at for at, *_ in cdr.gaps],
                 "itemsize": self.size,
             }
         )  # fmt: skip
         self._prepare_single(cdr)
 
-    def _prepare_single(self, cdr: _Cdr) -> None:
+    def _prepare_single(self, cdr: Template) -> None:
         """Struct of one message; every run of constant bytes is one string of it."""
         form, fixed, index = "<", [], 0
         gaps = {at: (code, count) for at, code, count, _ in cdr.gaps}
@@ -237,13 +160,6 @@ class Layout:
 
     def _is_same_but_padding(self, data: bytes) -> bool:
         return self.matches(np.frombuffer(data, np.uint8)[np.newaxis])
-
-
-def _numpy_codes(
-    gaps: list[tuple[int, str, int, slice]],
-) -> list[tuple[int, str, int, slice]]:
-    codes = {"i": "i4", "I": "u4", "d": "f8"}
-    return [(at, codes[code], count, columns) for at, code, count, columns in gaps]
 
 
 def layout_of(kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> Layout:

@@ -10,13 +10,14 @@ import yaml
 
 from teleop_core.bags.messages import Report, read_reports
 from teleop_core.bags.ordered import in_order
+from teleop_core.bags.recovery import recover
 from teleop_core.bags.series import Column, Series, join, kind_of
 from teleop_core.bags.source import McapSource, Records
 from teleop_core.bags.topics import Kind, Topic
 from teleop_core.bags.writer import METADATA_NAME
 from teleop_core.errors import RecordingError
 
-__all__ = ["Bag", "Series", "TopicInfo"]
+__all__ = ["Bag", "Series", "TopicInfo", "recover"]
 
 
 @dataclass(frozen=True)

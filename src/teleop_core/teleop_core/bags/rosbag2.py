@@ -1,5 +1,8 @@
 """The rosbag2 side of a recording: topics as MCAP records, and ``metadata.yaml``."""
 
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +11,7 @@ from mcap.records import Channel, Schema, Statistics
 
 from teleop_core.bags import ros_types
 from teleop_core.bags.topics import Quality, Topic
+from teleop_core.errors import RecordingError
 
 VERSION = 9
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
@@ -114,6 +118,26 @@ def metadata_text(
         "ros_distro": ros_types.DISTRIBUTION,
     }
     return _text({"rosbag2_bagfile_information": information})
+
+
+@contextmanager
+def new_directory(path: Path) -> Iterator[Path]:
+    """Make a recording's directory and tell its file; take it away again if that cannot be written.
+
+    Raises:
+        RecordingError: The directory exists already, or it or its file cannot be written.
+    """
+    try:
+        path.mkdir(parents=True)
+    except FileExistsError as error:
+        raise RecordingError(path, "exists already; choose another --out") from error
+    except OSError as error:
+        raise RecordingError(path, f"cannot be written: {error.strerror}") from error
+    try:
+        yield path / f"{path.resolve().name}_0.mcap"
+    except OSError as error:
+        shutil.rmtree(path, ignore_errors=True)
+        raise RecordingError(path, f"cannot be written: {error.strerror}") from error
 
 
 def write_metadata(directory: Path, text: str) -> None:

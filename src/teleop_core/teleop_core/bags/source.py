@@ -91,14 +91,16 @@ class McapSource:
             with path.open("rb") as file:
                 self._check_magic(file, is_whole)
                 with damage_told(path, "its index"):
-                    self.contents = (is_whole and self._summary(file)) or self._scan()
+                    self.contents = (is_whole and self._summary(file)) or self._scan(
+                        is_whole=is_whole
+                    )
         except OSError as error:
             raise RecordingError(path, f"cannot be read: {error.strerror}") from error
 
     def _check_magic(self, file: BinaryIO, is_whole: bool) -> None:
         begin = file.read(len(MAGIC))
         if not begin:
-            raise RecordingError(self.path, "is an empty file; " + CUT_OFF.format(path=self.path))
+            raise RecordingError(self.path, "is an empty file: nothing was recorded")
         if begin != MAGIC:
             kind = "an SQLite file" if begin == b"SQLite f" else "no MCAP file"
             raise RecordingError(self.path, f"is {kind}; recordings must have the storage mcap")
@@ -130,22 +132,19 @@ class McapSource:
 
     # -- files without an index ------------------------------------------------------------------
 
-    def _scan(self) -> Contents:
-        """Contents by reading the whole file."""
+    def _scan(self, *, is_whole: bool) -> Contents:
+        """Contents by reading the file; damaged chunks are left out if it need not be whole."""
         found = Contents()
         data = self.mapped()
         rows, found.end = walk.walk(data, len(MAGIC), len(data))
         _note_cold(found, data, rows)
         for begin, size in rows[rows[:, walk.OPCODE] == Opcode.CHUNK, 1:3].tolist():
-            chunk = Chunk.read(ReadDataStream(BytesIO(data[begin : begin + size].tobytes())))
-            inner = _uncompressed(chunk)
-            inside, _ = walk.walk(inner, 0, len(inner))
-            _note_cold(found, inner, inside)
-            messages = inside[inside[:, walk.OPCODE] == Opcode.MESSAGE]
-            if len(messages):
-                found.counts.update(messages[:, walk.CHANNEL].tolist())
-                logs = messages[:, walk.LOG]
-                found.places.append(Place(begin - 9, int(logs.min()), int(logs.max())))
+            stream = ReadDataStream(BytesIO(data[begin : begin + size].tobytes()))
+            try:
+                _note_chunk(found, _uncompressed(Chunk.read(stream)), begin - 9)
+            except _Damage:
+                if is_whole:
+                    raise
         found.places += _loose(found, rows)
         return found
 
@@ -225,6 +224,17 @@ def _note_cold(found: Contents, data: Bytes, rows: walk.Rows) -> None:
             found.channels[channel.id] = channel
         else:
             found.metadata.append(Metadata.read(stream))
+
+
+def _note_chunk(found: Contents, data: Bytes, offset: int) -> None:
+    """Note what is inside of a chunk."""
+    rows, _ = walk.walk(data, 0, len(data))
+    _note_cold(found, data, rows)
+    messages = rows[rows[:, walk.OPCODE] == Opcode.MESSAGE]
+    if len(messages):
+        logs = messages[:, walk.LOG]
+        found.counts.update(messages[:, walk.CHANNEL].tolist())
+        found.places.append(Place(offset, int(logs.min()), int(logs.max())))
 
 
 def _loose(found: Contents, rows: walk.Rows) -> list[Place]:

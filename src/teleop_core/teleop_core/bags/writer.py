@@ -8,16 +8,14 @@ import queue
 import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
 
 import numpy as np
 
 from teleop_core.bags import compression as compressions
 from teleop_core.bags import rosbag2
-from teleop_core.bags.chunks import Single, Stretch, assemble
+from teleop_core.bags.chunks import Messages, Single, Stretch, assemble, split
 from teleop_core.bags.layouts import SECOND_NS, Layout, Stamps, Values, layout
 from teleop_core.bags.mcap_file import McapFile
 from teleop_core.bags.recording import RecordingParameters
@@ -29,13 +27,6 @@ METADATA_NAME = "teleop_core"
 Block = Mapping[Topic, tuple[Stamps, Values, Stamps]]
 
 
-class _Job(NamedTuple):
-    """What becomes one or more chunks."""
-
-    stretches: list[Stretch]
-    singles: list[Single]
-
-
 class _Channel:
     """A topic being recorded: ``every`` is 0 if it is not, ``seen`` counts what came."""
 
@@ -44,6 +35,11 @@ class _Channel:
     def __init__(self, number: int, every: int, form: Layout | None) -> None:
         self.number, self.every, self.layout = number, every, form
         self.seen = self.recorded = 0
+
+    def is_turn(self) -> bool:
+        """Whether the next sample is one of those that are recorded; counts it."""
+        self.seen += 1
+        return self.every > 0 and (self.seen - 1) % self.every == 0
 
 
 class BagWriter:
@@ -93,7 +89,7 @@ class BagWriter:
         self._failure: BaseException | None = None
         self._is_open = True
         self._mcap = self._create({METADATA_NAME: dict(metadata or {})})
-        self._jobs: queue.Queue[_Job | None] = queue.Queue(maxsize=4)
+        self._jobs: queue.Queue[Messages | None] = queue.Queue(maxsize=4)
         self._worker = threading.Thread(target=self._work, name="bag writer", daemon=True)
         self._worker.start()
 
@@ -101,16 +97,10 @@ class BagWriter:
         name = self.parameters.compression
         compress = compressions.compressor(name, self.parameters.compression_level)
         schemas, channels = rosbag2.records_of(self._topics)
-        try:
-            self.path.mkdir(parents=True)
-            file = self.path / f"{self.path.resolve().name}_0.mcap"
+        with rosbag2.new_directory(self.path) as file:
             return McapFile(
                 file, schemas, channels, metadata, "" if name == "none" else name, compress
             )
-        except FileExistsError as error:
-            raise RecordingError(self.path, "exists already; choose another --out") from error
-        except OSError as error:
-            raise RecordingError(self.path, f"cannot be written: {error.strerror}") from error
 
     # -- what callers do -------------------------------------------------------------------------
 
@@ -133,20 +123,14 @@ class BagWriter:
             UnknownNameError: The topic was not announced.
         """
         channel = self._channels.get(topic.name) or self._unknown(topic)
-        if channel.every != 1:
-            channel.seen += 1
-            if channel.every == 0 or (channel.seen - 1) % channel.every:
-                return
-        sequence = channel.recorded
-        channel.recorded = sequence + 1
-        singles = self._singles
-        if not singles:
+        if channel.every != 1 and not channel.is_turn():
+            return
+        if publish_ns is None:
+            publish_ns = log_ns
+        if not self._singles:
             self._first_ns = log_ns
-        singles.append(
-            Single(
-                channel.number, sequence, log_ns, log_ns if publish_ns is None else publish_ns, data
-            )
-        )
+        self._singles.append((channel.number, channel.recorded, log_ns, publish_ns, data))
+        channel.recorded += 1
         self._bytes += len(data)
         if self._bytes > CHUNK_BYTES or log_ns - self._first_ns >= SECOND_NS:
             self.flush()
@@ -191,7 +175,7 @@ class BagWriter:
             return
         self._is_open = False
         if self._singles and self._failure is None:
-            self._jobs.put(_Job([], self._singles))
+            self._jobs.put(([], self._singles))
         self._jobs.put(None)
         self._worker.join()
         self._raise_failure()
@@ -223,15 +207,16 @@ class BagWriter:
         if not self._is_open:
             raise RecordingError(self.path, "is closed; nothing more can be recorded")
         if stretches or self._singles:
-            self._jobs.put(_Job(stretches, self._singles))
+            self._jobs.put((stretches, self._singles))
             self._singles, self._bytes = [], 0
 
     # -- the writing thread ----------------------------------------------------------------------
 
     def _work(self) -> None:
+        jobs = iter(self._jobs.get, None)
         try:
-            while (job := self._jobs.get()) is not None:
-                for part in _parts(job):
+            for stretches, singles in jobs:
+                for part in split(stretches, singles, CHUNK_BYTES):
                     self._mcap.append(assemble(*part))
             self._finish()
         except OSError as error:
@@ -240,9 +225,8 @@ class BagWriter:
             self._failure = error
         finally:
             self._mcap.close()
-        if self._failure is not None and self._is_open:
-            while self._jobs.get() is not None:  # callers must never wait for a dead thread
-                pass
+        for _ in jobs:  # callers must never wait for a dead thread
+            pass
 
     def _finish(self) -> None:
         """End the file and the directory behind the last chunk for which there is room."""
@@ -292,21 +276,3 @@ def _stretch(
         np.array(values[part], np.float64),
         np.array(log_ns[part], np.int64),
     )
-
-
-def _parts(job: _Job) -> list[_Job]:
-    """The job in pieces of about a chunk that follow each other in time."""
-    size = sum(s.size * len(s.log_ns) for s in job.stretches)
-    if size <= 2 * CHUNK_BYTES:
-        return [job]
-    logs = np.sort(np.concatenate([s.log_ns for s in job.stretches]))
-    pieces = -(-size // CHUNK_BYTES)
-    cuts = np.unique(logs[[len(logs) * i // pieces for i in range(1, pieces)]]).tolist()
-    bounds = [-(2**62), *cuts, 2**62]
-    out = []
-    for begin, end in pairwise(bounds):
-        singles = [s for s in job.singles if begin <= s.log_ns < end]
-        stretches = [s.between(begin, end) for s in job.stretches]
-        if singles or any(len(s.log_ns) for s in stretches):
-            out.append(_Job(stretches, singles))
-    return out

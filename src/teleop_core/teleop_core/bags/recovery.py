@@ -1,0 +1,80 @@
+"""Recovery: a recording that was cut off, made readable again in a new place."""
+
+from pathlib import Path
+
+import numpy as np
+
+from teleop_core.bags import compression, rosbag2
+from teleop_core.bags.chunks import HEADER, Chunk
+from teleop_core.bags.mcap_file import McapFile
+from teleop_core.bags.source import McapSource, Records
+from teleop_core.errors import RecordingError
+
+
+def recover(path: Path | str, out: Path | str | None = None) -> tuple[Path, int]:
+    """Copy what is whole of a recording into a new one; the old one is left as it is.
+
+    Args:
+        path: Directory or ``.mcap`` file of a recording whose writer was killed.
+        out: Directory to make; None puts ``_recovered`` behind the name of the old one.
+
+    Returns:
+        The new directory and the number of messages in it.
+
+    Raises:
+        RecordingError: There is nothing to recover, or the new directory exists or is not writable.
+    """
+    path = Path(path)
+    source = McapSource(_only_file(path), is_whole=False)
+    found = source.contents
+    if not found.places:
+        raise RecordingError(path, "holds no whole chunk of messages; nothing can be recovered")
+    target = (
+        Path(out)
+        if out
+        else path.with_name((path.stem if path.is_file() else path.name) + "_recovered")
+    )
+    with rosbag2.new_directory(target) as file:
+        return target, _copy(source, file)
+
+
+def _only_file(path: Path) -> Path:
+    if not path.exists():
+        raise RecordingError(path, "does not exist; give a recording's directory or .mcap file")
+    files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
+    if len(files) != 1:
+        reason = f"holds {len(files)} .mcap files; give the one to recover"
+        raise RecordingError(path, reason)
+    return files[0]
+
+
+def _copy(source: McapSource, target: Path) -> int:
+    found = source.contents
+    schemas, channels = list(found.schemas.values()), list(found.channels.values())
+    file = McapFile(
+        target, schemas, channels,
+        {record.name: record.metadata for record in found.metadata},
+        "zstd", compression.compressor("zstd", 1),
+    )  # fmt: skip
+    try:
+        for records in source.records(found.places):
+            file.append(_chunk(records))
+        file.finish()
+        statistics = file.statistics()
+        text = rosbag2.metadata_text(file.path, schemas, channels, statistics, 0)
+        rosbag2.write_metadata(target.parent, text)
+    finally:
+        file.close()
+    return int(statistics.message_count)
+
+
+def _chunk(records: Records) -> Chunk:
+    """The same messages in the same order, with an index."""
+    begins, sizes = records.begin - HEADER.size, records.size + HEADER.size
+    pieces = [records.data[b : b + n] for b, n in zip(begins.tolist(), sizes.tolist(), strict=True)]
+    entries = np.column_stack((records.log_ns, np.cumsum(sizes) - sizes)).astype("<u8")
+    index = {
+        number: entries[records.channel == number] for number in np.unique(records.channel).tolist()
+    }
+    start_ns, end_ns = int(records.log_ns.min()), int(records.log_ns.max())
+    return Chunk(np.concatenate(pieces), start_ns, end_ns, index)
