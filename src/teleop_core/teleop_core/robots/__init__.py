@@ -8,7 +8,12 @@ from teleop_core.robots.robot import IkResult, IkStatus, Robot
 __all__ = ["IkResult", "IkStatus", "Robot", "list_robots", "load_robot"]
 
 # Name of the robot -> module of this package whose make(**geometry) builds it.
-_MODULES = {"rcrt1": "rcrt1"}
+_MODULES = {
+    "rcrt1": "rcrt1",
+    "four_bar": "four_bar",
+    "parallelogram": "parallelogram",
+    "puma560": "puma560",
+}
 
 
 def list_robots() -> tuple[str, ...]:

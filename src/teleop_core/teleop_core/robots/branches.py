@@ -5,6 +5,11 @@ import math
 from teleop_core.compiled import kernel
 from teleop_core.geometry import Array
 
+# Rounding that a joint on its limit may show [rad or m].
+_SLACK = 1e-12
+# Added to the cost of a branch outside the limits: more than any move of one inside.
+OUTSIDE = 100.0
+
 
 @kernel
 def wrapped(angle: float) -> float:
@@ -46,3 +51,45 @@ def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
         is_there = is_there and abs(value - target) <= 1e-12
         q[i] = value
     return is_there
+
+
+@kernel
+def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool) -> float:
+    """Same angle by whole turns [rad]: next to the seed, inside the limits where one is.
+
+    In a path only the neighbour of the seed counts: a joint at its end stop stays there instead
+    of unwinding by a turn.
+    """
+    near = seed if is_path else min(max(seed, lower), upper)
+    angle -= 2.0 * math.pi * math.floor((angle - near) / (2.0 * math.pi) + 0.5)
+    if is_path:
+        return angle
+    if angle > upper + _SLACK and angle - 2.0 * math.pi >= lower - _SLACK:
+        return angle - 2.0 * math.pi
+    if angle < lower - _SLACK and angle + 2.0 * math.pi <= upper + _SLACK:
+        return angle + 2.0 * math.pi
+    return angle
+
+
+@kernel
+def move_cost(q: Array, seed: Array, limits: Array, first: int, last: int) -> float:
+    """Largest move of joints first..last-1 from the seed, the metric that orders branches.
+
+    Branches outside the limits come after all others. In a path (finite steps) limits do not
+    count, so that the branch never changes.
+    """
+    worst, outside = 0.0, 0.0
+    for i in range(first, last):
+        worst = max(worst, abs(q[i] - seed[i]))
+        outside = max(outside, limits[0, i] - q[i], q[i] - limits[1, i])
+    is_path = math.isfinite(limits[2, 0])
+    return worst if is_path or outside <= _SLACK else OUTSIDE + worst
+
+
+@kernel
+def is_allowed(q: Array, seed: Array, limits: Array) -> bool:
+    """Whether every joint is inside its limits and within its step of the seed."""
+    for i in range(q.shape[0]):
+        if not limits[0, i] <= q[i] <= limits[1, i] or abs(q[i] - seed[i]) > limits[2, i]:
+            return False
+    return True

@@ -1,0 +1,329 @@
+"""PUMA 560: the 6R arm with shoulder offset and spherical wrist, eight branches.
+
+Modified (Craig) Denavit-Hartenberg table: alpha = 0, -90, 0, -90, 90, -90 degrees, a = 0, 0, a2,
+a3, 0, 0, d = 0, 0, d3, d4, 0, 0; the tip is the wrist centre. In the vertical plane of joint 1,
+which lies d3 beside axis 1, u is the horizontal and z the vertical coordinate of the wrist.
+
+Source:
+    Ghosal 2020, lecture 6, PUMA 560, misprints corrected. Lengths: Corke and Armstrong-Hélouvry
+    1994. Joint ranges: Fu, Gonzalez and Lee 1987, brought to this table's zeros.
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.compiled import kernel
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import Array
+from teleop_core.robots.branches import bounded, is_allowed, move_cost, turned, wrapped
+from teleop_core.robots.robot import (
+    Drives,
+    IkStatus,
+    Kernels,
+    Robot,
+    geometry_of,
+    independent_axes,
+    is_askable,
+    pose_residual,
+)
+
+JOINTS = tuple(f"theta{i}" for i in range(1, 7))
+GEOMETRY = {"a2": 0.4318, "a3": 0.0203, "d3": 0.15005, "d4": 0.4318}
+_DEGREES = math.pi / 180.0
+LOWER = np.array([-160.0, -225.0, -225.0, -110.0, -100.0, -266.0]) * _DEGREES
+UPPER = np.array([160.0, 45.0, 45.0, 170.0, 100.0, 266.0]) * _DEGREES
+# Upper arm 45 degrees up, forearm level, tool 45 degrees down.
+HOME = np.array([0.0, -45.0, -45.0, 0.0, 45.0, 0.0]) * _DEGREES
+
+DRIVES = Drives(
+    # Motor inertias at the joint, effort limits and break-away torques: Armstrong, Khatib and
+    # Burdick 1986. Link inertias at home and everything else: assumed.
+    inertia=np.array([2.6, 6.8, 1.16, 0.20, 0.18, 0.19]),
+    viscous=np.array([4.9, 8.2, 3.5, 0.4, 0.4, 0.3]),
+    coulomb=np.array([6.3, 5.5, 2.6, 1.3, 1.0, 1.2]),
+    friction_speed=np.full(6, 0.01),
+    effort_limit=np.array([97.6, 186.4, 89.4, 24.2, 20.1, 21.3]),
+    speed_limit=np.array([82.0, 74.0, 122.0, 228.0, 241.0, 228.0]) * _DEGREES,
+    encoder_step=np.array([1.0, 0.7, 1.2, 0.9, 0.9, 0.9]) * 1e-4,
+    bandwidth=np.full(6, 60.0),
+)
+
+# Below this sine axes 4 and 6 count as one line and joint 4 keeps its value; below this distance
+# [m] a point counts as lying on the axis that turns it, and that joint keeps its value.
+_COLLINEAR = 1e-10
+_ON_AXIS = 1e-12
+# Sines and relative distances under which small moves need large joint moves.
+_NEAR = 0.02
+_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+
+
+@kernel
+def fk(q: Array, geometry: Array, T: Array) -> None:
+    """Write ``T_base_tip``, (4, 4), of joints (6,).
+
+    Source:
+        Ghosal 2020, lecture 6, 0_3T and 3_6T, corrected.
+    """
+    a2, a3, d3, d4 = geometry[0], geometry[1], geometry[2], geometry[3]
+    c1, s1 = math.cos(q[0]), math.sin(q[0])
+    c23, s23 = math.cos(q[1] + q[2]), math.sin(q[1] + q[2])
+    c4, s4 = math.cos(q[3]), math.sin(q[3])
+    c5, s5 = math.cos(q[4]), math.sin(q[4])
+    c6, s6 = math.cos(q[5]), math.sin(q[5])
+    # Columns of 3_6T, turned into the base one by one.
+    for column in range(3):
+        if column == 0:
+            x, y, z = c4 * c5 * c6 - s4 * s6, s5 * c6, -s4 * c5 * c6 - c4 * s6
+        elif column == 1:
+            x, y, z = -c4 * c5 * s6 - s4 * c6, -s5 * s6, s4 * c5 * s6 - c4 * c6
+        else:
+            x, y, z = -c4 * s5, c5, s4 * s5
+        h = c23 * x - s23 * y
+        T[0, column] = c1 * h - s1 * z
+        T[1, column] = s1 * h + c1 * z
+        T[2, column] = -s23 * x - c23 * y
+    u = a2 * math.cos(q[1]) + a3 * c23 - d4 * s23
+    T[0, 3] = c1 * u - s1 * d3
+    T[1, 3] = s1 * u + c1 * d3
+    T[2, 3] = -a2 * math.sin(q[1]) - a3 * s23 - d4 * c23
+    T[3, 0] = T[3, 1] = T[3, 2] = 0.0
+    T[3, 3] = 1.0
+
+
+@kernel
+def jacobian(q: Array, geometry: Array, J: Array) -> None:
+    """Write the geometric Jacobian (6, 6): rows linear, then angular, in base axes.
+
+    The wrist axes meet in the tip, so joints 4 to 6 do not move it.
+    """
+    T = np.empty((4, 4))
+    fk(q, geometry, T)
+    c1, s1 = math.cos(q[0]), math.sin(q[0])
+    c23, s23 = math.cos(q[1] + q[2]), math.sin(q[1] + q[2])
+    c4, s4 = math.cos(q[3]), math.sin(q[3])
+    u = c1 * T[0, 3] + s1 * T[1, 3]
+    elbow_u, elbow_z = geometry[0] * math.cos(q[1]), -geometry[0] * math.sin(q[1])
+    J[:] = 0.0
+    J[0, 0], J[1, 0], J[5, 0] = -T[1, 3], T[0, 3], 1.0
+    for j in range(1, 3):
+        across = T[2, 3] - (elbow_z if j == 2 else 0.0)
+        along = u - (elbow_u if j == 2 else 0.0)
+        J[0, j], J[1, j], J[2, j] = c1 * across, s1 * across, -along
+        J[3, j], J[4, j] = -s1, c1
+    J[3, 3], J[4, 3], J[5, 3] = -c1 * s23, -s1 * s23, -c23
+    J[3, 4], J[4, 4], J[5, 4] = c1 * c23 * s4 - s1 * c4, s1 * c23 * s4 + c1 * c4, -s23 * s4
+    J[3, 5], J[4, 5], J[5, 5] = T[0, 2], T[1, 2], T[2, 2]
+
+
+@kernel
+def _shoulder(T: Array, geometry: Array, is_back: bool, seed: float) -> tuple[float, float, bool]:
+    """Joint 1, the wrist's u in the plane it makes, and whether that plane holds the wrist."""
+    x, y, d3 = T[0, 3], T[1, 3], geometry[2]
+    square = x * x + y * y - d3 * d3
+    u = math.sqrt(max(square, 0.0))
+    if is_back:
+        u = -u
+    q1 = seed
+    if x * x + y * y > _ON_AXIS * _ON_AXIS:
+        q1 = math.atan2(y, x) - math.atan2(d3, u)
+    return q1, u, square >= -_ON_AXIS
+
+
+@kernel
+def _elbow(u: float, z: float, geometry: Array, is_down: bool) -> tuple[float, bool]:
+    """Joint 3 that puts the wrist at its distance from axis 2; whether it can.
+
+    Beyond reach the arm is stretched, too close it is folded.
+    """
+    a2, a3, d4 = geometry[0], geometry[1], geometry[3]
+    K = (u * u + z * z - a2 * a2 - a3 * a3 - d4 * d4) / (2.0 * a2)
+    square = a3 * a3 + d4 * d4 - K * K
+    root = math.sqrt(max(square, 0.0))
+    return math.atan2(a3, d4) - math.atan2(K, -root if is_down else root), square >= -_ON_AXIS
+
+
+@kernel
+def _upper_arm(u: float, z: float, q3: float, geometry: Array, seed: float) -> float:
+    """Joint 2 that points the arm, bent by joint 3, at the wrist; the seed if that is on axis 2."""
+    a2, a3, d4 = geometry[0], geometry[1], geometry[3]
+    if u * u + z * z <= _ON_AXIS * _ON_AXIS:
+        return seed
+    x, y = a3 + a2 * math.cos(q3), d4 - a2 * math.sin(q3)
+    return math.atan2(-x * z - u * y, x * u - y * z) - q3
+
+
+@kernel
+def _wrist_rotation(T: Array, q1: float, q23: float, M: Array) -> None:
+    """Write M (3, 3) = R03ᵀ R, the rotation that is left to the wrist."""
+    c1, s1, c23, s23 = math.cos(q1), math.sin(q1), math.cos(q23), math.sin(q23)
+    for j in range(3):
+        h = c1 * T[0, j] + s1 * T[1, j]
+        M[0, j] = c23 * h - s23 * T[2, j]
+        M[1, j] = -s23 * h - c23 * T[2, j]
+        M[2, j] = -s1 * T[0, j] + c1 * T[1, j]
+
+
+@kernel
+def _joint4(M: Array, seed: float) -> float:
+    """Joint 4 of the branch with a positive sine of joint 5; the seed with axes 4 and 6 in line."""
+    if math.hypot(M[0, 2], M[2, 2]) <= _COLLINEAR:
+        return seed
+    return math.atan2(M[2, 2], -M[0, 2])
+
+
+@kernel
+def _joint5(M: Array, q4: float) -> float:
+    """Joint 5 that brings the tool axis next to its wanted direction, given joint 4."""
+    return math.atan2(math.sin(q4) * M[2, 2] - math.cos(q4) * M[0, 2], M[1, 2])
+
+
+@kernel
+def _joint6(M: Array, q4: float, q5: float) -> float:
+    """Joint 6 that turns the tool next to its wanted attitude, given joints 4 and 5."""
+    c4, s4, c5, s5 = math.cos(q4), math.sin(q4), math.cos(q5), math.sin(q5)
+    h0, h1 = c4 * M[0, 0] - s4 * M[2, 0], c4 * M[0, 1] - s4 * M[2, 1]
+    x0, x1 = c5 * h0 + s5 * M[1, 0], c5 * h1 + s5 * M[1, 1]
+    y0, y1 = -s4 * M[0, 0] - c4 * M[2, 0], -s4 * M[0, 1] - c4 * M[2, 1]
+    return math.atan2(y0 - x1, x0 + y1)
+
+
+@kernel
+def _turn(q: Array, seed: Array, limits: Array, first: int, last: int) -> None:
+    """Bring joints first..last-1 next to the seed, or into their limits, by whole turns."""
+    for i in range(first, last):
+        q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], math.isfinite(limits[2, i]))
+
+
+@kernel
+def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
+    """Write the best of the eight branches; whether the wrist centre can be reached at all.
+
+    The wrist of an arm branch is solved only if the arm alone is not already too far away.
+    """
+    best, is_reachable, z = math.inf, False, T[2, 3]
+    trial = np.empty(6)
+    for branch in range(4):
+        trial[0], u, is_beside = _shoulder(T, geometry, branch > 1, seed[0])
+        trial[2], is_near = _elbow(u, z, geometry, branch % 2 == 1)
+        is_reachable = is_reachable or (is_beside and is_near)
+        trial[1] = _upper_arm(u, z, trial[2], geometry, seed[1])
+        _turn(trial, seed, limits, 0, 3)
+        arm = move_cost(trial, seed, limits, 0, 3)
+        if arm >= best:
+            continue
+        _wrist_rotation(T, trial[0], trial[1] + trial[2], M)
+        trial[3] = _joint4(M, seed[3])
+        trial[4] = _joint5(M, trial[3])
+        trial[5] = _joint6(M, trial[3], trial[4])
+        for _ in range(2):
+            _turn(trial, seed, limits, 3, 6)
+            cost = max(arm, move_cost(trial, seed, limits, 3, 6))
+            if cost < best:
+                best = cost
+                q[:] = trial
+            trial[3] += math.pi
+            trial[4] = -trial[4]
+            trial[5] += math.pi
+    return is_reachable
+
+
+@kernel
+def _settle(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> None:
+    """Keep a branch inside limits and steps; each joint makes the best of those before it."""
+    q[0] = bounded(q[0], seed[0], limits[0, 0], limits[1, 0], limits[2, 0])
+    u, z = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3], T[2, 3]
+    is_down = math.cos(math.atan2(geometry[1], geometry[3]) - q[2]) < 0.0
+    for i in (2, 1, 3, 4, 5):
+        if i == 2:
+            q[2] = _elbow(u, z, geometry, is_down)[0]
+        elif i == 1:
+            q[1] = _upper_arm(u, z, q[2], geometry, seed[1])
+        elif i == 3:
+            _wrist_rotation(T, q[0], q[1] + q[2], M)
+        elif i == 4:
+            q[4] = _joint5(M, q[3])
+        else:
+            q[5] = _joint6(M, q[3], q[4])
+        _turn(q, seed, limits, i, i + 1)
+        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+
+
+@kernel
+def _is_near_singular(q: Array, T: Array, geometry: Array) -> bool:
+    """Whether the wrist is straight, the arm stretched or folded, or the wrist over axis 1."""
+    reach = geometry[0] + math.hypot(geometry[1], geometry[3])
+    u = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3]
+    bend = math.cos(math.atan2(geometry[1], geometry[3]) - q[2])
+    return abs(math.sin(q[4])) < _NEAR or abs(bend) < _NEAR or abs(u) < _NEAR * reach
+
+
+@kernel
+def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
+    """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
+
+    Singular where the wrist centre stands over axis 1 (u = 0), where the arm is stretched or
+    folded, and where axes 4 and 6 are in line. A joint that a limit or step holds back lags;
+    the joints after it do the best that is left, and motion goes on at the other side.
+
+    Source:
+        Craig 2005, section 4.7, for this table; the solution in atan2 form is derived.
+    """
+    if not is_askable(T, seed):
+        return -1
+    M, reached = np.empty((3, 3)), np.empty((4, 4))
+    is_reachable = _choose(T, seed, limits, geometry, M, q)
+    if not is_allowed(q, seed, limits):
+        _settle(T, seed, limits, geometry, M, q)
+    fk(q, geometry, reached)
+    if not pose_residual(reached, T, residual):
+        return _LIMITED if is_reachable else _UNREACHABLE
+    return _NEAR_SINGULAR if _is_near_singular(q, T, geometry) else _FOLLOWED
+
+
+@kernel
+def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
+    """Write the branches (k, 6): front before back, elbow up before down, wrist; their number.
+
+    On a singularity, where a joint is free, it is zero and branches may coincide.
+    """
+    M, count = np.empty((3, 3)), 0
+    for branch in range(8):
+        q = solutions[count]
+        q[0], u, is_beside = _shoulder(T, geometry, branch > 3, 0.0)
+        q[2], is_near = _elbow(u, T[2, 3], geometry, branch % 4 > 1)
+        if not (is_beside and is_near):
+            continue
+        q[1] = _upper_arm(u, T[2, 3], q[2], geometry, 0.0)
+        _wrist_rotation(T, q[0], q[1] + q[2], M)
+        q[3] = _joint4(M, 0.0) + (math.pi if branch % 2 == 1 else 0.0)
+        q[4] = _joint5(M, q[3])
+        q[5] = _joint6(M, q[3], q[4])
+        for i in range(6):
+            q[i] = wrapped(q[i])
+        count += 1
+    return count
+
+
+def make(**geometry: float | str) -> Robot:
+    """PUMA 560; ``a2`` upper arm, ``a3`` elbow offset, ``d3`` shoulder offset, ``d4`` forearm [m]."""
+    row = geometry_of(GEOMETRY, geometry)
+    for symbol, value in row.items():
+        if abs(value) > 10.0:
+            raise ParameterError(symbol, value, "between -10 and 10 m")
+    if row["a2"] <= 0.0:
+        raise ParameterError("a2", row["a2"], "> 0 m")
+    if math.hypot(row["a3"], row["d4"]) <= 0.0:
+        raise ParameterError("d4", row["d4"], "other than 0 m when a3 is 0")
+    return Robot(
+        name="puma560",
+        joint_names=JOINTS,
+        lower=LOWER.copy(),
+        upper=UPPER.copy(),
+        home=HOME.copy(),
+        geometry=row,
+        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        drives=DRIVES,
+        dynamics=independent_axes(DRIVES.inertia.copy()),
+    )
