@@ -1,0 +1,59 @@
+"""PID: one joint's controller in parallel form, with a clean derivative and no windup."""
+
+from teleop_core.compiled import kernel
+from teleop_core.geometry import Array
+
+
+def critically_damped_gains(
+    inertia: Array, viscous: Array, bandwidth: Array
+) -> tuple[Array, Array, Array]:
+    """Gains that put all three closed-loop poles of an inertia with friction at one real place.
+
+    The loop ``inertia q'' + viscous q' = Kp e + Ki ∫e + Kd e'`` has the characteristic
+    polynomial ``inertia (s + bandwidth)³``: three equal real poles, hence no oscillation.
+
+    Args:
+        inertia: Inertias (n,) [kg·m² or kg], > 0.
+        viscous: Viscous friction (n,) [N·m·s/rad or N·s/m], >= 0.
+        bandwidth: Triple pole (n,) [rad/s], > 0.
+
+    Returns:
+        Kp, Ki, Kd, each (n,). Where friction alone damps more than wanted, Kd is 0.
+    """
+    kp = 3.0 * bandwidth**2 * inertia
+    ki = bandwidth**3 * inertia
+    kd = (3.0 * bandwidth * inertia - viscous).clip(min=0.0)
+    return kp, ki, kd
+
+
+@kernel
+def pid_step(
+    error: float, gains: Array, memory: Array, feedforward: float, limit: float, dt: float
+) -> float:
+    """Drive effort for one tick, within ±limit; updates the memory.
+
+    The integral is held while the drive is saturated and the error would push it further
+    (conditional integration). The derivative acts on the error through a first-order filter of
+    two ticks; it has no kick, because the slave's setpoint never moves faster than its drive.
+
+    Args:
+        error: Setpoint less measured position [rad or m].
+        gains: Kp, Ki, Kd.
+        memory: Integral effort, last error, filtered error rate (3,); written.
+        feedforward: Effort added before the limit.
+        limit: Largest effort of the drive.
+        dt: Tick [s], > 0.
+
+    Returns:
+        Effort [N·m or N].
+    """
+    memory[2] += ((error - memory[1]) / dt - memory[2]) / 2.0
+    memory[1] = error
+    free = gains[0] * error + gains[2] * memory[2] + feedforward
+    integral = memory[0] + gains[1] * error * dt
+    effort = free + integral
+    if abs(effort) <= limit or effort * error < 0.0:
+        memory[0] = integral
+    else:
+        effort = free + memory[0]
+    return min(max(effort, -limit), limit)
