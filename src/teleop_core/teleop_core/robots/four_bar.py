@@ -1,0 +1,223 @@
+"""Four-bar: a crank that moves a point of the coupler along a plane curve.
+
+q is the crank angle theta1 alone; the tip is the point of the coupler at distance ``a`` from the
+crank, with x along the coupler. ``ik`` takes the point of its curve nearest to the wanted x and
+y, and everything else is residual. ``mode``, 1 or -1, is the sign in front of the arc cosine of
+the closure. Outside its range a crank is drawn with the loop torn as little as possible;
+:class:`FourBar` answers with a status instead, for both modes and in all forms of the closure.
+
+Source:
+    Ghosal 2020, lecture 11, section on the planar 4-bar; Freudenstein 1954.
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.compiled import kernel
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import Array
+from teleop_core.robots.branches import bounded, wrapped
+from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar
+from teleop_core.robots.robot import (
+    REACHED,
+    IkStatus,
+    Kernels,
+    Robot,
+    geometry_of,
+    is_askable,
+    pose_residual,
+)
+
+__all__ = ["GEOMETRY", "Assembly", "Closure", "FourBar", "make"]
+
+# No lengths are published; these are a crank-rocker.
+GEOMETRY = {"l0": 0.4, "l1": 0.1, "l2": 0.35, "l3": 0.25, "a": 0.175, "mode": 1.0}
+_TURNS = 4.0 * math.pi  # assumed cable limit of a crank that turns all around
+_SAMPLES = 90  # of the coupler curve, in the search for its nearest point
+# Sine between coupler and rocker under which the crank hardly determines the coupler.
+_NEAR = 0.02
+_ROUNDING = 1e-12
+_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+
+
+@kernel
+def _angles(theta1: float, g: Array) -> tuple[float, float]:
+    """Rocker and coupler angle [rad] in the robot's mode; of the smallest gap when open."""
+    l0, l1, l2, l3 = g[0], g[1], g[2], g[3]
+    x, y = l0 - l1 * math.cos(theta1), -l1 * math.sin(theta1)
+    distance = math.hypot(x, y)
+    cosine = -1.0
+    if distance > 0.0:
+        cosine = (l2 * l2 - distance * distance - l3 * l3) / (2.0 * l3 * distance)
+    phi1 = math.atan2(y, x) + g[5] * math.acos(min(max(cosine, -1.0), 1.0))
+    return phi1, math.atan2(l3 * math.sin(phi1) + y, l3 * math.cos(phi1) + x)
+
+
+@kernel
+def fk(q: Array, geometry: Array, T: Array) -> None:
+    """Write ``T_base_tip``, (4, 4), of the coupler point for theta1 (1,) [rad]."""
+    _, coupler = _angles(q[0], geometry)
+    c, s, a = math.cos(coupler), math.sin(coupler), geometry[4]
+    T[:] = 0.0
+    T[0, 0], T[0, 1], T[1, 0], T[1, 1], T[2, 2], T[3, 3] = c, -s, s, c, 1.0, 1.0
+    T[0, 3] = geometry[1] * math.cos(q[0]) + a * c
+    T[1, 3] = geometry[1] * math.sin(q[0]) + a * s
+
+
+@kernel
+def jacobian(q: Array, geometry: Array, J: Array) -> None:
+    """Write the Jacobian (6, 1); bounded where coupler and rocker are in line.
+
+    The ends of the coupler have the same speed along the rocker:
+    l1 sin(phi1 - theta1) + l2 sin(phi1 - coupler) d coupler/d theta1 = 0.
+    """
+    phi1, coupler = _angles(q[0], geometry)
+    l1, a = geometry[1], geometry[4]
+    sine = math.sin(phi1 - coupler)
+    sine = math.copysign(max(abs(sine), _ROUNDING), sine)
+    turn = -l1 * math.sin(phi1 - q[0]) / (geometry[2] * sine)
+    J[:] = 0.0
+    J[0, 0] = -l1 * math.sin(q[0]) - a * turn * math.sin(coupler)
+    J[1, 0] = l1 * math.cos(q[0]) + a * turn * math.cos(coupler)
+    J[5, 0] = turn
+
+
+@kernel
+def _distance(theta1: float, x: float, y: float, g: Array) -> float:
+    """Distance [m] of the coupler point from (x, y)."""
+    _, coupler = _angles(theta1, g)
+    dx = g[1] * math.cos(theta1) + g[4] * math.cos(coupler) - x
+    dy = g[1] * math.sin(theta1) + g[4] * math.sin(coupler) - y
+    return math.hypot(dx, dy)
+
+
+@kernel
+def _refined(theta1: float, lower: float, upper: float, T: Array, g: Array) -> float:
+    """Crank angle in [lower, upper] whose coupler point is, going down, nearest to T's."""
+    q, J, reached = np.empty(1), np.empty((6, 1)), np.empty((4, 4))
+    best = _distance(theta1, T[0, 3], T[1, 3], g)
+    for _ in range(60):
+        q[0] = theta1
+        fk(q, g, reached)
+        jacobian(q, g, J)
+        slope = J[0, 0] * (T[0, 3] - reached[0, 3]) + J[1, 0] * (T[1, 3] - reached[1, 3])
+        move = slope / max(J[0, 0] ** 2 + J[1, 0] ** 2, 1e-18)
+        improved = False
+        for _ in range(40):
+            trial = min(max(theta1 + move, lower), upper)
+            distance = _distance(trial, T[0, 3], T[1, 3], g)
+            if distance < best:
+                improved = True
+                break
+            move *= 0.5
+        if not improved:
+            break
+        theta1, best = trial, distance
+    return theta1
+
+
+@kernel
+def _candidate(k: int, T: Array, g: Array) -> float:
+    """One of the two crank angles whose end is ``a`` away from T's point."""
+    x, y, l1, a = T[0, 3], T[1, 3], g[1], g[4]
+    radius = math.hypot(x, y)
+    cosine = (radius * radius + l1 * l1 - a * a) / max(2.0 * l1 * radius, 1e-300)
+    half = math.acos(min(max(cosine, -1.0), 1.0))
+    return math.atan2(y, x) + (half if k == 0 else -half)
+
+
+@kernel
+def _in_turn(angle: float, seed: float, lower: float, upper: float) -> float:
+    """Same angle, in the turn next to the seed that is inside the limits."""
+    near: float = seed + wrapped(angle - seed)
+    if near > upper + _ROUNDING:
+        return near - 2.0 * math.pi
+    return near + 2.0 * math.pi if near < lower - _ROUNDING else near
+
+
+@kernel
+def _nearest(T: Array, seed: float, limits: Array, g: Array) -> float:
+    """Crank angle of the nearest point of the whole curve; of equal ones next to the seed."""
+    lower, upper = limits[0, 0], limits[1, 0]
+    best, cost = seed, math.inf
+    for k in range(2):
+        angle = _in_turn(_candidate(k, T, g), seed, lower, upper)
+        inside = lower - _ROUNDING <= angle <= upper + _ROUNDING
+        is_exact = inside and _distance(angle, T[0, 3], T[1, 3], g) <= REACHED
+        if is_exact and abs(angle - seed) < cost:
+            best, cost = angle, abs(angle - seed)
+    if cost < math.inf:
+        return best
+    start = max(lower, seed - math.pi)
+    width = (min(upper, start + 2.0 * math.pi) - start) / _SAMPLES
+    for i in range(_SAMPLES + 1):
+        distance = _distance(start + i * width, T[0, 3], T[1, 3], g)
+        if distance < cost:
+            best, cost = start + i * width, distance
+    return best
+
+
+@kernel
+def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
+    """Write theta1 (1,); see :class:`teleop_core.robots.robot.Kernels`.
+
+    In a path the crank goes down the distance from where it is, so it stays on its part of the
+    curve; otherwise the whole curve is searched.
+    """
+    if not is_askable(T, seed):
+        return -1
+    lower, upper = limits[0, 0], limits[1, 0]
+    start = bounded(seed[0], seed[0], lower, upper, math.inf)
+    if math.isinf(limits[2, 0]):
+        start = _nearest(T, start, limits, geometry)
+    else:
+        lower, upper = max(lower, seed[0] - limits[2, 0]), min(upper, seed[0] + limits[2, 0])
+        start = min(max(start, lower), upper)
+    q[0] = min(max(_refined(start, lower, upper, T, geometry), limits[0, 0]), limits[1, 0])
+    reached = np.empty((4, 4))
+    fk(q, geometry, reached)
+    pose_residual(reached, T, residual)
+    if _distance(q[0], T[0, 3], T[1, 3], geometry) > REACHED:
+        return _LIMITED if q[0] <= lower or q[0] >= upper else _UNREACHABLE
+    phi1, coupler = _angles(q[0], geometry)
+    return _NEAR_SINGULAR if abs(math.sin(phi1 - coupler)) < _NEAR else _FOLLOWED
+
+
+@kernel
+def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
+    """Write the crank angles (k, 1), k <= 2, whose coupler point is at T's x and y."""
+    count = 0
+    for k in range(2):
+        angle = wrapped(_candidate(k, T, geometry))
+        is_exact = _distance(angle, T[0, 3], T[1, 3], geometry) <= REACHED
+        if is_exact and (count == 0 or abs(wrapped(angle - solutions[0, 0])) > REACHED):
+            solutions[count, 0] = angle
+            count += 1
+    return count
+
+
+def make(**geometry: float | str) -> Robot:
+    """Four-bar with lengths l0..l3, coupler point ``a`` [m] and assembly ``mode`` 1 or -1."""
+    row = geometry_of(GEOMETRY, geometry)
+    loop = FourBar(row["l0"], row["l1"], row["l2"], row["l3"])
+    if row["mode"] not in {1.0, -1.0}:
+        raise ParameterError("mode", row["mode"], "1 or -1")
+    ranges = loop.crank_ranges()
+    if not ranges:
+        lengths = (loop.l0, loop.l1, loop.l2, loop.l3)
+        raise ParameterError("l0, l1, l2, l3", lengths, "lengths that close a loop")
+    lower, upper = ranges[0]
+    if (lower, upper) == (-math.pi, math.pi):
+        lower, upper = -_TURNS, _TURNS
+    return Robot(
+        name="four_bar",
+        joint_names=("theta1",),
+        lower=np.array([lower]),
+        upper=np.array([upper]),
+        home=np.array([0.5 * (lower + upper)]),
+        geometry=row,
+        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        task_mask=(True, True, False, False, False, False),
+    )

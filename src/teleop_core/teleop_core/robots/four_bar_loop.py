@@ -1,0 +1,128 @@
+"""Planar four-bar loop: all four forms of its closure and its two assembly modes.
+
+Ground ``l0`` lies along x from the left to the right pivot, crank ``l1`` turns by theta1 at the
+left one, rocker ``l3`` by phi1 at the right one, coupler ``l2`` joins their ends. phi2 is the
+angle from crank to coupler, phi3 from coupler to rocker, taken from the coupler's end downward to
+the right pivot.
+
+Source:
+    Ghosal 2020, lecture 11, eqs. 2-5, corrected (coupler form: pi; last form: l0 restored).
+"""
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import Array
+
+_ROUNDING = 1e-12
+
+
+class Assembly(IntEnum):
+    """Whether a loop can be put together."""
+
+    CLOSED = 0  # both assembly modes exist (they coincide at the end of the range)
+    CANNOT_ASSEMBLE = 1  # the links do not meet; angles are those of the smallest gap
+
+
+class Closure(NamedTuple):
+    """Angles of a closed loop [rad] in (-pi, pi]; the last axis (2,) is the assembly mode."""
+
+    status: Array
+    """:class:`Assembly` for each theta1, integers."""
+    phi1: Array
+    phi2: Array
+    phi3: Array
+
+
+@dataclass(frozen=True)
+class FourBar:
+    """Lengths of a planar four-bar [m]: ground, crank, coupler, rocker."""
+
+    l0: float
+    l1: float
+    l2: float
+    l3: float
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(name, value, "a length > 0 m")
+
+    def close(self, theta1: Array | float) -> Closure:
+        """All angles for crank angles (...) [rad], both modes.
+
+        Source:
+            Freudenstein 1954; Ghosal 2020, eq. 5, solved for phi1.
+        """
+        theta = np.asarray(theta1, dtype=np.float64)[..., None]
+        x, y = self.l1 * np.cos(theta), self.l1 * np.sin(theta)
+        A, B = 2.0 * self.l3 * (self.l0 - x), -2.0 * self.l3 * y
+        C = (self.l0 - x) ** 2 + y**2 + self.l3**2 - self.l2**2
+        radius = np.hypot(A, B)
+        is_open = np.abs(C) > radius * (1.0 + _ROUNDING)
+        cosine = np.clip(-C / np.where(radius > 0.0, radius, 1.0), -1.0, 1.0)
+        phi1 = np.arctan2(B, A) + np.array([1.0, -1.0]) * np.arccos(cosine)
+        coupler = np.arctan2(self.l3 * np.sin(phi1) - y, self.l0 + self.l3 * np.cos(phi1) - x)
+        angles = (phi1, coupler - theta, phi1 + math.pi - coupler)
+        return Closure(np.where(is_open, 1, 0)[..., 0], *(_principal(angle) for angle in angles))
+
+    def crank_ranges(self) -> tuple[tuple[float, float], ...]:
+        """Intervals of theta1 [rad] in which the loop closes; none, one or two (mirror images).
+
+        The ends of the crank and of the ground must be between |l2 - l3| and l2 + l3 apart.
+        """
+        product, squares = 2.0 * self.l0 * self.l1, self.l0**2 + self.l1**2
+        least = (squares - (self.l2 + self.l3) ** 2) / product
+        most = (squares - (self.l2 - self.l3) ** 2) / product
+        if least > 1.0 + _ROUNDING or most < -1.0 - _ROUNDING:
+            return ()
+        inner, outer = math.acos(min(most, 1.0)), math.acos(max(least, -1.0))
+        if inner == 0.0:
+            return ((-outer, outer),)
+        if outer == math.pi:
+            return ((inner, 2.0 * math.pi - inner),)
+        return ((inner, outer), (-outer, -inner))
+
+    def gap_3r(self, theta1: Array, phi1: Array, phi2: Array, phi3: Array) -> Array:
+        """Form A, broken at the right pivot: gap in x, y [m] and in angle [rad], (..., 3).
+
+        The angles add up to a multiple of 2 pi (the source says 4 pi).
+        """
+        second, third = theta1 + phi2, theta1 + phi2 + phi3
+        x = self.l1 * np.cos(theta1) + self.l2 * np.cos(second) + self.l3 * np.cos(third) - self.l0
+        y = self.l1 * np.sin(theta1) + self.l2 * np.sin(second) + self.l3 * np.sin(third)
+        return np.stack((x, y, _principal(third + math.pi - phi1)), axis=-1)
+
+    def gap_2r_1r(self, theta1: Array, phi1: Array, phi2: Array) -> Array:
+        """Form B, broken between coupler and rocker: gap in x, y [m], (..., 2)."""
+        x = self.l1 * np.cos(theta1) + self.l2 * np.cos(theta1 + phi2)
+        y = self.l1 * np.sin(theta1) + self.l2 * np.sin(theta1 + phi2)
+        return np.stack((x - self.l0 - self.l3 * np.cos(phi1), y - self.l3 * np.sin(phi1)), axis=-1)
+
+    def gap_2r_2r(self, theta1: Array, phi1: Array, phi2: Array, right: Array, a: float) -> Array:
+        """Form C, coupler broken at ``a`` [m] from the crank: gap in x, y, angle, (..., 3).
+
+        ``right`` is the angle from the rocker to the coupler's right part, seen from the rocker
+        end: theta1 + phi2 = phi1 + right + pi (the slide prints pi/2).
+        """
+        b, left = self.l2 - a, theta1 + phi2
+        x = self.l1 * np.cos(theta1) + a * np.cos(left) - self.l0 - self.l3 * np.cos(phi1)
+        y = self.l1 * np.sin(theta1) + a * np.sin(left) - self.l3 * np.sin(phi1)
+        x, y = x - b * np.cos(phi1 + right), y - b * np.sin(phi1 + right)
+        return np.stack((x, y, _principal(left - phi1 - right - math.pi)), axis=-1)
+
+    def gap_freudenstein(self, theta1: Array, phi1: Array) -> Array:
+        """Form D, coupler as a distance: squared distance of the ends less l2² [m²], (...)."""
+        x = self.l1 * np.cos(theta1) - self.l0 - self.l3 * np.cos(phi1)
+        y = self.l1 * np.sin(theta1) - self.l3 * np.sin(phi1)
+        return np.asarray(x * x + y * y - self.l2**2)
+
+
+def _principal(angle: Array) -> Array:
+    """Same angle in (-pi, pi]."""
+    return np.asarray(-np.remainder(math.pi - angle, 2.0 * math.pi) + math.pi)
