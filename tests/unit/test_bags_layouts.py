@@ -1,0 +1,164 @@
+"""Layouts: the bytes of messages, against rosbags' serialiser."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from teleop_core.bags import ros_types, topics
+from teleop_core.bags.layouts import Layout, discover, layout, layout_of
+from teleop_core.bags.messages import Refusal, read_values
+from teleop_core.bags.topics import Kind
+from teleop_core.errors import ShapeError
+
+JOINTS = ("theta1", "d2", "a_rather_long_joint_name")
+NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=9)
+FIXED = [kind for kind in Kind if kind is not Kind.REPORT]
+
+
+def rosbags_message(kind: Kind, stamp_ns: int, values, names, frame_id: str):
+    """The same message made by rosbags."""
+    t = ros_types.typestore().types
+    header = t["std_msgs/msg/Header"](
+        t["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9)), frame_id
+    )
+    point, turn, vector = (t[f"geometry_msgs/msg/{n}"] for n in ("Point", "Quaternion", "Vector3"))
+    v, kind_type = values.tolist(), t[kind.ros_type]
+    if kind is Kind.POSE:
+        pose = t["geometry_msgs/msg/Pose"](point(*v[:3]), turn(*v[4:], v[3]))
+        return kind_type(header, pose)
+    if kind in {Kind.TWIST, Kind.WRENCH}:
+        part = t["geometry_msgs/msg/" + ("Twist" if kind is Kind.TWIST else "Wrench")]
+        return kind_type(header, part(vector(*v[:3]), vector(*v[3:])))
+    if kind is Kind.BUTTONS:
+        return kind_type(header, np.zeros(0, np.float32), values.astype(np.int32))
+    parts = [values[i * len(names) : (i + 1) * len(names)] for i in range(3)]
+    return kind_type(header, list(names), *parts)
+
+
+@st.composite
+def streams(draw):
+    """A layout with stamps and values that fit it."""
+    kind = draw(st.sampled_from(FIXED))
+    names = tuple(draw(st.lists(NAMES, min_size=1, max_size=7, unique=True)))
+    form = layout_of(kind, names, draw(NAMES | st.just("")))
+    count = draw(st.integers(1, 4))
+    stamps = draw(st.lists(st.integers(0, 2**31 * 10**9 - 1), min_size=count, max_size=count))
+    number = st.integers(-(2**31), 2**31 - 1) if kind is Kind.BUTTONS else st.floats(width=64)
+    rows = [draw(st.lists(number, min_size=form.width, max_size=form.width)) for _ in stamps]
+    return form, np.array(stamps, np.int64), np.array(rows, float)
+
+
+@given(streams())
+def test_bytes_are_those_that_rosbags_writes(stream):
+    form, stamps, values = stream
+    for row, stamp, numbers in zip(form.encode(stamps, values), stamps, values, strict=True):
+        message = rosbags_message(form.kind, int(stamp), numbers, form.joint_names, form.frame_id)
+        assert row.tobytes() == ros_types.serialise(message)
+
+
+@given(streams())
+def test_decoding_gives_back_what_was_encoded(stream):
+    form, stamps, values = stream
+    rows = form.encode(stamps, values)
+    assert form.matches(rows)
+    decoded_stamps, decoded = form.decode(rows)
+    np.testing.assert_array_equal(decoded_stamps, stamps)
+    np.testing.assert_array_equal(decoded, values)
+
+
+@given(streams())
+def test_single_messages_have_the_bytes_of_the_batch(stream):
+    form, stamps, values = stream
+    for row, stamp, numbers in zip(form.encode(stamps, values), stamps, values, strict=True):
+        data = form.encode_one(int(stamp), numbers)
+        assert data == row.tobytes()
+        decoded = form.decode_one(data)
+        assert decoded is not None
+        assert decoded[0] == stamp
+        np.testing.assert_array_equal(decoded[1], numbers)
+
+
+@given(streams())
+def test_a_stream_is_recognised_by_its_first_message(stream):
+    form, stamps, values = stream
+    assert discover(form.kind, form.encode_one(int(stamps[0]), values[0])) is form
+
+
+@given(streams())
+def test_reading_by_attribute_agrees_with_reading_bytes(stream):
+    form, stamps, values = stream
+    data = form.encode_one(int(stamps[0]), values[0])
+    message = ros_types.deserialise(data, form.kind.ros_type)
+    result = read_values(form.kind, message, form.joint_names)
+    assert not isinstance(result, Refusal)
+    assert result[0] == stamps[0]
+    np.testing.assert_array_equal(result[1], values[0])
+
+
+@given(streams(), st.data())
+def test_any_other_constant_byte_is_noticed_one_by_one_and_in_batches(stream, data):
+    form, stamps, values = stream
+    rows = form.encode(stamps, values)
+    other = layout_of(form.kind, tuple(n + "x" for n in form.joint_names), form.frame_id + "x")
+    same_size = np.resize(rows, (len(rows), other.size))
+    assert not other.matches(same_size)
+    assert other.decode_one(same_size[0].tobytes()) is None
+
+
+def padding_of(form: Layout) -> list[int]:
+    """Bytes that hold neither constants nor numbers."""
+    used = form._mask.astype(bool)
+    for name in form._dtype.names or ():
+        field, at = form._dtype.fields[name][:2]
+        used[at : at + field.itemsize] = True
+    return np.flatnonzero(~used).tolist()
+
+
+@pytest.mark.parametrize("kind", FIXED)
+def test_padding_may_hold_anything_since_rclpy_does_not_clear_it(kind):
+    form = layout_of(kind, JOINTS, "slave_base")
+    values = np.arange(form.width, dtype=float)
+    clean = form.encode_one(7, values)
+    dirty = bytearray(clean)
+    for at in padding_of(form):
+        dirty[at] = 0xA6
+    dirty += b"\x7d\x12\x74\x02"  # what rclpy appends to a JointState without velocities
+    assert bytes(dirty) != clean
+    decoded = form.decode_one(bytes(dirty))
+    assert decoded is not None
+    np.testing.assert_array_equal(decoded[1], values)
+    assert form.matches(np.frombuffer(bytes(dirty), np.uint8)[np.newaxis])
+    assert discover(kind, bytes(dirty)) is form
+
+
+@pytest.mark.parametrize("kind", FIXED)
+def test_a_message_cut_short_is_not_decoded(kind):
+    form = layout_of(kind, JOINTS, "slave_base")
+    data = form.encode_one(7, np.zeros(form.width))
+    for length in range(len(data)):
+        assert form.decode_one(data[:length]) is None
+        assert discover(kind, data[:length]) is None
+
+
+def test_values_of_another_width_are_refused():
+    form = layout(topics.SLAVE_MEASURED_CP, JOINTS)
+    with pytest.raises(ShapeError) as caught:
+        form.encode(np.zeros(2, np.int64), np.zeros((2, 6)))
+    assert caught.value.expected == (2, 7)
+
+
+def test_a_frame_can_be_named_in_place_of_the_topics_own():
+    assert layout(topics.SLAVE_MEASURED_CP, JOINTS).frame_id == "slave_base"
+    assert layout(topics.SLAVE_MEASURED_CP, JOINTS, "world").frame_id == "world"
+
+
+def test_reports_have_no_layout():
+    with pytest.raises(ValueError, match="teleop/state"):
+        layout(topics.TELEOP_STATE, JOINTS)
+
+
+def test_positions_alone_are_not_taken_for_a_whole_state():
+    state = layout_of(Kind.STATE, JOINTS, "f")
+    data = layout_of(Kind.JOINTS, JOINTS, "f").encode_one(1, np.zeros(3))
+    assert state.decode_one(data + bytes(200)) is None
