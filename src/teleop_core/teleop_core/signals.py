@@ -31,12 +31,13 @@ def signals_dtype(joints: int) -> np.dtype[Any]:
     """Record type for a slave with this many joints.
 
     One field per stream, named as :attr:`Topic.field`, with the columns of its kind; ``stamp_ns``
-    of the master sample in force; ``servo_stamp_ns`` and ``setpoint_stamp_ns``, the stamps that
-    slave/servo_jp and slave/setpoint_js carry; ``teleop_state``, the columns
+    of the master sample in force; ``now_ns``, the time of the slave's tick; ``servo_stamp_ns`` and
+    ``setpoint_stamp_ns``, the stamps that slave/servo_jp and slave/setpoint_js carry; ``teleop_state``, the columns
     :data:`STATE_FIELDS`; and how inverse kinematics and the slave took the command.
     """
     streams = [(topic.field, "f8", (topic.kind.width(joints),)) for topic in STREAMS]
-    stamps = [(name, "i8") for name in ("stamp_ns", "servo_stamp_ns", "setpoint_stamp_ns")]
+    names = ("stamp_ns", "now_ns", "servo_stamp_ns", "setpoint_stamp_ns")
+    stamps = [(name, "i8") for name in names]
     report = [
         ("teleop_state", "f8", (len(STATE_FIELDS),)),
         ("ik_residual", "f8", (2,)),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import bound, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import (
     Array,
@@ -218,6 +218,7 @@ class MotionScaling:
         self._values = parameters
         self.reset()
         self.retune(parameters)
+        self._step = bound(motion_scaling_step, self.parameters, self.state, self.signals)
 
     def reset(self) -> None:
         """Forget the latched poses: the next sample starts from the slave's setpoint."""
@@ -249,4 +250,4 @@ class MotionScaling:
 
     def step(self) -> None:
         """Process one master sample."""
-        motion_scaling_step(self.parameters, self.state, self.signals)
+        self._step()

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import bound, kernel
 from teleop_core.geometry import transform_from_pose
 from teleop_core.parameters import parameter
 from teleop_core.robots import load_robot
@@ -27,21 +27,19 @@ class InverseKinematicsParameters:
 
 
 def scratch(joints: int) -> Any:
-    """Plain arrays for robot kernels, which cannot take fields of records."""
-    return (np.zeros((4, 4)), np.zeros(joints), np.zeros(joints), np.zeros(2))
+    """Plain arrays for robot kernels, which cannot take fields of records, and the timeout [s]."""
+    return (np.zeros((4, 4)), np.zeros(joints), np.zeros(joints), np.zeros(2), np.zeros(1))
 
 
 @kernel
-def inverse_kinematics_step(
-    ik: Any, limits: Any, geometry: Any, timeout_ns: int, work: Any, row: Any
-) -> None:
+def inverse_kinematics_step(ik: Any, limits: Any, geometry: Any, work: Any, row: Any) -> None:
     """One slave pose: write slave_servo_jp, ik_status and ik_residual.
 
     The answer is the neighbour of the last one; while the slave does not follow, of the slave's
     own setpoint, so that a restart never asks for another branch.
     """
-    T, seed, q, residual = work
-    if row.stamp_ns - row.setpoint_stamp_ns > timeout_ns:
+    T, seed, q, residual, timeout = work
+    if row.stamp_ns - row.setpoint_stamp_ns > timeout[0] * 1e9:
         copy(row.slave_setpoint_js, seed)
     transform_from_pose(row.slave_servo_cp, T)
     status = ik(T, seed, limits, geometry, q, residual)
@@ -68,6 +66,10 @@ class InverseKinematics:
         self.limits = self.robot.limits(DT)
         self.retune(parameters)
         self.reset()
+        self._step = bound(
+            inverse_kinematics_step, self.robot.ik_pointer, self.limits, self.robot.geometry_row,
+            self.work, self.signals,
+        )  # fmt: skip
 
     def reset(self) -> None:
         """Start from home."""
@@ -76,11 +78,8 @@ class InverseKinematics:
     def retune(self, parameters: InverseKinematicsParameters) -> None:
         """Take new parameters from the next pose on."""
         self.limits[2] = self.robot.limits(DT)[2] * parameters.speed_share
-        self.timeout_ns = round(parameters.feedback_timeout * 1e9)
+        self.work[4][0] = parameters.feedback_timeout
 
     def step(self) -> None:
         """Process one slave pose."""
-        inverse_kinematics_step(
-            self.robot.ik_pointer, self.limits, self.robot.geometry_row, self.timeout_ns, self.work,
-            self.signals,
-        )  # fmt: skip
+        self._step()

@@ -77,11 +77,11 @@ STAGE = {stage.name: stage for stage in STAGES}
 @kernel
 def _tick(stamp_ns: int, scaling: Any, ik: Any, slave: Any, row: Any) -> None:
     """One tick behind the master: scaling, inverse kinematics, slave, on one record."""
-    row.stamp_ns = stamp_ns
+    row.stamp_ns = row.now_ns = stamp_ns
     motion_scaling_step(scaling[0], scaling[1], row)
-    inverse_kinematics_step(ik[0], ik[1], ik[2], ik[3], ik[4], row)
+    inverse_kinematics_step(ik[0], ik[1], ik[2], ik[3], row)
     p, s, work, robot, geometry, dynamics = slave
-    slave_step(p, s, work, robot, geometry, dynamics, stamp_ns, row)
+    slave_step(p, s, work, robot, geometry, dynamics, row)
 
 
 @kernel
@@ -142,7 +142,7 @@ class Graph:
         ik, slave = self.ik, self.slave
         return (
             (self.scaling.parameters, self.scaling.state),
-            (ik.robot.ik_pointer, ik.limits, ik.robot.geometry_row, ik.timeout_ns, ik.work),
+            (ik.robot.ik_pointer, ik.limits, ik.robot.geometry_row, ik.work),
             (slave.parameters, slave.state, slave.work, slave.pointers,
              slave.robot.geometry_row, slave.dynamics),
         )  # fmt: skip

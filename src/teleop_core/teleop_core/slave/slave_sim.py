@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import kernel, pointer
+from teleop_core.compiled import bound, kernel, pointer
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array, pose_from_transform
 from teleop_core.mapping.filters import lag_step
@@ -91,13 +91,13 @@ def _slave_dtypes(n: int) -> tuple[np.dtype[Any], np.dtype[Any]]:
 
 
 @kernel
-def _take_command(p: Any, s: Any, now_ns: int, row: Any) -> int:
+def _take_command(p: Any, s: Any, row: Any) -> int:
     """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
 
     A jump is farther from the command in force than full speed reaches in the command timeout;
     no stream within its timeout can be that far.
     """
-    stamp = row.servo_stamp_ns
+    stamp, now_ns = row.servo_stamp_ns, row.now_ns
     if stamp > s.seen_ns:
         s.seen_ns = stamp
         far = p.timeout_ns * 1e-9
@@ -151,7 +151,7 @@ def _control(p: Any, s: Any, work: Any, gravity: Any, dynamics: Array, dt: float
 
 @kernel
 def slave_step(
-    p: Any, s: Any, work: Any, robot: Any, geometry: Array, dynamics: Array, now_ns: int, row: Any
+    p: Any, s: Any, work: Any, robot: Any, geometry: Array, dynamics: Array, row: Any
 ) -> None:
     """One control tick of 1 ms: write the slave's setpoint and measured topics.
 
@@ -162,7 +162,7 @@ def slave_step(
     fk, acceleration, gravity = robot
     q, dq, effort, before, T = work[0], work[1], work[2], work[5], work[6]
     copy(s.command, before)
-    row.command_status = _take_command(p, s, now_ns, row)
+    row.command_status = _take_command(p, s, row)
     _advance_setpoint(p, s, before, 1e-3)
     _control(p, s, work, gravity, dynamics, 1e-3)
     n = q.shape[0]
@@ -186,7 +186,7 @@ def slave_step(
 class SlaveSim:
     """Stage that simulates the slave: 1 kHz control of a continuous arm.
 
-    ``signals`` is the record it reads (``slave_servo_jp``, ``servo_stamp_ns``) and writes
+    ``signals`` is the record it reads (``now_ns``, ``slave_servo_jp``, ``servo_stamp_ns``) and writes
     (``slave_setpoint_js``, ``slave_setpoint_cp``, ``setpoint_stamp_ns``, ``slave_measured_js``,
     ``slave_measured_cp``, ``command_status``). It starts at home, at rest and in balance: the
     integrators hold the gravity that is not compensated.
@@ -212,6 +212,10 @@ class SlaveSim:
         )
         self.retune(parameters)
         self.reset()
+        self._step = bound(
+            slave_step, self.parameters, self.state, self.work, self.pointers,
+            self.robot.geometry_row, self.dynamics, self.signals,
+        )  # fmt: skip
 
     def reset(self) -> None:
         """Back to home, at rest, with no command in force."""
@@ -275,10 +279,8 @@ class SlaveSim:
 
     def step(self, now_ns: int) -> None:
         """One tick of 1 ms that starts at ``now_ns`` [ns]."""
-        slave_step(
-            self.parameters, self.state, self.work, self.pointers, self.robot.geometry_row,
-            self.dynamics, now_ns, self.signals,
-        )  # fmt: skip
+        self.signals["now_ns"] = now_ns
+        self._step()
 
 
 def _per_joint(robot: Robot, name: str, values: tuple[float, ...], default: Array) -> Array:
