@@ -10,8 +10,10 @@ __all__ = ["IkResult", "IkStatus", "Robot", "list_robots", "load_robot"]
 # Name of the robot -> module of this package whose make(**geometry) builds it.
 _MODULES = {
     "rcrt1": "rcrt1",
+    "mma": "mma",
     "four_bar": "four_bar",
     "parallelogram": "parallelogram",
+    "stewart": "stewart",
     "puma560": "puma560",
 }
 

@@ -1,0 +1,167 @@
+"""Stewart legs: lengths, Jacobian and direct kinematics of a body held by six legs, as kernels.
+
+Joints of the legs are given as (6, 3) points: ``base`` in base coordinates, ``platform`` in
+platform coordinates [m]. ``T`` is ``T_base_platform``.
+
+Source:
+    Merlet 2006 (leg Jacobian); Levenberg 1944, Marquardt 1963 (direct kinematics).
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.compiled import kernel
+from teleop_core.geometry import Array
+from teleop_core.robots.damped import factorise, solve
+
+# Legs count as closed within this error of length [m].
+CLOSED = 1e-11
+_ITERATIONS = 100
+_LARGEST_TURN = 0.5  # rad, of one iteration
+
+
+@kernel
+def leg_system(T: Array, base: Array, platform: Array, lengths: Array, J: Array) -> None:
+    """Write leg lengths (6,) [m] and the leg Jacobian (6, 6), legs by twist in base axes.
+
+    A row is (u, R m × u), u the unit vector along the leg: leg speed per linear, then angular
+    velocity of the platform frame.
+    """
+    m, leg = np.empty(3), np.empty(3)
+    for i in range(6):
+        square = 0.0
+        for r in range(3):
+            m[r] = T[r, 0] * platform[i, 0] + T[r, 1] * platform[i, 1] + T[r, 2] * platform[i, 2]
+            leg[r] = T[r, 3] + m[r] - base[i, r]
+            square += leg[r] * leg[r]
+        lengths[i] = math.sqrt(square)
+        for r in range(3):
+            leg[r] /= max(lengths[i], 1e-300)
+            J[i, r] = leg[r]
+        J[i, 3] = m[1] * leg[2] - m[2] * leg[1]
+        J[i, 4] = m[2] * leg[0] - m[0] * leg[2]
+        J[i, 5] = m[0] * leg[1] - m[1] * leg[0]
+
+
+@kernel
+def moved(T: Array, move: Array, out: Array) -> None:
+    """Write T after a small move (6,): shift [m], then turn [rad] about its origin, base axes."""
+    x, y, z = move[3], move[4], move[5]
+    angle = math.sqrt(x * x + y * y + z * z)
+    s = math.sin(angle) / angle if angle > 1e-8 else 1.0
+    c = 2.0 * (math.sin(0.5 * angle) / angle) ** 2 if angle > 1e-8 else 0.5
+    for j in range(3):
+        a, b, d = T[0, j], T[1, j], T[2, j]
+        # Rodrigues: v + s (w × v) + c (w × (w × v)).
+        p, q, r = y * d - z * b, z * a - x * d, x * b - y * a
+        out[0, j] = a + s * p + c * (y * r - z * q)
+        out[1, j] = b + s * q + c * (z * p - x * r)
+        out[2, j] = d + s * r + c * (x * q - y * p)
+        out[j, 3] = T[j, 3] + move[j]
+        out[3, j] = 0.0
+    out[3, 3] = 1.0
+
+
+@kernel
+def _damped_move(J: Array, gap: Array, damping: float, size: float, move: Array) -> None:
+    """Write the least-squares move (6,) that closes the gaps (6,), damped per length ``size``."""
+    A = np.empty((6, 6))
+    for r in range(6):
+        move[r] = 0.0
+        for i in range(6):
+            move[r] += J[i, r] * gap[i]
+        for s in range(r + 1):
+            A[r, s] = 0.0
+            for i in range(6):
+                A[r, s] += J[i, r] * J[i, s]
+        A[r, r] += damping * (size * size if r > 2 else 1.0)
+    factorise(A)
+    solve(A, move)
+    turn = math.sqrt(move[3] ** 2 + move[4] ** 2 + move[5] ** 2)
+    if turn > _LARGEST_TURN:
+        for r in range(6):
+            move[r] *= _LARGEST_TURN / turn
+
+
+@kernel
+def _gaps(wanted: Array, lengths: Array, gap: Array) -> float:
+    """Write what the legs lack (6,) [m]; the sum of squares."""
+    square = 0.0
+    for i in range(6):
+        gap[i] = wanted[i] - lengths[i]
+        square += gap[i] * gap[i]
+    return square
+
+
+@kernel
+def direct(wanted: Array, base: Array, platform: Array, size: float, T: Array) -> float:
+    """Move T from where it is to the platform pose with these leg lengths.
+
+    Damping shrinks with success, so that convergence ends quadratic; lengths that no pose near
+    the start has end in the least sum of squared errors.
+
+    Args:
+        wanted: Leg lengths (6,) [m].
+        base: Base joints (6, 3) [m].
+        platform: Platform joints (6, 3) [m].
+        size: Length [m] at which one metre weighs as one radian.
+        T: Start, and result (4, 4).
+
+    Returns:
+        Largest error of a leg length that is left [m].
+    """
+    J, trial_J, trial = np.empty((6, 6)), np.empty((6, 6)), np.empty((4, 4))
+    lengths, gap, move = np.empty(6), np.empty(6), np.empty(6)
+    leg_system(T, base, platform, lengths, J)
+    cost, damping = _gaps(wanted, lengths, gap), 1e-4
+    for _ in range(_ITERATIONS):
+        if cost <= 1e-31 * size * size or damping > 1e8:
+            break
+        _damped_move(J, gap, damping, size, move)
+        moved(T, move, trial)
+        leg_system(trial, base, platform, lengths, trial_J)
+        trial_cost = 0.0
+        for i in range(6):
+            trial_cost += (wanted[i] - lengths[i]) ** 2
+        if trial_cost >= cost:
+            damping = max(10.0 * damping, 1e-12)
+            continue
+        gained = cost - trial_cost
+        T[:], J[:] = trial, trial_J
+        cost, damping = _gaps(wanted, lengths, gap), 0.05 * damping
+        if gained <= 1e-14 * cost:
+            break
+    return float(np.abs(gap).max())
+
+
+@kernel
+def invert(A: Array, inverse: Array) -> float:
+    """Write the inverse (n, n) of A, which is destroyed; the product of the pivots' signs.
+
+    Partial pivoting; a pivot of nothing counts as 1e-12, so that the result stays finite.
+    """
+    n, sign = A.shape[0], 1.0
+    inverse[:] = np.eye(n)
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[best, k]):
+                best = i
+        if best != k:
+            sign = -sign
+            for j in range(n):
+                A[k, j], A[best, j] = A[best, j], A[k, j]
+                inverse[k, j], inverse[best, j] = inverse[best, j], inverse[k, j]
+        pivot = math.copysign(max(abs(A[k, k]), 1e-12), A[k, k])
+        sign *= math.copysign(1.0, pivot)
+        for j in range(n):
+            A[k, j] /= pivot
+            inverse[k, j] /= pivot
+        for i in range(n):
+            factor = A[i, k]
+            if i != k and factor != 0.0:
+                for j in range(n):
+                    A[i, j] -= factor * A[k, j]
+                    inverse[i, j] -= factor * inverse[k, j]
+    return sign
