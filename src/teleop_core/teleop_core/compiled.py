@@ -26,7 +26,7 @@ _sources: dict[Any, frozenset[str]] = {}
 def _stamped(compiled: Any, function: Callable[..., Any]) -> Any:
     """Let the disk cache of a compiled function depend on every file its kernels come from."""
     code, names = function.__code__, function.__globals__
-    called = (names.get(name) for name in code.co_names)
+    called: list[Any] = [names.get(name) for name in code.co_names]
     inner = [_sources[value.py_func] for value in called if _is_kernel(value)]
     files = frozenset([code.co_filename]).union(*inner)
     _sources[function] = files

@@ -117,7 +117,8 @@ def specs(group: type, prefix: str = "") -> Iterator[Spec]:
         if kind is UnionType or kind not in {bool, int, float, str, tuple}:
             raise TypeError(f"{group.__name__}.{entry.name}: a parameter cannot be a {hint}")
         element = get_args(hint)[0] if kind is tuple else kind
-        yield Spec(prefix + entry.name, kind, element, entry.default, **entry.metadata)
+        default: Any = entry.default
+        yield Spec(prefix + entry.name, kind, element, default, **entry.metadata)
 
 
 def build(group: type[Group], values: Mapping[str, object], prefix: str = "") -> Group:

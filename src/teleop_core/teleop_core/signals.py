@@ -31,9 +31,10 @@ def signals_dtype(joints: int) -> np.dtype[Any]:
     """Record type for a slave with this many joints.
 
     One field per stream, named as :attr:`Topic.field`, with the columns of its kind; ``stamp_ns``
-    of the master sample in force; ``now_ns``, the time of the slave's tick; ``servo_stamp_ns`` and
-    ``setpoint_stamp_ns``, the stamps that slave/servo_jp and slave/setpoint_js carry; ``teleop_state``, the columns
-    :data:`STATE_FIELDS`; and how inverse kinematics and the slave took the command.
+    of the master sample in force; ``now_ns``, the time of the slave's tick; ``servo_stamp_ns``
+    and ``setpoint_stamp_ns``, the stamps that slave/servo_jp and slave/setpoint_js carry;
+    ``teleop_state``, the columns :data:`STATE_FIELDS`; and how inverse kinematics and the slave
+    took the command.
     """
     streams = [(topic.field, "f8", (topic.kind.width(joints),)) for topic in STREAMS]
     names = ("stamp_ns", "now_ns", "servo_stamp_ns", "setpoint_stamp_ns")

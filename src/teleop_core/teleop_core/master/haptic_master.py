@@ -240,7 +240,8 @@ class HapticMaster:
         """Stylus in the inkwell, at time zero, with the random numbers of the seed."""
         self._rng = np.random.default_rng(self._fixed.seed)
         self._path = Path(self._fixed.path, self._rng, self._recorded)
-        self._tick, self._block, self._used = 0, None, BLOCK
+        self._tick, self._used = 0, BLOCK
+        self._block: tuple[Array, ...] | None = None
         self._rest = np.empty(4)
         quaternion_from_rotation(rotation("x", REST_TILT), self._rest)
         for name in _STATE.names or ():
@@ -269,7 +270,7 @@ class HapticMaster:
             Wanted positions (count, 3) [m], attitudes (count, 4), noise (count, 6), buttons
             (count, 3), as :func:`haptic_master_step` takes them row by row.
         """
-        times = (self._tick + np.arange(1, count + 1)) * DT
+        times = np.arange(self._tick + 1, self._tick + count + 1, dtype=np.float64) * DT
         self._tick += count
         position, turn = self._path.sample(times)
         attitudes = np.empty((count, 4))

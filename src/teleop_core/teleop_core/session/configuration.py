@@ -169,7 +169,9 @@ class Configuration:
         for layer in layers:
             for stage, values in layer.items():
                 merged[stage] |= values
-        groups = {name: build(group, merged[name], f"{name}.") for name, group in GROUPS.items()}
+        groups: dict[str, Any] = {
+            name: build(group, merged[name], f"{name}.") for name, group in GROUPS.items()
+        }
         robots = {groups[stage].robot for stage in ("inverse_kinematics", "slave_sim")}
         if len(robots) > 1:
             text = " and ".join(sorted(robots))
@@ -203,3 +205,15 @@ def configure(
     layers += [load_file(Path(file)) for file in files]
     layers += [parse_setting(text) for text in settings]
     return Configuration.from_layers(layers, scenario or "")
+
+
+def parameter_rows(stages: Iterable[str]) -> list[tuple[str, str, str, str]]:
+    """Name, default, what is allowed and meaning of every parameter of some stages."""
+    rows = []
+    for stage in stages:
+        for spec in specs(GROUPS[stage]):
+            allowed = ", ".join(spec.choices) if spec.choices else spec.bounds()
+            default = spec.default if spec.kind is not tuple else list(spec.default)  # type: ignore[arg-type]
+            text = spec.doc + (" (fixed)" if spec.fixed else "")
+            rows.append((f"{stage}.{spec.name}", str(default), allowed, text))
+    return rows

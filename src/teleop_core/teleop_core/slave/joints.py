@@ -85,4 +85,3 @@ def integrate(
             # Sum of the four stage speeds, written with the accelerations they came from.
             q[i] += h * dq[i] + h * h / 6.0 * (k[0, i] + k[1, i] + k[2, i])
             dq[i] += h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
-    # fmt: skip

@@ -13,7 +13,7 @@ from teleop_core.mapping.filters import lag_step
 from teleop_core.parameters import parameter
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import ACCELERATION, GRAVITY, Robot
-from teleop_core.signals import DT, copy, make_signals
+from teleop_core.signals import copy, make_signals
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.pid import critically_damped_gains, pid_step
 
@@ -186,10 +186,10 @@ def slave_step(
 class SlaveSim:
     """Stage that simulates the slave: 1 kHz control of a continuous arm.
 
-    ``signals`` is the record it reads (``now_ns``, ``slave_servo_jp``, ``servo_stamp_ns``) and writes
-    (``slave_setpoint_js``, ``slave_setpoint_cp``, ``setpoint_stamp_ns``, ``slave_measured_js``,
-    ``slave_measured_cp``, ``command_status``). It starts at home, at rest and in balance: the
-    integrators hold the gravity that is not compensated.
+    ``signals`` is the record it reads (``now_ns``, ``slave_servo_jp``, ``servo_stamp_ns``) and
+    writes (``slave_setpoint_js``, ``slave_setpoint_cp``, ``setpoint_stamp_ns``,
+    ``slave_measured_js``, ``slave_measured_cp``, ``command_status``). It starts at home, at rest
+    and in balance: the integrators hold the gravity that is not compensated.
     """
 
     def __init__(self, parameters: SlaveSimParameters, signals: Any = None) -> None:

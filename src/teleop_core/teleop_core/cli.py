@@ -1,0 +1,289 @@
+"""The ``teleop`` command: simulate, run live, replay, play, score and look things up.
+
+Imports stand inside the commands: ``teleop --help`` answers at once.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+from teleop_core.errors import TeleopError
+
+FAILED = 2
+INTERRUPTED = 130
+
+_EPILOG = """\
+a first session:
+  teleop sim --scenario coarse_box --out bags/coarse    record 46 s of teleoperation
+  teleop evaluate bags/coarse --html coarse.html        score it, look at it
+  teleop replay bags/coarse --out bags/unfiltered --set reference_filter.is_on=false
+"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(FAILED, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point of ``teleop``; returns the exit code: 0, 2 for wrong use, 130 for Ctrl-C."""
+    parsed = _parser().parse_args(arguments)
+    try:
+        code: int = parsed.run(parsed)
+    except TeleopError as error:
+        print(f"teleop {parsed.command}: {error}", file=sys.stderr)
+        return FAILED
+    except KeyboardInterrupt:
+        print(f"teleop {parsed.command}: interrupted; what was recorded is kept", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader of our output, such as head, has seen enough
+        sys.stderr.close()
+        return 0
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="teleop",
+        description="Master-slave teleoperation: simulate, record, replay and score sessions.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    from teleop_core import __version__
+
+    parser.add_argument("--version", action="version", version=__version__)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for add in (_add_sim, _add_live, _add_replay, _add_play, _add_evaluate, _add_lookups):
+        add(commands)
+    return parser
+
+
+def _add_sim(commands: Any) -> None:
+    sim = _command(commands, "sim", _sim, "run and record a session in virtual time")
+    _session_arguments(sim)
+    sim.add_argument("--seed", type=int, help="seed of everything random (haptic_master.seed)")
+
+
+def _add_live(commands: Any) -> None:
+    live = _command(commands, "live", _live, "run and record a session as ROS 2 nodes")
+    _session_arguments(live)
+
+
+def _add_replay(commands: Any) -> None:
+    text = "run a recorded master through the graph again, in virtual time"
+    again = _command(commands, "replay", _replay, text)
+    again.add_argument("bag", type=Path, help="recording whose master is replayed")
+    _out_argument(again)
+    _setting_arguments(again)
+
+
+def _add_play(commands: Any) -> None:
+    play = _command(commands, "play", _play, "publish a recording on live ROS 2 topics")
+    play.add_argument("bag", type=Path, help="recording to publish")
+    play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
+    play.add_argument("--rate", type=float, default=1.0, help="times real time (default: 1)")
+
+
+def _add_evaluate(commands: Any) -> None:
+    score = _command(commands, "evaluate", _evaluate, "score recordings beside published figures")
+    score.add_argument("bags", type=Path, nargs="+", metavar="BAG", help="recordings to score")
+    score.add_argument("--json", type=Path, metavar="FILE", help="write the scores as JSON")
+    score.add_argument("--html", type=Path, metavar="FILE", help="write one page with plots")
+
+
+def _add_lookups(commands: Any) -> None:
+    recover = _command(commands, "recover", _recover, "save what a cut-off recording holds")
+    recover.add_argument("bag", type=Path, help="recording that was not closed")
+    recover.add_argument("--out", type=Path, help="new recording (default: BAG_recovered)")
+    _command(commands, "scenarios", _scenarios, "list the scenarios")
+    text = "list every parameter with unit, bounds and meaning"
+    parameters = _command(commands, "parameters", _parameters, text)
+    parameters.add_argument("stage", nargs="?", help="only this stage")
+    parameters.add_argument("--markdown", action="store_true", help="as a table for documents")
+    robot = _command(commands, "robot", _robot, "show a robot: joints, limits, home, tip pose")
+    robot.add_argument("name", nargs="?", help="robot; without one, all are listed")
+
+
+def _command(
+    commands: Any, name: str, run: Callable[[argparse.Namespace], int], text: str
+) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
+    parser.set_defaults(run=run)
+    return parser
+
+
+def _out_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--out", type=Path, required=True, help="directory of the recording; must not exist"
+    )
+
+
+def _session_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scenario", help="one of `teleop scenarios`")
+    parser.add_argument("--duration", type=float, metavar="S", help="seconds, in its place")
+    _out_argument(parser)
+    _setting_arguments(parser)
+
+
+def _setting_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--config", type=Path, action="append", default=[], metavar="FILE",
+        help="ROS 2 parameter file over the scenario; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", dest="settings",
+        help="parameter over all files, e.g. fine_gain=0.2 or slave_sim.command_timeout=0.2",
+    )  # fmt: skip
+
+
+def _settings(arguments: argparse.Namespace) -> list[str]:
+    given = list(arguments.settings)
+    if arguments.duration is not None:
+        given.append(f"teleop.duration={arguments.duration!r}")
+    if getattr(arguments, "seed", None) is not None:
+        given.append(f"haptic_master.seed={arguments.seed}")
+    return given
+
+
+def _sim(arguments: argparse.Namespace) -> int:
+    from teleop_core.session.configuration import configure
+    from teleop_core.session.runner import simulate
+
+    configuration = configure(arguments.scenario, arguments.config, _settings(arguments))
+    with _progress("simulating") as progress:
+        ticks = simulate(configuration, arguments.out, progress)
+    print(f"{arguments.out}: {ticks / 1e3:g} s recorded; next: teleop evaluate {arguments.out}")
+    return 0
+
+
+def _replay(arguments: argparse.Namespace) -> int:
+    from teleop_core.bags.reader import Bag
+    from teleop_core.session.configuration import Configuration, load_file, parse_setting
+    from teleop_core.session.runner import recorded_configuration, replay
+
+    bag = Bag(arguments.bag)
+    layer, scenario = recorded_configuration(bag)
+    layers = [layer, *map(load_file, arguments.config), *map(parse_setting, arguments.settings)]
+    with _progress("replaying") as progress:
+        configuration = Configuration.from_layers(layers, scenario)
+        ticks = replay(bag, configuration, arguments.out, progress)
+    print(f"{arguments.out}: {ticks / 1e3:g} s replayed; next: teleop evaluate {arguments.out}")
+    return 0
+
+
+def _live(arguments: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from teleop_core.session.configuration import configure
+
+    configuration = configure(arguments.scenario, arguments.config, _settings(arguments))
+    _ros("live").live(configuration, arguments.out, Console())
+    print(f"{arguments.out}: recorded; next: teleop evaluate {arguments.out}")
+    return 0
+
+
+def _play(arguments: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from teleop_core.bags.reader import Bag
+
+    _ros("play").play(Bag(arguments.bag), arguments.topics, arguments.rate, Console())
+    return 0
+
+
+def _ros(module: str) -> Any:
+    """Module of the nodes, which are the only part that needs ROS."""
+    from importlib import import_module
+
+    try:
+        return import_module(f"teleop_core.nodes.{module}")
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("teleop_core"):
+            raise
+        raise TeleopError(
+            f"needs ROS 2 ({error.name} is missing): pip install 'teleop_core[ros]' or source ROS"
+        ) from error
+
+
+def _evaluate(arguments: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from teleop_core.evaluation.command import evaluate_bags
+
+    evaluate_bags(arguments.bags, arguments.json, arguments.html, Console())
+    return 0
+
+
+def _recover(arguments: argparse.Namespace) -> int:
+    from teleop_core.bags.reader import recover
+
+    path, messages = recover(arguments.bag, arguments.out)
+    print(f"{path}: {messages} messages recovered")
+    return 0
+
+
+def _scenarios(_: argparse.Namespace) -> int:
+    from teleop_core.session.configuration import list_scenarios
+
+    for name, description in list_scenarios().items():
+        print(f"{name:16} {description}")
+    return 0
+
+
+def _parameters(arguments: argparse.Namespace) -> int:
+    from teleop_core.errors import UnknownNameError
+    from teleop_core.session.configuration import GROUPS, parameter_rows
+
+    if arguments.stage is not None and arguments.stage not in GROUPS:
+        raise UnknownNameError("stage", arguments.stage, GROUPS)
+    rows = parameter_rows([arguments.stage] if arguments.stage else GROUPS)
+    if arguments.markdown:
+        print("| parameter | default | allowed | meaning |\n|---|---|---|---|")
+        for row in rows:
+            print("| `" + " | ".join((f"{row[0]}`", *row[1:])) + " |")
+        return 0
+    for name, default, allowed, text in rows:
+        print(f"{name:42} {default:18} {text} ({allowed})")
+    return 0
+
+
+def _robot(arguments: argparse.Namespace) -> int:
+    import numpy as np
+
+    from teleop_core.robots import list_robots, load_robot
+
+    if arguments.name is None:
+        print("\n".join(list_robots()))
+        return 0
+    robot = load_robot(arguments.name)
+    print(f"{robot.name}: {robot.n} joints [rad, m]")
+    for row in zip(robot.joint_names, robot.lower, robot.upper, robot.home, strict=True):
+        print("  {:10} {:9.4f} … {:8.4f}   home {:8.4f}".format(*row))
+    print("geometry: " + ", ".join(f"{k} = {v}" for k, v in robot.geometry.items()))
+    print("T_base_tip at home:")
+    print(np.array2string(robot.fk(robot.home), precision=4, suppress_small=True))
+    return 0
+
+
+@contextmanager
+def _progress(text: str) -> Iterator[Callable[[int, int], None]]:
+    """Progress bar on a terminal, nothing when piped; counts are milliseconds."""
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(text), BarColumn(), TextColumn("{task.percentage:.0f} %"))
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task(text, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
