@@ -118,30 +118,16 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 
 @kernel
-def _shoulder(T: Array, geometry: Array, is_back: bool, seed: float) -> tuple[float, float, bool]:
-    """Joint 1, the wrist's u in the plane it makes, and whether that plane holds the wrist."""
-    x, y, d3 = T[0, 3], T[1, 3], geometry[2]
-    square = x * x + y * y - d3 * d3
-    u = math.sqrt(max(square, 0.0))
-    if is_back:
-        u = -u
-    q1 = seed
-    if x * x + y * y > _ON_AXIS * _ON_AXIS:
-        q1 = math.atan2(y, x) - math.atan2(d3, u)
-    return q1, u, square >= -_ON_AXIS
+def _bend(u: float, z: float, geometry: Array) -> tuple[float, bool]:
+    """Bend of the elbow that puts the wrist at its distance from axis 2, and whether one does.
 
-
-@kernel
-def _elbow(u: float, z: float, geometry: Array, is_down: bool) -> tuple[float, bool]:
-    """Joint 3 that puts the wrist at its distance from axis 2; whether it can.
-
-    Beyond reach the arm is stretched, too close it is folded.
+    Joint 3 is atan2(a3, d4) less the bend, or less its supplement. Beyond reach the arm is
+    stretched or folded.
     """
     a2, a3, d4 = geometry[0], geometry[1], geometry[3]
     K = (u * u + z * z - a2 * a2 - a3 * a3 - d4 * d4) / (2.0 * a2)
     square = a3 * a3 + d4 * d4 - K * K
-    root = math.sqrt(max(square, 0.0))
-    return math.atan2(a3, d4) - math.atan2(K, -root if is_down else root), square >= -_ON_AXIS
+    return math.atan2(K, math.sqrt(max(square, 0.0))), square >= -_ON_AXIS
 
 
 @kernel
@@ -152,6 +138,31 @@ def _upper_arm(u: float, z: float, q3: float, geometry: Array, seed: float) -> f
         return seed
     x, y = a3 + a2 * math.cos(q3), d4 - a2 * math.sin(q3)
     return math.atan2(-x * z - u * y, x * u - y * z) - q3
+
+
+@kernel
+def _arms(T: Array, geometry: Array, seed: Array, arms: Array) -> bool:
+    """Write joints 1 to 3 of the branches (4, 3): front up, front down, back up, back down.
+
+    With the wrist on an axis the joint of that axis keeps the seed's value.
+
+    Returns:
+        Whether they reach the wrist centre; else they are the nearest.
+    """
+    x, y, z, d3 = T[0, 3], T[1, 3], T[2, 3], geometry[2]
+    square = x * x + y * y - d3 * d3
+    u = math.sqrt(max(square, 0.0))
+    bend, is_near = _bend(u, z, geometry)
+    aside, lead = math.atan2(d3, u), math.atan2(geometry[1], geometry[3])
+    azimuth = math.atan2(y, x)
+    if x * x + y * y <= _ON_AXIS * _ON_AXIS:
+        azimuth = seed[0] + aside
+    for branch in range(4):
+        is_back, is_down = branch > 1, branch % 2 == 1
+        arms[branch, 0] = azimuth - (math.pi - aside if is_back else aside)
+        arms[branch, 2] = lead - (math.pi - bend if is_down else bend)
+        arms[branch, 1] = _upper_arm(-u if is_back else u, z, arms[branch, 2], geometry, seed[1])
+    return square >= -_ON_AXIS and is_near
 
 
 @kernel
@@ -166,23 +177,14 @@ def _wrist_rotation(T: Array, q1: float, q23: float, M: Array) -> None:
 
 
 @kernel
-def _joint4(M: Array, seed: float) -> float:
-    """Joint 4 of the branch with a positive sine of joint 5; the seed with axes 4 and 6 in line."""
-    if math.hypot(M[0, 2], M[2, 2]) <= _COLLINEAR:
-        return seed
-    return math.atan2(M[2, 2], -M[0, 2])
-
-
-@kernel
-def _joint5(M: Array, q4: float) -> float:
+def _joint5(M: Array, c4: float, s4: float) -> float:
     """Joint 5 that brings the tool axis next to its wanted direction, given joint 4."""
-    return math.atan2(math.sin(q4) * M[2, 2] - math.cos(q4) * M[0, 2], M[1, 2])
+    return math.atan2(s4 * M[2, 2] - c4 * M[0, 2], M[1, 2])
 
 
 @kernel
-def _joint6(M: Array, q4: float, q5: float) -> float:
+def _joint6(M: Array, c4: float, s4: float, c5: float, s5: float) -> float:
     """Joint 6 that turns the tool next to its wanted attitude, given joints 4 and 5."""
-    c4, s4, c5, s5 = math.cos(q4), math.sin(q4), math.cos(q5), math.sin(q5)
     h0, h1 = c4 * M[0, 0] - s4 * M[2, 0], c4 * M[0, 1] - s4 * M[2, 1]
     x0, x1 = c5 * h0 + s5 * M[1, 0], c5 * h1 + s5 * M[1, 1]
     y0, y1 = -s4 * M[0, 0] - c4 * M[2, 0], -s4 * M[0, 1] - c4 * M[2, 1]
@@ -190,10 +192,23 @@ def _joint6(M: Array, q4: float, q5: float) -> float:
 
 
 @kernel
+def _wrist(M: Array, seed: float, q: Array) -> None:
+    """Write joints 4 to 6 of the branch with sin(q5) >= 0; joint 4 is the seed if it is zero."""
+    s5 = math.sqrt(M[0, 2] * M[0, 2] + M[2, 2] * M[2, 2])
+    if s5 > _COLLINEAR:
+        q[3], c4, s4 = math.atan2(M[2, 2], -M[0, 2]), -M[0, 2] / s5, M[2, 2] / s5
+    else:
+        q[3], c4, s4 = seed, math.cos(seed), math.sin(seed)
+    q[4] = math.atan2(s4 * M[2, 2] - c4 * M[0, 2], M[1, 2])
+    q[5] = _joint6(M, c4, s4, M[1, 2], s5)
+
+
+@kernel
 def _turn(q: Array, seed: Array, limits: Array, first: int, last: int) -> None:
     """Bring joints first..last-1 next to the seed, or into their limits, by whole turns."""
+    is_path = math.isfinite(limits[2, 0])
     for i in range(first, last):
-        q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], math.isfinite(limits[2, i]))
+        q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
 
 
 @kernel
@@ -202,50 +217,47 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
 
     The wrist of an arm branch is solved only if the arm alone is not already too far away.
     """
-    best, is_reachable, z = math.inf, False, T[2, 3]
-    trial = np.empty(6)
+    arms, trial, best = np.empty((4, 3)), np.empty(6), math.inf
+    is_reachable = _arms(T, geometry, seed, arms)
     for branch in range(4):
-        trial[0], u, is_beside = _shoulder(T, geometry, branch > 1, seed[0])
-        trial[2], is_near = _elbow(u, z, geometry, branch % 2 == 1)
-        is_reachable = is_reachable or (is_beside and is_near)
-        trial[1] = _upper_arm(u, z, trial[2], geometry, seed[1])
+        trial[0], trial[1], trial[2] = arms[branch, 0], arms[branch, 1], arms[branch, 2]
         _turn(trial, seed, limits, 0, 3)
         arm = move_cost(trial, seed, limits, 0, 3)
         if arm >= best:
             continue
         _wrist_rotation(T, trial[0], trial[1] + trial[2], M)
-        trial[3] = _joint4(M, seed[3])
-        trial[4] = _joint5(M, trial[3])
-        trial[5] = _joint6(M, trial[3], trial[4])
+        _wrist(M, seed[3], trial)
         for _ in range(2):
             _turn(trial, seed, limits, 3, 6)
             cost = max(arm, move_cost(trial, seed, limits, 3, 6))
             if cost < best:
                 best = cost
-                q[:] = trial
-            trial[3] += math.pi
-            trial[4] = -trial[4]
-            trial[5] += math.pi
+                for i in range(6):
+                    q[i] = trial[i]
+            trial[3], trial[4], trial[5] = trial[3] + math.pi, -trial[4], trial[5] + math.pi
     return is_reachable
 
 
 @kernel
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
-    q[0] = bounded(q[0], seed[0], limits[0, 0], limits[1, 0], limits[2, 0])
-    u, z = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3], T[2, 3]
-    is_down = math.cos(math.atan2(geometry[1], geometry[3]) - q[2]) < 0.0
-    for i in (2, 1, 3, 4, 5):
+    lead = math.atan2(geometry[1], geometry[3])
+    is_down = math.cos(lead - q[2]) < 0.0
+    u = z = 0.0
+    for i in (0, 2, 1, 3, 4, 5):
         if i == 2:
-            q[2] = _elbow(u, z, geometry, is_down)[0]
+            u, z = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3], T[2, 3]
+            bend = _bend(u, z, geometry)[0]
+            q[2] = lead - (math.pi - bend if is_down else bend)
         elif i == 1:
             q[1] = _upper_arm(u, z, q[2], geometry, seed[1])
         elif i == 3:
             _wrist_rotation(T, q[0], q[1] + q[2], M)
         elif i == 4:
-            q[4] = _joint5(M, q[3])
-        else:
-            q[5] = _joint6(M, q[3], q[4])
+            q[4] = _joint5(M, math.cos(q[3]), math.sin(q[3]))
+        elif i == 5:
+            c5, s5 = math.cos(q[4]), math.sin(q[4])
+            q[5] = _joint6(M, math.cos(q[3]), math.sin(q[3]), c5, s5)
         _turn(q, seed, limits, i, i + 1)
         q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
 
@@ -253,10 +265,12 @@ def _settle(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
 @kernel
 def _is_near_singular(q: Array, T: Array, geometry: Array) -> bool:
     """Whether the wrist is straight, the arm stretched or folded, or the wrist over axis 1."""
-    reach = geometry[0] + math.hypot(geometry[1], geometry[3])
+    a2, a3, d4 = geometry[0], geometry[1], geometry[3]
+    forearm = math.sqrt(a3 * a3 + d4 * d4)
     u = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3]
-    bend = math.cos(math.atan2(geometry[1], geometry[3]) - q[2])
-    return abs(math.sin(q[4])) < _NEAR or abs(bend) < _NEAR or abs(u) < _NEAR * reach
+    bend = d4 * math.cos(q[2]) + a3 * math.sin(q[2])
+    is_wrist = abs(math.sin(q[4])) < _NEAR
+    return is_wrist or abs(bend) < _NEAR * forearm or abs(u) < _NEAR * (a2 + forearm)
 
 
 @kernel
@@ -284,26 +298,24 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the branches (k, 6): front before back, elbow up before down, wrist; their number.
+    """Write the eight branches (8, 6) in the order of arms, sin(q5) >= 0 first; their number.
 
     On a singularity, where a joint is free, it is zero and branches may coincide.
     """
-    M, count = np.empty((3, 3)), 0
+    M, arms = np.empty((3, 3)), np.empty((4, 3))
+    if not _arms(T, geometry, np.zeros(6), arms):
+        return 0
     for branch in range(8):
-        q = solutions[count]
-        q[0], u, is_beside = _shoulder(T, geometry, branch > 3, 0.0)
-        q[2], is_near = _elbow(u, T[2, 3], geometry, branch % 4 > 1)
-        if not (is_beside and is_near):
-            continue
-        q[1] = _upper_arm(u, T[2, 3], q[2], geometry, 0.0)
+        q = solutions[branch]
+        for i in range(3):
+            q[i] = arms[branch // 2, i]
         _wrist_rotation(T, q[0], q[1] + q[2], M)
-        q[3] = _joint4(M, 0.0) + (math.pi if branch % 2 == 1 else 0.0)
-        q[4] = _joint5(M, q[3])
-        q[5] = _joint6(M, q[3], q[4])
+        _wrist(M, 0.0, q)
+        if branch % 2 == 1:
+            q[3], q[4], q[5] = q[3] + math.pi, -q[4], q[5] + math.pi
         for i in range(6):
             q[i] = wrapped(q[i])
-        count += 1
-    return count
+    return 8
 
 
 def make(**geometry: float | str) -> Robot:
