@@ -3,9 +3,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from teleop_core.bags import topics
 from teleop_core.bags.recording import RecordingParameters
 from teleop_core.bags.topics import Topic
@@ -26,7 +23,7 @@ from teleop_core.robots.inverse_kinematics import (
     InverseKinematicsParameters,
     inverse_kinematics_step,
 )
-from teleop_core.signals import TICK_NS, make_signals
+from teleop_core.signals import TICK_NS, copy, make_signals
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters, slave_step
 
 
@@ -97,24 +94,16 @@ def _run_block(
 
 
 @kernel
-def _replay_block(
-    stamps_ns: NDArray[np.int64],
-    poses: Array,
-    buttons: Array,
-    scaling: Any,
-    ik: Any,
-    slave: Any,
-    row: Any,
-    block: Any,
-) -> None:
-    """As :func:`_run_block`, with recorded samples in place of the master."""
+def _replay_block(samples: Any, scaling: Any, ik: Any, slave: Any, row: Any, block: Any) -> None:
+    """As :func:`_run_block`, with the master's topics of ``samples`` in place of the master."""
     for i in range(block.shape[0]):
-        for j in range(7):
-            row.master_measured_cp[j] = poses[i, j]
-        for j in range(3):
-            row.master_buttons[j] = buttons[i, j]
-        _tick(stamps_ns[i], scaling, ik, slave, row)
-        block[i] = row  # fmt: skip
+        sample = samples[i]
+        copy(sample.master_measured_cp, row.master_measured_cp)
+        copy(sample.master_measured_cv, row.master_measured_cv)
+        copy(sample.master_measured_cf, row.master_measured_cf)
+        copy(sample.master_buttons, row.master_buttons)
+        _tick(sample.stamp_ns, scaling, ik, slave, row)
+        block[i] = row
 
 
 class Graph:
@@ -160,18 +149,16 @@ class Graph:
         self.now_ns += ticks * TICK_NS
         return block
 
-    def replay(self, stamps_ns: NDArray[np.int64], poses: Array, buttons: Array) -> Any:
+    def replay(self, samples: Any) -> Any:
         """Ticks with recorded master samples in place of the simulated master.
 
         Args:
-            stamps_ns: Stamp of each tick (N,) [ns].
-            poses: Recorded master/measured_cp (N, 7).
-            buttons: Recorded master/buttons (N, 3).
+            samples: Signals (N,) of which ``stamp_ns`` and the master's topics are used.
 
         Returns:
             Signals after each tick, a structured array (N,).
         """
-        block = make_signals(self.robot.n, len(poses))
-        _replay_block(stamps_ns, poses, buttons, *self._stages(), self.signals, block)
-        self.now_ns = int(stamps_ns[-1])
+        block = make_signals(self.robot.n, len(samples))
+        _replay_block(samples, *self._stages(), self.signals, block)
+        self.now_ns = int(samples["stamp_ns"][-1])
         return block

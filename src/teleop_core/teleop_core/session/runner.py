@@ -6,17 +6,18 @@ from typing import Any
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from teleop_core.bags import topics
-from teleop_core.bags.reader import Bag
+from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
 from teleop_core.bags.topics import STREAMS
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 from teleop_core.geometry import Array
 from teleop_core.session.configuration import Configuration, Layer, parse_layer
-from teleop_core.session.graph import Graph
-from teleop_core.signals import STATE_FIELDS, TICK_NS
+from teleop_core.session.graph import STAGES, Graph
+from teleop_core.signals import STATE_FIELDS, TICK_NS, make_signals
 
 BLOCK = 1000
 """Ticks per block: one second, one chunk of the recording."""
@@ -72,21 +73,30 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
         RecordingError: The bag lacks a topic, or the directory is as in :func:`simulate`.
     """
     bag.require((topics.MASTER_MEASURED_CP, topics.MASTER_BUTTONS))
-    read = bag.read_many((topics.MASTER_MEASURED_CP, topics.MASTER_BUTTONS))
-    poses, buttons = (read[t.name] for t in (topics.MASTER_MEASURED_CP, topics.MASTER_BUTTONS))
-    first, last = int(poses.stamp_ns[0]), int(poses.stamp_ns[-1])
-    stamps = np.arange(first, last + 1, TICK_NS)
-    at = np.searchsorted(poses.stamp_ns, stamps, side="right") - 1
-    pressed_at = np.searchsorted(buttons.stamp_ns, stamps, side="right") - 1
-    pressed = np.where(pressed_at[:, None] >= 0, buttons.values[pressed_at], 0.0)
+    recorded = [topic for topic in MASTER_TOPICS if topic.name in bag.topics]
+    series = bag.read_many(recorded)
+    poses = series[topics.MASTER_MEASURED_CP.name]
+    stamps = np.arange(poses.stamp_ns[0], poses.stamp_ns[-1] + 1, TICK_NS)
     graph = Graph(configuration.groups)
 
     def blocks() -> Iterator[Any]:
         for done in range(0, len(stamps), BLOCK):
-            part = slice(done, done + BLOCK)
-            yield graph.replay(stamps[part], poses.values[at[part]], pressed[part])
+            samples = make_signals(graph.robot.n, len(stamps[done : done + BLOCK]))
+            samples["stamp_ns"] = stamps[done : done + BLOCK]
+            for topic in recorded:
+                _hold(series[topic.name], samples["stamp_ns"], samples[topic.field])
+            yield graph.replay(samples)
 
     return _record(graph, configuration, out, blocks(), len(stamps), progress)
+
+
+MASTER_TOPICS = STAGES[0].writes
+
+
+def _hold(series: Series, stamps_ns: NDArray[np.int64], values: Array) -> None:
+    """Write into ``values`` (N, width) the newest sample at each stamp; before the first: as is."""
+    at = np.searchsorted(series.stamp_ns, stamps_ns, side="right") - 1
+    values[at >= 0] = series.values[at[at >= 0]]
 
 
 def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
