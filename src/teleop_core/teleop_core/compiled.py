@@ -20,6 +20,11 @@ from numba.core.sigutils import normalize_signature
 # Function pointers as arguments are what lets one compiled graph run any robot.
 warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatureWarning)
 
+# Division by zero gives infinity or NaN as in NumPy, not an exception in the middle of a loop;
+# pointers (below) make their own C wrapper, so kernels compile faster without one.
+_ERRORS: dict[str, Any] = {"error_model": "numpy"}
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "no_cfunc_wrapper": True, **_ERRORS}
+
 _sources: dict[Any, frozenset[str]] = {}
 
 
@@ -28,7 +33,7 @@ def _stamped(compiled: Any, function: Callable[..., Any]) -> Any:
     code, names = function.__code__, function.__globals__
     called: list[Any] = [names.get(name) for name in code.co_names]
     inner = [_sources[value.py_func] for value in called if _is_kernel(value)]
-    files = frozenset([code.co_filename]).union(*inner)
+    files = frozenset([code.co_filename, __file__]).union(*inner)
     _sources[function] = files
     _stamp(compiled, files)
     return compiled
@@ -52,7 +57,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     releases the interpreter lock, so that other threads run beside it. Arrays must be writable:
     numba compiles a second time for read-only ones.
     """
-    return _stamped(numba.njit(cache=True, nogil=True)(function), function)
+    return _stamped(numba.njit(**_OPTIONS)(function), function)
 
 
 def pointer(compiled: Any, signature: Any) -> Any:
@@ -68,7 +73,7 @@ def pointer(compiled: Any, signature: Any) -> Any:
     # What numba.cfunc does, but with our stamp: both live in one cache file, and with different
     # stamps each would throw the other away.
     function = compiled.py_func
-    callback = CFunc(function, normalize_signature(signature), locals={}, options={})
+    callback = CFunc(function, normalize_signature(signature), locals={}, options=_ERRORS)
     callback.enable_caching()
     _stamp(callback, _sources[function])
     callback.compile()
