@@ -14,6 +14,7 @@ from teleop_core.bags.source import McapSource, Records
 
 class _Message(NamedTuple):
     log_ns: int
+    place: int  # offset in the file of what holds it
     channel: int
     begin: int
     end: int
@@ -21,6 +22,7 @@ class _Message(NamedTuple):
 
 
 _log_time = itemgetter(0)
+_order = itemgetter(0, 1)
 
 
 def in_order(source: McapSource, channels: frozenset[int]) -> Iterator[tuple[int, int, bytes]]:
@@ -34,11 +36,10 @@ def in_order(source: McapSource, channels: frozenset[int]) -> Iterator[tuple[int
     )
     starts = chain((place.start_ns for place in places[1:]), [sys.maxsize])
     waiting: list[_Message] = []
-    for records, next_start in zip(
-        source.records(places, window=sys.maxsize), starts, strict=False
-    ):
-        waiting += _messages(records, channels)
-        waiting.sort(key=_log_time)
+    tables = source.records(places, window=sys.maxsize)
+    for place, records, next_start in zip(places, tables, starts, strict=False):
+        waiting += _messages(place.offset, records, channels)
+        waiting.sort(key=_order)
         ready = bisect_left(waiting, next_start, key=_log_time)
         for message in waiting[:ready]:
             data = message.records.data[message.begin : message.end].tobytes()
@@ -46,9 +47,9 @@ def in_order(source: McapSource, channels: frozenset[int]) -> Iterator[tuple[int
         del waiting[:ready]
 
 
-def _messages(records: Records, channels: frozenset[int]) -> Iterator[_Message]:
+def _messages(place: int, records: Records, channels: frozenset[int]) -> Iterator[_Message]:
     own = np.flatnonzero(np.isin(records.channel, list(channels)))
     ends = (records.begin + records.size)[own]
     columns = (records.log_ns[own], records.channel[own], records.begin[own], ends)
     for log_ns, channel, begin, end in zip(*(c.tolist() for c in columns), strict=True):
-        yield _Message(log_ns, channel, begin, end, records)
+        yield _Message(log_ns, place, channel, begin, end, records)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teleop_core.bags import compression, rosbag2
 from teleop_core.bags.chunks import HEADER, Chunk
@@ -58,7 +59,9 @@ def _copy(source: McapSource, target: Path) -> int:
     )  # fmt: skip
     try:
         for records in source.records(found.places):
-            file.append(_chunk(records))
+            is_sound = np.isin(records.channel, list(found.channels)) & (records.log_ns >= 0)
+            if is_sound.any():
+                file.append(_chunk(records, is_sound))
         file.finish()
         statistics = file.statistics()
         text = rosbag2.metadata_text(file.path, schemas, channels, statistics, 0)
@@ -68,13 +71,11 @@ def _copy(source: McapSource, target: Path) -> int:
     return int(statistics.message_count)
 
 
-def _chunk(records: Records) -> Chunk:
-    """The same messages in the same order, with an index."""
-    begins, sizes = records.begin - HEADER.size, records.size + HEADER.size
+def _chunk(records: Records, chosen: NDArray[np.bool_]) -> Chunk:
+    """The chosen messages in the same order, with an index."""
+    channels, log_ns = records.channel[chosen], records.log_ns[chosen]
+    begins, sizes = records.begin[chosen] - HEADER.size, records.size[chosen] + HEADER.size
     pieces = [records.data[b : b + n] for b, n in zip(begins.tolist(), sizes.tolist(), strict=True)]
-    entries = np.column_stack((records.log_ns, np.cumsum(sizes) - sizes)).astype("<u8")
-    index = {
-        number: entries[records.channel == number] for number in np.unique(records.channel).tolist()
-    }
-    start_ns, end_ns = int(records.log_ns.min()), int(records.log_ns.max())
-    return Chunk(np.concatenate(pieces), start_ns, end_ns, index)
+    entries = np.column_stack((log_ns, np.cumsum(sizes) - sizes)).astype("<u8")
+    index = {number: entries[channels == number] for number in np.unique(channels).tolist()}
+    return Chunk(np.concatenate(pieces), int(log_ns.min()), int(log_ns.max()), index)

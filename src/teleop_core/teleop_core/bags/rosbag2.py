@@ -63,15 +63,21 @@ def _text(value: Any) -> str:
     return yaml.dump(value, Dumper=_Plain, sort_keys=False, allow_unicode=True)
 
 
+def _parsed(qos: str) -> Any:
+    """Quality of service from a channel; none if it is not readable."""
+    try:
+        return yaml.safe_load(qos) or []
+    except yaml.YAMLError:
+        return []
+
+
 def _topic_entry(channel: Channel, type_name: str, count: int) -> dict[str, Any]:
     return {
         "topic_metadata": {
             "name": channel.topic,
             "type": type_name,
             "serialization_format": channel.message_encoding,
-            "offered_qos_profiles": yaml.safe_load(
-                channel.metadata.get("offered_qos_profiles") or "[]"
-            ),
+            "offered_qos_profiles": _parsed(channel.metadata.get("offered_qos_profiles", "")),
             "type_description_hash": channel.metadata.get("topic_type_hash", ""),
         },
         "message_count": count,

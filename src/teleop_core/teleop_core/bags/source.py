@@ -28,7 +28,16 @@ CUT_OFF = "was cut off while being recorded; `teleop recover {path}` saves what 
 _FOOTER_SIZE = 9 + 20
 _WINDOW = 4 << 20
 _LOOK_AHEAD = 3
-_Damage = (McapError, EndOfFile, struct.error, UnicodeDecodeError, KeyError, *DamagedError)
+_Damage = (
+    McapError,
+    EndOfFile,
+    struct.error,
+    UnicodeDecodeError,
+    KeyError,
+    *DamagedError,
+    OverflowError,
+    MemoryError,
+)
 
 
 class Records(NamedTuple):
@@ -179,8 +188,19 @@ class McapSource:
         if place.end:
             return self.mapped()
         with damage_told(self.path, f"the chunk at byte {place.offset}"):
-            file.seek(place.offset + 9)
-            return _uncompressed(Chunk.read(ReadDataStream(file)))
+            return _uncompressed(_chunk_at(file, place.offset))
+
+
+def _chunk_at(file: BinaryIO, offset: int) -> Chunk:
+    """Chunk record; lengths in it cannot lead beyond its end."""
+    size = file.seek(0, 2)
+    if offset > size:
+        raise ValueError(f"the file has {size} bytes")
+    file.seek(offset)
+    opcode, length = struct.unpack("<BQ", file.read(9))
+    if opcode != Opcode.CHUNK or length > size - offset - 9:
+        raise ValueError("no chunk is there")
+    return Chunk.read(ReadDataStream(BytesIO(file.read(length))))
 
 
 def _uncompressed(chunk: Chunk) -> Bytes:
