@@ -3,25 +3,50 @@ VENV := .venv
 BIN := $(VENV)/bin
 PYTHON ?= python3
 OUT ?= out
+SECONDS_LIVE ?= 20
 # Keep DDS traffic on this machine; export another value to talk to other hosts.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup demo test lint bench clean
+.PHONY: setup demo test lint format bench bench-setup clean
+
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: constraints.txt src/teleop_core/setup.py
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e 'src/teleop_core[ros,test]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	    -c constraints.txt -e 'src/teleop_core[ros,test]'
 	touch $@
+
+demo: setup
+	rm -rf $(OUT)/demo
+	$(BIN)/teleop sim --scenario coarse_box --out $(OUT)/demo/coarse_box
+	$(BIN)/teleop sim --scenario fine_box --out $(OUT)/demo/fine_box
+	$(BIN)/teleop live --scenario coarse_box --duration 10 --out $(OUT)/demo/live
+	$(BIN)/teleop evaluate $(OUT)/demo/coarse_box $(OUT)/demo/fine_box $(OUT)/demo/live \
+	    --json $(OUT)/demo/scores.json --html $(OUT)/demo/report.html
+	@echo "$(CURDIR)/$(OUT)/demo/report.html"
 
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+format: setup
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
 test: lint
 	$(BIN)/pytest
+
+bench-setup: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	    -c constraints.txt -e 'src/teleop_core[bench]'
+
+bench: bench-setup
+	$(BIN)/python benchmarks/session.py
+	$(BIN)/python benchmarks/kinematics.py
+	$(BIN)/python benchmarks/live.py --seconds $(SECONDS_LIVE)
 
 clean:
 	rm -rf $(OUT) ros_ws/build ros_ws/install ros_ws/log
