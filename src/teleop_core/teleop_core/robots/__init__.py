@@ -14,6 +14,7 @@ _MODULES = {
     "four_bar": "four_bar",
     "parallelogram": "parallelogram",
     "stewart": "stewart",
+    "rps3": "rps3",
     "puma560": "puma560",
 }
 

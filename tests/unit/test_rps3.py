@@ -1,0 +1,220 @@
+"""3-RPS: leg chains, inverse, and direct kinematics with all assembly modes."""
+
+import math
+
+import numpy as np
+import pytest
+import roboticstoolbox as rtb
+
+from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.geometry import rotation, transform
+from teleop_core.robots import IkStatus, list_robots, load_robot
+from teleop_core.robots.rps3 import Assembly, assembly_modes, joint_points, leg_coordinates
+from teleop_core.robots.rps3_loop import constraints
+
+B, A = 1.0, 0.5
+# Six printed decimals.
+PRINTED = 6e-7
+# Loop equations are solved to rounding; poses lose the condition of the assembly.
+SOLVED = 1e-9
+
+
+def tilted(rng, most=0.6):
+    """Height and tilt without torsion: what the robot controls."""
+    angle, heading = rng.uniform(0.0, most), rng.uniform(-math.pi, math.pi)
+    R = rotation("z", heading) @ rotation("y", angle) @ rotation("z", -heading)
+    return transform(R, np.array([0.0, 0.0, rng.uniform(0.9, 1.3)]))
+
+
+def test_mobility_and_passive_joints_of_the_lecture():
+    freedom = 6 * (8 - 9 - 1) + 6 * 1 + 3 * 3
+    assert freedom == 3
+    assert 9 - freedom == 6
+
+
+def test_loop_equations_have_rank_three_over_angles_and_lengths():
+    gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    constraints(np.array([1.2, 1.0, 0.9]), np.radians([60.0, 70.0, 80.0]), B, A, gap, G, H)
+    assert np.linalg.matrix_rank(np.hstack((G, H))) == 3
+
+
+def test_loop_equations_are_the_distances_of_the_ball_joints_with_their_slopes():
+    rng, step = np.random.default_rng(1), 1e-6
+    gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    ahead, behind, unused = np.empty(3), np.empty(3), np.empty((3, 3))
+    for _ in range(20):
+        lengths, theta = rng.uniform(0.5, 1.5, 3), rng.uniform(-3.0, 3.0, 3)
+        constraints(lengths, theta, B, A, gap, G, H)
+        S = joint_points(lengths, theta, b=B)
+        sides = [np.sum((S[i] - S[(i + 1) % 3]) ** 2) for i in range(3)]
+        assert np.allclose(gap, np.array(sides) - 3.0 * A**2, atol=1e-13)
+        for i in range(3):
+            change = step * np.eye(3)[i]
+            constraints(lengths, theta + change, B, A, ahead, unused, unused.copy())
+            constraints(lengths, theta - change, B, A, behind, unused, unused.copy())
+            assert np.allclose(G[:, i], (ahead - behind) / (2.0 * step), atol=1e-8)
+            constraints(lengths + change, theta, B, A, ahead, unused, unused.copy())
+            constraints(lengths - change, theta, B, A, behind, unused, unused.copy())
+            assert np.allclose(H[:, i], (ahead - behind) / (2.0 * step), atol=1e-8)
+
+
+def test_ball_joints_are_those_of_the_specification_and_give_the_legs_back():
+    lengths, angles = [1.2, 1.0, 0.9], np.radians([60.0, 70.0, 80.0])
+    S = joint_points(lengths, angles, b=B)
+    printed = [
+        [0.4, 0.0, 1.039230],
+        [-0.328990, 0.569827, 0.939693],
+        [-0.421858, -0.730680, 0.886327],
+    ]
+    assert np.allclose(S, printed, atol=PRINTED)
+    back = leg_coordinates(S, b=B)
+    assert np.allclose(back[0], lengths, atol=1e-14)
+    assert np.allclose(back[1], angles, atol=1e-14)
+
+
+def test_leg_chain_of_the_denavit_hartenberg_table_ends_at_the_ball_joint():
+    chain = rtb.DHRobot([rtb.RevoluteMDH(), rtb.PrismaticMDH(alpha=-math.pi / 2)])
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        lengths, angles = rng.uniform(0.5, 1.5, 3), rng.uniform(0.2, 2.9, 3)
+        S = joint_points(lengths, angles, b=B)
+        for i in range(3):
+            hinge = transform(rotation("z", 2.0 * math.pi * i / 3.0), np.zeros(3))
+            hinge = hinge @ transform(rotation("x", math.pi / 2), np.array([B, 0.0, 0.0]))
+            tip = hinge @ chain.fkine([math.pi / 2 - angles[i], lengths[i]]).A
+            assert np.allclose(tip[:3, 3], S[i], atol=1e-14)
+            spoken = hinge @ chain.fkine([math.pi - angles[i], lengths[i]]).A
+            assert not np.allclose(spoken[:3, 3], S[i], atol=1e-3)
+
+
+def test_equal_legs_lift_the_platform_level_as_the_specification_says():
+    modes = assembly_modes([1.2, 1.2, 1.2], b=B, a=A)
+    level = np.abs(np.degrees(modes.angles) - 65.375682).max(axis=1)
+    k = int(level.argmin())
+    assert level[k] < PRINTED
+    assert np.allclose(modes.transforms[k][:3, 3], [0.0, 0.0, 1.090871], atol=PRINTED)
+    assert np.allclose(modes.transforms[k][:3, :3], np.eye(3), atol=SOLVED)
+    assert np.allclose(load_robot("rps3").fk([1.2] * 3), modes.transforms[k], atol=SOLVED)
+
+
+def test_assembly_modes_close_the_loop_come_in_mirrored_pairs_and_are_at_most_sixteen():
+    rng, counts = np.random.default_rng(3), set()
+    for _ in range(60):
+        lengths = rng.uniform(0.5, 1.8, 3)
+        modes = assembly_modes(lengths, b=B, a=A)
+        counts.add(len(modes.angles))
+        for theta, T in zip(modes.angles, modes.transforms, strict=True):
+            S = joint_points(lengths, theta, b=B)
+            platform = A * np.array([[1, 0, 0], [-0.5, 0.75**0.5, 0], [-0.5, -(0.75**0.5), 0]])
+            assert np.allclose(platform @ T[:3, :3].T + T[:3, 3], S, atol=1e-8)
+            mirrored = np.abs(np.exp(1j * modes.angles) - np.exp(-1j * theta)).max(axis=1)
+            assert mirrored.min() < 1e-6
+    assert max(counts) <= 16
+    assert len(counts) > 2
+
+
+@pytest.mark.parametrize("lengths", [(1.2, 1.2, 1.2), (1.2, 1.0, 0.9), (0.7, 0.9, 1.5)])
+def test_no_assembly_mode_is_missed(lengths):
+    # Independent search: Newton steps of plain NumPy from many random leg angles.
+    rng = np.random.default_rng(4)
+    legs = np.array(lengths)
+    modes = np.exp(1j * assembly_modes(legs, b=B, a=A).angles)
+    gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    reached = 0
+    for start in rng.uniform(-math.pi, math.pi, (400, 3)):
+        theta = start.copy()
+        for _ in range(40):
+            constraints(legs, theta, B, A, gap, G, H)
+            theta -= np.clip(np.linalg.lstsq(G, gap, rcond=1e-12)[0], -0.5, 0.5)
+        if np.abs(gap).max() < 1e-13:
+            assert np.abs(modes - np.exp(1j * theta)).max(axis=1).min() < 1e-5
+            reached += 1
+    assert reached > 100
+
+
+def test_legs_that_cannot_meet_are_a_status_with_a_finite_pose():
+    modes = assembly_modes([0.1, 0.1, 5.0], b=B, a=A)
+    assert modes.status == Assembly.CANNOT_ASSEMBLE
+    assert modes.angles.shape == (0, 3)
+    assert np.isfinite(load_robot("rps3").fk([0.1, 0.1, 5.0])).all()
+
+
+def test_the_robot_reaches_height_and_tilt_and_leaves_the_rest_as_residual():
+    robot, rng = load_robot("rps3"), np.random.default_rng(5)
+    assert robot.task_mask == (False, False, True, True, True, False)
+    for _ in range(200):
+        T = tilted(rng)
+        wanted = T @ transform(rotation("z", rng.uniform(-1.0, 1.0)), np.zeros(3))
+        wanted[:2, 3] = rng.uniform(-0.1, 0.1, 2)
+        result = robot.ik(wanted)
+        reached = robot.fk(result.q)
+        assert result.status == IkStatus.FOLLOWED
+        assert np.allclose(reached[2, [2, 3]], wanted[2, [2, 3]], atol=SOLVED)
+        assert np.allclose(reached[:3, :3], T[:3, :3], atol=1e-8)
+        # The parasitic shift of the centre, from the zero-torsion rotation.
+        shift = 0.5 * A * (T[0, 0] - T[1, 1]), -A * T[1, 0]
+        assert np.allclose(reached[:2, 3], shift, atol=SOLVED)
+        gap = np.linalg.norm(reached[:3, 3] - wanted[:3, 3])
+        assert math.isclose(result.residual[0], gap, abs_tol=1e-12)
+
+
+def test_poses_and_legs_are_inverse_to_each_other_and_found_among_the_modes():
+    robot, rng = load_robot("rps3"), np.random.default_rng(6)
+    q = rng.uniform(1.05, 1.35, (100, 3))
+    poses = robot.fk(q)
+    result = robot.ik(poses)
+    assert np.allclose(result.q, q, atol=SOLVED)
+    assert result.residual.max() < SOLVED
+    for legs, T in zip(q[:20], poses, strict=False):
+        modes = assembly_modes(legs, b=B, a=A)
+        assert np.abs(modes.transforms - T).max(axis=(1, 2)).min() < 1e-8
+        assert np.allclose(robot.ik_all(T), [legs], atol=SOLVED)
+
+
+def test_jacobian_is_the_finite_difference():
+    robot, rng, step = load_robot("rps3"), np.random.default_rng(7), 1e-6
+    for q in rng.uniform(1.0, 1.4, (10, 3)):
+        J, T = robot.jacobian(q), robot.fk(q)
+        for leg in range(3):
+            change = step * np.eye(3)[leg]
+            slope = (robot.fk(q + change) - robot.fk(q - change)) / (2.0 * step)
+            spin = slope[:3, :3] @ T[:3, :3].T
+            assert np.allclose(J[:3, leg], slope[:3, 3], atol=1e-7)
+            assert np.allclose(J[3:, leg], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-7)
+
+
+def test_strokes_stop_the_legs():
+    robot = load_robot("rps3")
+    result = robot.ik(transform(np.eye(3), np.array([0.0, 0.0, 3.0])))
+    assert result.status == IkStatus.LIMITED
+    assert np.allclose(result.q, robot.upper)
+
+
+def test_along_a_path_that_tilts_over_and_back_the_legs_keep_their_step():
+    robot, step = load_robot("rps3"), 0.01
+    limits = robot.limits()
+    limits[2] = step
+    q, worst = robot.home.copy(), 0.0
+    for angle in 1.9 * np.sin(np.linspace(0.0, 2.0 * math.pi, 1000)):
+        T = transform(rotation("x", angle), np.array([0.0, 0.0, 1.09]))
+        found, residual = np.empty(3), np.empty(2)
+        status = robot.kernels.ik(T, q, limits, robot.geometry_row, found, residual)
+        assert np.isfinite(residual).all()
+        worst, q = max(worst, np.abs(found - q).max()), found
+    assert worst <= step + 1e-15
+    assert status == IkStatus.FOLLOWED
+    assert np.allclose(q, np.hypot(1.09, B - A), atol=1e-9)
+
+
+def test_bad_questions_are_refused():
+    assert "rps3" in list_robots()
+    with pytest.raises(ParameterError):
+        assembly_modes([1.0, 1.0, 0.0], b=B, a=A)
+    with pytest.raises(ShapeError):
+        joint_points([1.0, 1.0], [0.0, 0.0, 0.0], b=B)
+    with pytest.raises(ParameterError):
+        load_robot("rps3", l_home=0.4)
+    with pytest.raises(ParameterError):
+        load_robot("rps3", a=-1.0)
+    with pytest.raises(UnknownNameError):
+        load_robot("rps3", c=1.0)
