@@ -16,7 +16,7 @@ import numpy as np
 from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.branches import bounded, is_allowed, move_cost, turned, wrapped
+from teleop_core.robots.branches import bounded, cheapest, is_allowed, move_cost, turned, wrapped
 from teleop_core.robots.robot import (
     Drives,
     IkStatus,
@@ -142,7 +142,7 @@ def _upper_arm(u: float, z: float, q3: float, geometry: Array, seed: float) -> f
 
 @kernel
 def _arms(T: Array, geometry: Array, seed: Array, arms: Array) -> bool:
-    """Write joints 1 to 3 of the branches (4, 3): front up, front down, back up, back down.
+    """Write joints 1 to 3 of the branches into four rows: front up, front down, back up, back down.
 
     With the wrist on an axis the joint of that axis keeps the seed's value.
 
@@ -167,7 +167,7 @@ def _arms(T: Array, geometry: Array, seed: Array, arms: Array) -> bool:
 
 @kernel
 def _wrist_rotation(T: Array, q1: float, q23: float, M: Array) -> None:
-    """Write M (3, 3) = R03ᵀ R, the rotation that is left to the wrist."""
+    """Write R03ᵀ R, the rotation that is left to the wrist, into the 3x3 corner of M."""
     c1, s1, c23, s23 = math.cos(q1), math.sin(q1), math.cos(q23), math.sin(q23)
     for j in range(3):
         h = c1 * T[0, j] + s1 * T[1, j]
@@ -215,26 +215,29 @@ def _turn(q: Array, seed: Array, limits: Array, first: int, last: int) -> None:
 def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
     """Write the best of the eight branches; whether the wrist centre can be reached at all.
 
-    The wrist of an arm branch is solved only if the arm alone is not already too far away.
+    The arm with the smallest move comes first, and no wrist is solved for one that cannot win.
     """
-    arms, trial, best = np.empty((4, 3)), np.empty(6), math.inf
-    is_reachable = _arms(T, geometry, seed, arms)
+    arms, costs = np.empty((4, 6)), np.empty(4)
+    is_reachable, best = _arms(T, geometry, seed, arms), math.inf
     for branch in range(4):
-        trial[0], trial[1], trial[2] = arms[branch, 0], arms[branch, 1], arms[branch, 2]
-        _turn(trial, seed, limits, 0, 3)
-        arm = move_cost(trial, seed, limits, 0, 3)
-        if arm >= best:
-            continue
+        _turn(arms[branch], seed, limits, 0, 3)
+        costs[branch] = move_cost(arms[branch], seed, limits, 0, 3)
+    for _ in range(4):
+        arm = cheapest(costs)
+        if costs[arm] >= best:
+            break
+        trial = arms[arm]
         _wrist_rotation(T, trial[0], trial[1] + trial[2], M)
         _wrist(M, seed[3], trial)
         for _ in range(2):
             _turn(trial, seed, limits, 3, 6)
-            cost = max(arm, move_cost(trial, seed, limits, 3, 6))
+            cost = max(costs[arm], move_cost(trial, seed, limits, 3, 6))
             if cost < best:
                 best = cost
                 for i in range(6):
                     q[i] = trial[i]
             trial[3], trial[4], trial[5] = trial[3] + math.pi, -trial[4], trial[5] + math.pi
+        costs[arm] = math.inf
     return is_reachable
 
 
@@ -286,10 +289,10 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """
     if not is_askable(T, seed):
         return -1
-    M, reached = np.empty((3, 3)), np.empty((4, 4))
-    is_reachable = _choose(T, seed, limits, geometry, M, q)
+    reached = np.empty((4, 4))  # until the end its corner holds the rotation left to the wrist
+    is_reachable = _choose(T, seed, limits, geometry, reached, q)
     if not is_allowed(q, seed, limits):
-        _settle(T, seed, limits, geometry, M, q)
+        _settle(T, seed, limits, geometry, reached, q)
     fk(q, geometry, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if is_reachable else _UNREACHABLE
@@ -302,7 +305,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
 
     On a singularity, where a joint is free, it is zero and branches may coincide.
     """
-    M, arms = np.empty((3, 3)), np.empty((4, 3))
+    M, arms = np.empty((3, 3)), np.empty((4, 6))
     if not _arms(T, geometry, np.zeros(6), arms):
         return 0
     for branch in range(8):
