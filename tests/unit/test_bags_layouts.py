@@ -115,6 +115,21 @@ def padding_of(form: Layout) -> list[int]:
     return np.flatnonzero(~used).tolist()
 
 
+def test_messages_serialised_by_rclpy_are_understood():
+    # JointState(name=[a, bb], position=[1, 2]) in slave_base at 1 s 2 ns, from rclpy 7.1.6: it ends
+    # with eight bytes that belong to no field.
+    positions = bytes.fromhex(
+        "0001000001000000020000000b000000736c6176655f62617365000002000000020000006100000003000000"
+        "6262000002000000000000000000f03f00000000000000400000000000000000000000007d127402"
+    )
+    found = discover(Kind.JOINTS, positions)
+    assert found is not None
+    assert (found.joint_names, found.frame_id) == (("a", "bb"), "slave_base")
+    stamp_ns, values = found.decode_one(positions)
+    assert stamp_ns == 1_000_000_002
+    assert values.tolist() == [1.0, 2.0]
+
+
 @pytest.mark.parametrize("kind", FIXED)
 def test_padding_may_hold_anything_since_rclpy_does_not_clear_it(kind):
     form = layout_of(kind, JOINTS, "slave_base")

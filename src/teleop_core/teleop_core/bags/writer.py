@@ -23,6 +23,7 @@ from teleop_core.bags.topics import Kind, Topic
 from teleop_core.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 
 CHUNK_BYTES = 1 << 20
+QUEUE_LENGTH = 8  # blocks, or seconds of live messages, that wait for a slow disk
 METADATA_NAME = "teleop_core"
 Block = Mapping[Topic, tuple[Stamps, Values, Stamps]]
 
@@ -89,7 +90,7 @@ class BagWriter:
         self._failure: BaseException | None = None
         self._is_open = True
         self._mcap = self._create({METADATA_NAME: dict(metadata or {})})
-        self._jobs: queue.Queue[Messages | None] = queue.Queue(maxsize=4)
+        self._jobs: queue.Queue[Messages | None] = queue.Queue(maxsize=QUEUE_LENGTH)
         self._worker = threading.Thread(target=self._work, name="bag writer", daemon=True)
         self._worker.start()
 

@@ -1,0 +1,127 @@
+"""Recordings when the disk is full or the process is killed, and how much memory they take."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+
+from teleop_core.bags import topics
+from teleop_core.bags.reader import Bag, recover
+from teleop_core.errors import RecordingError
+
+LIMIT = 3_000_000  # bytes that a file may have, or a disk holds
+
+RECORDER = """
+import json, os, resource, signal, sys
+import numpy as np
+from teleop_core.bags import topics
+from teleop_core.bags.messages import report
+from teleop_core.bags.writer import BagWriter
+from teleop_core.errors import RecordingError
+
+path, compression, seconds, ending = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4]
+if ending.startswith("limit"):
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    limit = int(ending.removeprefix("limit"))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+rng = np.random.default_rng(1)
+names = tuple("abcdef")
+values = {t: rng.normal(size=(1000, t.kind.width(6))) for t in topics.STREAMS}
+told = ""
+try:
+    with BagWriter(path, topics.ALL, names, compression=compression) as writer:
+        for second in range(seconds):
+            times = np.arange(second * 1000, (second + 1) * 1000) * 1_000_000
+            writer.write_block({t: (times, v, times) for t, v in values.items()})
+            now = int(times[-1])
+            writer.write(topics.TELEOP_STATE, now, report(now, "a", 0, "b", {"c": "d"}))
+        if ending == "kill":
+            while writer._jobs.qsize():
+                pass
+            os.kill(os.getpid(), signal.SIGKILL)
+except RecordingError as error:
+    told = str(error)
+print(json.dumps({"told": told, "kilobytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss}))
+"""
+
+
+def run_recorder(path: Path, compression: str, seconds: int, ending: str) -> tuple[int, dict]:
+    command = [sys.executable, "-c", RECORDER, str(path), compression, str(seconds), ending]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, timeout=120)
+    return done.returncode, json.loads(done.stdout or "{}")
+
+
+@pytest.fixture
+def small_disk(tmp_path) -> Iterator[str | None]:
+    """A disk of a few megabytes where mounting is allowed; else a limit of the file size."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", f"size={LIMIT}", "none", str(disk)]
+    is_mounted = (
+        shutil.which("mount") is not None
+        and subprocess.run(command, stderr=subprocess.DEVNULL, check=False).returncode == 0
+    )
+    yield "disk" if is_mounted else None
+    if is_mounted:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+def assert_safe(path: Path, told: str) -> None:
+    """What the error says is safe is what every reader finds."""
+    bag = Bag(path)
+    series = bag.read(topics.SLAVE_MEASURED_JS)
+    total = sum(info.count for info in bag.topics.values())
+    assert f"the first {bag.end_ns / 1e9:.1f} s ({total} messages) are safe" in told
+    assert str(path) in told
+    np.testing.assert_array_equal(series.stamp_ns, np.arange(len(series)) * 1_000_000)
+    assert len(series) >= 1000
+    with AnyReader([path]) as reader:
+        assert sum(1 for _ in reader.messages()) == total
+    assert sorted(file.name for file in path.iterdir()) == [f"{path.name}_0.mcap", "metadata.yaml"]
+
+
+@pytest.mark.parametrize("compression", ["none", "zstd"])
+def test_a_full_disk_keeps_what_was_recorded_so_far(small_disk, tmp_path, compression):
+    path = tmp_path / "disk" / "bag"
+    code, result = run_recorder(path, compression, 30, small_disk or f"limit{LIMIT}")
+    assert code == 0
+    assert_safe(path, result["told"])
+
+
+def test_a_file_that_may_not_grow_is_finished_within_its_limit(tmp_path):
+    code, result = run_recorder(tmp_path / "bag", "none", 30, f"limit{LIMIT}")
+    assert code == 0
+    assert_safe(tmp_path / "bag", result["told"])
+    assert (tmp_path / "bag" / "bag_0.mcap").stat().st_size <= LIMIT
+
+
+def test_a_disk_without_any_room_leaves_nothing_behind(tmp_path):
+    code, result = run_recorder(tmp_path / "bag", "none", 1, "limit100")
+    assert code == 0
+    assert result["told"].startswith(f"{tmp_path / 'bag'}: cannot be written")
+    assert not (tmp_path / "bag").exists()
+
+
+def test_what_a_killed_process_recorded_is_recovered(tmp_path):
+    code, _ = run_recorder(tmp_path / "bag", "zstd", 5, "kill")
+    assert code == -signal.SIGKILL
+    with pytest.raises(RecordingError, match="teleop recover"):
+        Bag(tmp_path / "bag")
+    out, count = recover(tmp_path / "bag")
+    series = Bag(out).read(topics.SLAVE_MEASURED_CP)
+    assert len(series) >= 3000  # at most the chunk being compressed and its successor are lost
+    with AnyReader([out]) as reader:
+        assert sum(1 for _ in reader.messages()) == count
+
+
+def test_memory_does_not_grow_with_the_length_of_the_recording(tmp_path):
+    _, short = run_recorder(tmp_path / "short", "lz4", 20, "end")
+    _, long = run_recorder(tmp_path / "long", "lz4", 200, "end")
+    assert long["kilobytes"] < 1.1 * short["kilobytes"]
