@@ -1,0 +1,35 @@
+"""Fixtures that several folders of tests share."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture(scope="session")
+def teleop() -> Run:
+    """Run the ``teleop`` command as a user would, in a process of its own."""
+
+    def run(*arguments: object, code: int = 0) -> "subprocess.CompletedProcess[str]":
+        command = [sys.executable, "-m", "teleop_core.cli", *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+        assert done.returncode == code, done.stdout + done.stderr
+        return done
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def recording(teleop: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Twelve seconds of a session with clutch, both modes and the box, made once."""
+    out = tmp_path_factory.mktemp("bags") / "session"
+    settings = ("path.approach_time=1.0", "buttons.clutch=[4.0, 5.0]", "buttons.mode=[6.0, 9.0]",
+                "buttons.fixture=[2.0, 11.0]")  # fmt: skip
+    teleop(
+        "sim", "--scenario", "mode_switching", "--duration", 12, "--out", out, "--set", *settings
+    )
+    return out

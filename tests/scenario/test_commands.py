@@ -1,0 +1,238 @@
+"""Every command that a user types, from end to end, with right and with wrong use."""
+
+import json
+import os
+import pty
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from teleop_core.bags import topics
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.topics import STREAMS
+from teleop_core.bags.writer import BagWriter
+
+
+def one_line(done: subprocess.CompletedProcess[str]) -> str:
+    """The only line on standard error; nothing stands on standard output."""
+    assert done.stdout == ""
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1, done.stderr
+    return lines[0]
+
+
+def test_sim_records_every_stream_at_1_khz(recording):
+    bag = Bag(recording)
+    for topic in STREAMS:
+        assert bag.topics[topic.name].count == 12_000
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(teleop, tmp_path):
+    bytes_of = []
+    for folder, seed in (("a", 3), ("b", 3), ("c", 4)):
+        out = tmp_path / folder / "bag"
+        teleop("sim", "--scenario", "coarse_box", "--duration", 2, "--seed", seed, "--out", out)
+        bytes_of.append((out / "bag_0.mcap").read_bytes())
+    assert bytes_of[0] == bytes_of[1]
+    assert bytes_of[0] != bytes_of[2]
+
+
+def test_replay_with_the_same_configuration_is_bit_identical(teleop, recording, tmp_path):
+    teleop("replay", recording, "--out", tmp_path / "again")
+    first, again = Bag(recording), Bag(tmp_path / "again")
+    for topic in STREAMS:
+        a, b = first.read(topic), again.read(topic)
+        assert np.array_equal(a.values, b.values), topic.name
+        assert np.array_equal(a.stamp_ns, b.stamp_ns), topic.name
+
+
+def test_replay_with_another_configuration_answers_what_if(teleop, recording, tmp_path):
+    teleop("replay", recording, "--out", tmp_path / "what_if", "--set", "fine_gain=0.5")
+    first, other = Bag(recording), Bag(tmp_path / "what_if")
+    assert np.array_equal(
+        first.read(topics.MASTER_MEASURED_CP).values, other.read(topics.MASTER_MEASURED_CP).values
+    )
+    a, b = (bag.read(topics.SLAVE_MEASURED_CP).values for bag in (first, other))
+    before_fine = slice(0, 5900)
+    assert np.array_equal(a[before_fine], b[before_fine])
+    assert np.abs(a - b).max() > 1e-3
+
+
+def test_a_recording_stores_what_repeats_it(recording):
+    metadata = Bag(recording).metadata
+    stored = yaml.safe_load(metadata["configuration"])
+    assert metadata["scenario"] == "mode_switching"
+    assert metadata["robot"] == "rcrt1"
+    assert metadata["seed"] == "1"
+    assert stored["haptic_master"]["ros__parameters"]["buttons.fixture"] == [2.0, 11.0]
+
+
+def test_state_reports_every_change_of_clutch_mode_and_box(recording):
+    reports = Bag(recording).reports(topics.TELEOP_STATE)
+    at = {round(r.stamp_ns * 1e-9, 1): r.message for r in reports}
+    assert "box on" in at[2.0]
+    assert at[4.0].startswith("CLUTCHED")
+    assert at[5.0].startswith("FOLLOWING")
+    assert "fine" in at[6.0]
+    assert "coarse" in at[9.0]
+    assert "box" not in at[11.0]
+
+
+def test_evaluate_prints_a_table_and_writes_json_and_page(teleop, recording, tmp_path):
+    scores, page = tmp_path / "scores.json", tmp_path / "page.html"
+    done = teleop("evaluate", recording, "--json", scores, "--html", page)
+    assert "0.338" in done.stdout  # the published figure beside ours
+    text = scores.read_text()
+    assert "NaN" not in text
+    assert "rms" in text
+    json.loads(text)
+    assert "<html" in page.read_text()[:500].lower()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--scenario", "coarse_bix"], ["coarse_bix", "coarse_box", "fine_box"]),
+        (["--set", "robot=r2d2"], ["r2d2", "rcrt1"]),
+        (["--set", "fine_gian=0.1"], ["fine_gian", "fine_gain"]),
+        (["--set", "fine_gain"], ["fine_gain", "key=value"]),
+        (["--set", "fine_gain=200"], ["fine_gain", "200", "between"]),
+        (["--set", "fine_gain=nan"], ["fine_gain", "nan", "finite"]),
+        (["--set", "fixture.wall=wet"], ["wet", "soft, hard"]),
+        (["--set", "fixture.size=[1, 2]"], ["fixture.size", "3 values"]),
+        (["--set", "pid.kp=[1.0]"], ["pid.kp", "6 values"]),
+        (["--duration", "-1"], ["duration", "-1", "between"]),
+        (["--config", "/nowhere.yaml"], ["/nowhere.yaml", "No such file"]),
+    ],
+)
+def test_sim_refuses_wrong_input_in_one_line(teleop, tmp_path, arguments, words):
+    line = one_line(teleop("sim", *arguments, "--out", tmp_path / "bag", code=2))
+    for word in words:
+        assert word in line
+    assert not (tmp_path / "bag").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("a: [", "not YAML"),
+        ("[]", "stages"),
+        ("nobody: {ros__parameters: {}}", "nobody"),
+        ("slave_sim: 3", "ros__parameters"),
+        ("slave_sim: {ros__parameters: {speed: 1.0}}", "speed"),
+        ("slave_sim: {ros__parameters: {command_timeout: 1}}", "float"),
+    ],
+)
+def test_sim_refuses_wrong_parameter_files_in_one_line(teleop, tmp_path, text, word):
+    file = tmp_path / "wrong.yaml"
+    file.write_text(text)
+    assert word in one_line(teleop("sim", "--config", file, "--out", tmp_path / "bag", code=2))
+
+
+def test_an_existing_output_is_never_overwritten(teleop, recording, tmp_path):
+    for command in (("sim",), ("replay", recording)):
+        line = one_line(teleop(*command, "--out", recording, code=2))
+        assert "exists" in line
+    assert Bag(recording).topics["slave/measured_js"].count == 12_000
+
+
+def make_foreign(path: Path) -> None:
+    with BagWriter(path, [topics.MASTER_BUTTONS], ()) as writer:
+        stamps = np.array([1, 2])
+        writer.write_block({topics.MASTER_BUTTONS: (stamps, np.zeros((2, 3)), stamps)})
+
+
+def test_replay_and_evaluate_name_what_a_bag_lacks(teleop, tmp_path):
+    make_foreign(tmp_path / "foreign")
+    for command in (("replay", "--out", tmp_path / "out"), ("evaluate",)):
+        line = one_line(teleop(command[0], tmp_path / "foreign", *command[1:], code=2))
+        assert "measured_cp" in line
+        assert "master/buttons" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_a_truncated_and_an_empty_bag_are_told_apart(teleop, recording, tmp_path):
+    assert "does not exist" in one_line(teleop("evaluate", tmp_path / "none", code=2))
+    cut = tmp_path / "cut"
+    shutil.copytree(recording, cut)
+    file = next(cut.glob("*.mcap"))
+    os.truncate(file, file.stat().st_size // 2)
+    assert "recover" in one_line(teleop("evaluate", cut, code=2))
+    with BagWriter(tmp_path / "empty", [topics.MASTER_BUTTONS], ()):
+        pass
+    assert "no messages" in one_line(teleop("evaluate", tmp_path / "empty", code=2))
+
+
+def test_recover_saves_what_a_truncated_bag_holds(teleop, recording, tmp_path):
+    cut = tmp_path / "cut"
+    shutil.copytree(recording, cut)
+    file = next(cut.glob("*.mcap"))
+    os.truncate(file, file.stat().st_size // 2)
+    teleop("recover", cut, "--out", tmp_path / "saved")
+    saved, whole = (Bag(p).read(topics.SLAVE_MEASURED_JS) for p in (tmp_path / "saved", recording))
+    assert len(saved) > 4000
+    assert np.array_equal(saved.values, whole.values[: len(saved)])
+
+
+def test_lookups_answer_without_a_session(teleop):
+    assert "coarse_box" in teleop("scenarios").stdout
+    assert "motion_scaling.fine_gain" in teleop("parameters").stdout
+    assert "slave_sim" not in teleop("parameters", "motion_scaling").stdout
+    assert teleop("parameters", "--markdown").stdout.startswith("| parameter")
+    assert "rcrt1" in teleop("robot").stdout
+    assert "theta2" in teleop("robot", "rcrt1").stdout
+    assert "rcrt1" in one_line(teleop("robot", "r2d2", code=2))
+    assert "motion_scaling" in one_line(teleop("parameters", "nobody", code=2))
+
+
+def test_help_answers_without_numpy(teleop):
+    code = "import sys; from teleop_core import cli; cli.main(['--help'])"
+    done = subprocess.run(
+        [sys.executable, "-X", "importtime", "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "COMMAND" in done.stdout
+    assert "numba" not in done.stderr
+
+
+def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop, tmp_path):
+    piped = teleop("sim", "--duration", 1, "--out", tmp_path / "piped")
+    assert piped.stderr == ""
+    reader, terminal = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "teleop_core.cli", "sim", "--duration", "1", "--out",
+         str(tmp_path / "seen")],
+        stderr=terminal, stdout=subprocess.DEVNULL,
+    )  # fmt: skip
+    os.close(terminal)
+    shown = b""
+    try:
+        while part := os.read(reader, 4096):
+            shown += part
+    except OSError:  # the terminal closed with the process
+        pass
+    assert process.wait(timeout=60) == 0
+    assert b"simulating" in shown
+
+
+def test_an_operator_can_follow_a_recording(teleop, recording, tmp_path):
+    out = tmp_path / "followed"
+    settings = ("path.kind=bag", f"path.bag={recording}", "tremor_amplitude=0.0")
+    teleop("sim", "--duration", 3, "--out", out, "--set", *settings)
+    wanted, got = (
+        Bag(p).read(topics.MASTER_MEASURED_CP).values[:3000, :3] for p in (recording, out)
+    )
+    # The hand lags behind by its own dynamics, less than a tenth of a second at 40 mm/s.
+    assert np.linalg.norm(wanted - got, axis=1).max() < 5e-3
+    assert "missing.bag" in one_line(
+        teleop(
+            "sim", "--out", tmp_path / "x", "--set", "path.kind=bag", "path.bag=missing.bag", code=2
+        )
+    )
