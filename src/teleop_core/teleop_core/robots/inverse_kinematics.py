@@ -8,7 +8,7 @@ import numpy as np
 from teleop_core.compiled import bound, kernel
 from teleop_core.geometry import transform_from_pose
 from teleop_core.parameters import parameter
-from teleop_core.robots import load_robot
+from teleop_core.robots import load_robot_set
 from teleop_core.signals import DT, copy, make_signals
 
 
@@ -16,7 +16,10 @@ from teleop_core.signals import DT, copy, make_signals
 class InverseKinematicsParameters:
     """Parameters of :class:`InverseKinematics`."""
 
-    robot: str = parameter("rcrt1", fixed=True, doc="robot, one of `teleop robot --list`")
+    robot: str = parameter("rcrt1", fixed=True, doc="slave robot, one of `teleop robot`")
+    geometry: tuple[str, ...] = parameter(
+        (), fixed=True, doc="symbol=value in place of the robot's lengths and options [m, rad]"
+    )
     speed_share: float = parameter(
         1.0, lower=0.01, upper=1.0, doc="share of the drives' speed limits that references may use"
     )
@@ -60,7 +63,7 @@ class InverseKinematics:
     """
 
     def __init__(self, parameters: InverseKinematicsParameters, signals: Any = None) -> None:
-        self.robot = load_robot(parameters.robot)
+        self.robot = load_robot_set(parameters.robot, parameters.geometry)
         self.signals = make_signals(self.robot.n)[0] if signals is None else signals
         self.work = scratch(self.robot.n)
         self.limits = self.robot.limits(DT)

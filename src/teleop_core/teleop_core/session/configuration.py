@@ -172,10 +172,11 @@ class Configuration:
         groups: dict[str, Any] = {
             name: build(group, merged[name], f"{name}.") for name, group in GROUPS.items()
         }
-        robots = {groups[stage].robot for stage in ("inverse_kinematics", "slave_sim")}
-        if len(robots) > 1:
-            text = " and ".join(sorted(robots))
-            raise ParameterError("robot", text, "the same in inverse_kinematics and slave_sim")
+        stages = ("inverse_kinematics", "slave_sim")
+        for name in ("robot", "geometry"):
+            first, second = (getattr(groups[stage], name) for stage in stages)
+            if first != second:
+                raise ParameterError(name, (first, second), "the same in " + " and ".join(stages))
         return Configuration(groups, scenario)
 
     def text(self) -> str:

@@ -11,7 +11,7 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array, pose_from_transform
 from teleop_core.mapping.filters import lag_step
 from teleop_core.parameters import parameter
-from teleop_core.robots import load_robot
+from teleop_core.robots import load_robot_set
 from teleop_core.robots.robot import ACCELERATION, GRAVITY, Robot
 from teleop_core.signals import copy, make_signals
 from teleop_core.slave.joints import integrate
@@ -52,7 +52,10 @@ class PidParameters:
 class SlaveSimParameters:
     """Parameters of :class:`SlaveSim`."""
 
-    robot: str = parameter("rcrt1", fixed=True, doc="robot, one of `teleop robot --list`")
+    robot: str = parameter("rcrt1", fixed=True, doc="slave robot, one of `teleop robot`")
+    geometry: tuple[str, ...] = parameter(
+        (), fixed=True, doc="symbol=value in place of the robot's lengths and options [m, rad]"
+    )
     command_timeout: float = parameter(
         0.1, unit="s", lower=0.002, upper=5.0,
         doc="the last reference is held when no command came for longer than this",
@@ -193,7 +196,7 @@ class SlaveSim:
     """
 
     def __init__(self, parameters: SlaveSimParameters, signals: Any = None) -> None:
-        self.robot = load_robot(parameters.robot)
+        self.robot = load_robot_set(parameters.robot, parameters.geometry)
         if self.robot.drives is None or self.robot.dynamics is None:
             raise ParameterError("slave_sim.robot", parameters.robot, "a robot with drives")
         self.signals = make_signals(self.robot.n)[0] if signals is None else signals
