@@ -1,0 +1,196 @@
+"""Balance of the MMA's shoulder: the published joint-2 spring, and the load that it leaves.
+
+The design matches only the *difference* of the gravity torque between two poses, 0.16 N·m. The
+spring is slack in the first pose, where gravity asks for 1.03 N·m, and gives 0.18 of 1.19 N·m in
+the worst one: 1.01 N·m stay with the operator. :func:`shoulder_load` states that residual.
+
+Source:
+    Singh 2014, chapter 5, misprints corrected; torques about joint 2, positive downwards.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import Array
+
+STANDARD_GRAVITY = 9.8  # [m/s²], as the source takes it
+# Table 5.1 [kg]; the printed total, 310.36 g, is not the sum of its rows.
+MASSES = {
+    "L2": 0.03773, "L3": 0.02587, "L3a": 0.00746, "L3b": 0.02587, "L4": 0.02557, "L5": 0.01693,
+    "L6": 0.01209, "L7": 0.15259, "packing": 0.00325,
+}  # fmt: skip
+# Horizontal distance of the common mass centre from joint 2 [m]: link 2 at 45° and level.
+ARM_AT_45_DEGREES, ARM_LEVEL = 0.34360, 0.39594
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShoulderSpring:
+    """Compression spring between points at distance ``anchor`` from joint 2 on links 1 and 2."""
+
+    anchor: float = 0.028
+    """[m]"""
+    free_length: float = 0.05173
+    """[m]"""
+    rate: float = 754.57
+    """[N/m], safety factor 1.15 included."""
+
+    def __post_init__(self) -> None:
+        for name in ("anchor", "free_length", "rate"):
+            _positive(name, getattr(self, name))
+
+    def length(self, opening: float | Array) -> Array:
+        """Distance of the anchors [m] when links 1 and 2 enclose ``opening`` [rad]."""
+        return 2.0 * self.anchor * np.sin(0.5 * np.asarray(opening))
+
+    def lever(self, opening: float | Array) -> Array:
+        """Distance of the spring's line from joint 2 [m]."""
+        return self.anchor * np.cos(0.5 * np.asarray(opening))
+
+    def torque(self, opening: float | Array) -> Array:
+        """Torque that lifts link 2 [N·m]; zero when the spring is slack."""
+        deflection = np.maximum(self.free_length - self.length(opening), 0.0)
+        return self.rate * deflection * self.lever(opening)
+
+
+class Coil(NamedTuple):
+    """Dimensions of a helical spring (table 5.2)."""
+
+    turns: int
+    slenderness: float
+    """Free length over mean diameter."""
+    solid_length: float
+    """[m]"""
+    spring_index: float
+    """Mean diameter over wire diameter."""
+    pitch: float
+    """[m]"""
+
+
+class ShoulderLoad(NamedTuple):
+    """Torques about joint 2 [N·m], each of the shape of θ2."""
+
+    gravity: Array
+    spring: Array
+    residual: Array
+    """What gravity asks for and the spring does not give; positive pulls link 2 down."""
+
+
+def gravity_torque(mass: float, arm: float | Array) -> Array:
+    """Torque [N·m] of a mass [kg] at a horizontal distance [m]."""
+    return mass * STANDARD_GRAVITY * np.asarray(arm)
+
+
+def matching_rate(torque_difference: float, deflection: float, lever: float) -> float:
+    """Rate [N/m] of a spring, slack in the first pose, that gives a torque difference [N·m].
+
+    Args:
+        torque_difference: Second less first gravity torque [N·m].
+        deflection: Of the spring in the second pose [m], > 0.
+        lever: Of the spring in the second pose [m], > 0.
+
+    Returns:
+        Rate without safety factor [N/m].
+
+    Raises:
+        ParameterError: A length is not positive.
+
+    Source:
+        Singh 2014, eq. 5.33.
+    """
+    return torque_difference / (_positive("deflection", deflection) * _positive("lever", lever))
+
+
+def coil(
+    *, free_length: float = 0.05173, diameter: float = 0.014, wire: float = 0.0015,
+    rate: float = 754.57, shear_modulus: float = 42.5e9,
+) -> Coil:  # fmt: skip
+    """Helical spring of a given rate.
+
+    The source prints 13 turns and no material; 13 turns need 40.9 to 44.2 GPa (as phosphor bronze
+    has), steel would need 24.
+
+    Args:
+        free_length: [m], > 0.
+        diameter: Mean diameter of the coil [m], > 0.
+        wire: Diameter of the wire [m], > 0.
+        rate: [N/m], > 0.
+        shear_modulus: [Pa], > 0.
+
+    Raises:
+        ParameterError: A value is not positive, or the spring comes out with fewer than two turns.
+
+    Source:
+        Singh 2014, table 5.2: N = G d⁴ / (8 D³ k).
+    """
+    given = {"free_length": free_length, "diameter": diameter, "wire": wire, "rate": rate,
+             "shear_modulus": shear_modulus}  # fmt: skip
+    for name, value in given.items():
+        _positive(name, value)
+    turns = round(shear_modulus * wire**4 / (8.0 * diameter**3 * rate))
+    if turns < 2:
+        raise ParameterError("rate", rate, "small enough for two turns")
+    return Coil(
+        turns, free_length / diameter, turns * wire, diameter / wire, free_length / (turns - 1)
+    )
+
+
+def shoulder_load(theta2: float | Array, spring: ShoulderSpring | None = None) -> ShoulderLoad:
+    """Gravity, spring and what is left at joint 2, for θ2 [rad] (-90° upright, 0 level).
+
+    The source gives the arm of the mass centre in two poses. Between them the links beyond the
+    shoulder keep their attitude, as at home, so the arm is a constant plus a cosine, here drawn
+    through both values. The enclosed angle of links 1 and 2 is 90° - θ2.
+
+    Args:
+        theta2: θ2 [rad], any shape.
+        spring: None for the published one.
+
+    Returns:
+        :class:`ShoulderLoad`.
+    """
+    angle = np.asarray(theta2, dtype=np.float64)
+    swing = (ARM_LEVEL - ARM_AT_45_DEGREES) / (1.0 - math.sqrt(0.5))
+    arm = ARM_LEVEL - swing * (1.0 - np.cos(angle))
+    gravity = gravity_torque(sum(MASSES.values()), arm)
+    lifting = (spring or ShoulderSpring()).torque(0.5 * math.pi - angle)
+    return ShoulderLoad(gravity, lifting, gravity - lifting)
+
+
+def cam_pulley_radius(theta: float | Array, weight_moment: float, rate: float) -> Array:
+    """Radius r(θ) [m] of the cable on a cam that balances one link exactly.
+
+    A spring of ``rate`` [N/m] pulls the cable; ``weight_moment`` is m g l [N·m] and θ [rad] the
+    angle from the upright. r solves k r³ - mgl sin(θ) r' + mgl r cos(θ) = 0.
+
+    Raises:
+        ParameterError: A value is not positive.
+
+    Source:
+        Ulrich and Kumar, in Singh 2014, eqs. 5.1-5.8.
+    """
+    scale = math.sqrt(_positive("weight_moment", weight_moment) / _positive("rate", rate))
+    return scale * np.sin(0.5 * np.asarray(theta))
+
+
+def cam_profile(theta: float | Array, weight_moment: float, rate: float) -> tuple[Array, Array]:
+    """Polar form of the cam: distance [m] of the point that the cable leaves, and its angle [rad].
+
+    Raises:
+        ParameterError: A value is not positive.
+
+    Source:
+        Ulrich and Kumar, in Singh 2014, eqs. 5.9-5.10.
+    """
+    radius = cam_pulley_radius(theta, weight_moment, rate)
+    slope = 0.5 * math.sqrt(weight_moment / rate) * np.cos(0.5 * np.asarray(theta))
+    return np.hypot(radius, slope), np.arctan2(slope, radius)
+
+
+def _positive(name: str, value: float) -> float:
+    if not (math.isfinite(value) and value > 0.0):
+        raise ParameterError(name, value, "finite and > 0")
+    return value
