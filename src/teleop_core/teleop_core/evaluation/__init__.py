@@ -1,1 +1,1 @@
-"""."""
+"""Evaluation: scores of recordings, beside the published figures."""

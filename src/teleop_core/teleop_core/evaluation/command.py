@@ -1,0 +1,74 @@
+"""Command: what ``teleop evaluate`` does."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from teleop_core.bags.reader import Bag
+from teleop_core.errors import EvaluationError
+from teleop_core.evaluation.metrics import Study, study
+from teleop_core.evaluation.score import Score
+from teleop_core.evaluation.table import score_tables
+
+
+def evaluate_bags(
+    paths: Sequence[Path], json_file: Path | None, html_file: Path | None, console: Console
+) -> list[Score]:
+    """Score recordings, show the table, and write JSON and page if wanted.
+
+    Nothing is written unless every recording could be scored. Files that exist are replaced.
+
+    Args:
+        paths: Recordings.
+        json_file: Where the scores go: a list with one entry per recording.
+        html_file: Where the page goes.
+        console: Where the table and the paths of the files are shown.
+
+    Returns:
+        One score per recording.
+
+    Raises:
+        EvaluationError: A recording cannot be scored, or a file not be written.
+        RecordingError: A recording is missing, damaged, or lacks a topic.
+    """
+    for file in (json_file, html_file):
+        if file is not None:
+            _check_place(file)
+    studies = [study(Bag(path)) for path in paths]
+    scores = [found.score for found in studies]
+    for table in score_tables(scores, console.width):
+        console.print(table)
+    if json_file is not None:
+        text = json.dumps([score.to_json() for score in scores], indent=2, allow_nan=False)
+        _write(json_file, text + "\n")
+        console.print(f"scores: {json_file}", markup=False, highlight=False, soft_wrap=True)
+    if html_file is not None:
+        _write(html_file, _page(studies))
+        console.print(f"page: {html_file}", markup=False, highlight=False, soft_wrap=True)
+    return scores
+
+
+def _page(studies: Sequence[Study]) -> str:
+    from teleop_core.evaluation.page import report_page  # carries plotly, which few calls need
+
+    return report_page(studies)
+
+
+def _check_place(file: Path) -> None:
+    if not file.parent.is_dir():
+        raise EvaluationError(f"{file}: the directory {file.parent} does not exist; make it first")
+    if file.is_dir():
+        raise EvaluationError(f"{file}: is a directory, must be a file")
+
+
+def _write(file: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    part = file.with_name(file.name + ".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        part.replace(file)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise EvaluationError(f"{file}: cannot be written: {error.strerror}") from error

@@ -1,0 +1,85 @@
+"""State history: what teleop/state said at any time, as columns."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.topics import TELEOP_STATE
+from teleop_core.errors import EvaluationError
+from teleop_core.evaluation.accumulators import Integers
+from teleop_core.evaluation.pairing import NONE, latest
+from teleop_core.geometry import Array
+from teleop_core.signals import STATE, STATE_FIELDS
+
+_CENTER = slice(STATE["fixture_center_x"], STATE["fixture_center_x"] + 3)
+_SIZE = slice(STATE["fixture_size_x"], STATE["fixture_size_x"] + 3)
+
+
+@dataclass(frozen=True, eq=False)
+class StateHistory:
+    """Changes of the state, in the order of their stamps.
+
+    Attributes:
+        stamp_ns: Time from which a row holds, shape (N,), [ns].
+        rows: Columns as in :data:`~teleop_core.signals.STATE_FIELDS`, shape (N, 11).
+    """
+
+    stamp_ns: Integers
+    rows: Array
+
+    def at(self, stamp_ns: Integers) -> "States":
+        """State in force at each stamp, shape (N,), [ns]; all zero before the first report."""
+        index = latest(stamp_ns, self.stamp_ns)
+        if not len(self.rows):
+            return States(np.zeros((len(stamp_ns), len(STATE_FIELDS))))
+        return States(np.where((index != NONE)[:, None], self.rows[index], 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """State at N times; ``rows`` as in :class:`StateHistory`, shape (N, 11)."""
+
+    rows: Array
+
+    def column(self, name: str) -> Array:
+        """One field, shape (N,)."""
+        return self.rows[:, STATE[name]]
+
+    @property
+    def center(self) -> Array:
+        """Centre of the box in the slave's base, shape (N, 3), [m]."""
+        return self.rows[:, _CENTER]
+
+    @property
+    def size(self) -> Array:
+        """Wall to wall on the slave's x, y, z, shape (N, 3), [m]."""
+        return self.rows[:, _SIZE]
+
+
+def read_history(bag: Bag) -> StateHistory:
+    """State history of a recording; empty if it has no teleop/state.
+
+    Raises:
+        EvaluationError: A report lacks a field, or has one that is no number.
+        RecordingError: The topic carries something else.
+    """
+    info = bag.topics.get(TELEOP_STATE.name)
+    stamps: list[int] = []
+    rows: list[list[float]] = []
+    for report in bag.reports(TELEOP_STATE) if info is not None and info.count else ():
+        stamps.append(report.stamp_ns)
+        rows.append([_number(bag, name, report.values.get(name)) for name in STATE_FIELDS])
+    columns = np.array(rows).reshape(len(rows), len(STATE_FIELDS))
+    order = np.argsort(np.array(stamps, np.int64), kind="stable")
+    return StateHistory(np.array(stamps, np.int64)[order], columns[order])
+
+
+def _number(bag: Bag, name: str, text: str | None) -> float:
+    if text is None:
+        raise EvaluationError(f"{bag.path}: a {TELEOP_STATE.name} report lacks {name}")
+    try:
+        return float(text)
+    except ValueError as error:
+        reason = f"{name} is {text!r}, must be a number"
+        raise EvaluationError(f"{bag.path}: in {TELEOP_STATE.name}, {reason}") from error

@@ -1,0 +1,61 @@
+"""Table: scores on the terminal, side by side and beside the published figures."""
+
+from collections.abc import Sequence
+
+from rich.box import SIMPLE
+from rich.markup import escape
+from rich.table import Table
+
+from teleop_core.evaluation.published import SOURCE, published_for
+from teleop_core.evaluation.score import Score, Session
+from teleop_core.evaluation.summary import MET, NOT_MET, Row, summary
+
+LABEL_WIDTH, COLUMN_WIDTH = 26, 18
+
+
+def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
+    """Tables of as many scores side by side as fit.
+
+    Args:
+        scores: One or more.
+        width: Room on the terminal, in characters.
+    """
+    fitting = max(1, (width - LABEL_WIDTH) // COLUMN_WIDTH)
+    return [score_table(scores[i : i + fitting]) for i in range(0, len(scores), fitting)]
+
+
+def score_table(scores: Sequence[Score]) -> Table:
+    """One column per score; each figure with a tick or a cross, and what was published."""
+    caption = f"{MET} met, {NOT_MET} not met: ≤ published figure ({SOURCE})"
+    table = Table(
+        box=SIMPLE, caption=caption, caption_justify="left", pad_edge=False, padding=(0, 1, 0, 0)
+    )
+    table.add_column("", no_wrap=True)
+    for score in scores:
+        table.add_column(escape(heading(score.session)), justify="left", no_wrap=True)
+    group = ""
+    for rows in zip(*map(summary, scores), strict=True):
+        if rows[0].group != group:
+            group = rows[0].group
+            table.add_section()
+            table.add_row(f"[bold]{group}[/bold]")
+        unit = f" [dim]{rows[0].unit}[/dim]" if rows[0].unit else ""
+        table.add_row(f"  {rows[0].label}{unit}", *map(_cell, rows))
+    return table
+
+
+def heading(session: Session) -> str:
+    """Name of a recording and what it was, in three lines."""
+    gain = "" if session.gain is None else f", gain {session.gain:g}"
+    mode = published_for(session.gain)
+    seed = "" if session.seed is None else f", seed {session.seed}"
+    return "\n".join(
+        (session.title, f"{session.duration_s:.1f} s{gain}", f"{session.robot or 'unknown'}{seed}")
+    ) + (f"\nlike {mode.mode} mode" if mode else "")
+
+
+def _cell(row: Row) -> str:
+    if row.is_met is None:
+        return row.value
+    mark = f"[green]{MET}[/green]" if row.is_met else f"[red]{NOT_MET}[/red]"
+    return f"{row.value:>6}{mark} [dim]≤{row.published}[/dim]"

@@ -1,0 +1,108 @@
+"""Windows: a recording as some seconds of all topics at a time, each with what surrounds it.
+
+Samples of different topics belong together although they stand in different chunks. A window
+holds its own stretch of log time and a second of context on both sides, so that partners are found
+across its ends.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.bags.reader import Bag, Series
+from teleop_core.bags.topics import Topic
+
+CONTEXT_NS = 1_000_000_000
+WINDOW_NS = 4_000_000_000
+_FOREVER = 2**62
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Series of topics around the log times ``after_ns`` < t <= ``until_ns``.
+
+    Attributes:
+        series: Per topic name, in the order of log times; at least the sample before the window
+            is in it, if there is one. Topics without samples are left out.
+    """
+
+    after_ns: int
+    until_ns: int
+    series: dict[str, Series]
+
+    def own(self, topic: Topic) -> slice:
+        """Samples of a topic inside of the window; the rest is context."""
+        series = self.series.get(topic.name)
+        if series is None:
+            return slice(0, 0)
+        first, last = np.searchsorted(series.log_ns, (self.after_ns, self.until_ns), side="right")
+        return slice(int(first), int(last))
+
+
+class DisorderError(Exception):
+    """Samples stand further out of order in the file than the context of a window reaches."""
+
+
+def whole(bag: Bag, topics: Iterable[Topic]) -> Iterator[Window]:
+    """The recording as one window, whatever the order in its file."""
+    yield Window(-_FOREVER, _FOREVER, bag.read_many(topics))
+
+
+def windows(bag: Bag, topics: Iterable[Topic]) -> Iterator[Window]:
+    """Windows of a recording in the order of time; memory does not grow with its length.
+
+    Raises:
+        DisorderError: A sample belongs to a window that was handed out already; :func:`whole`
+            reads such a file.
+    """
+    pending: dict[str, Series] = {}
+    waiting: list[dict[str, Series]] = []
+    after_ns = bag.start_ns - 1
+    newest_ns = after_ns
+    for block in bag.blocks(topics):
+        for series in block.values():
+            if series.log_ns.min() <= after_ns:
+                raise DisorderError
+            newest_ns = max(newest_ns, int(series.log_ns.max()))
+        waiting.append(block)
+        until_ns = newest_ns - CONTEXT_NS
+        if until_ns - after_ns >= WINDOW_NS:
+            pending = _joined(pending, waiting)
+            yield Window(after_ns, until_ns, pending)
+            pending = {name: _since(series, until_ns) for name, series in pending.items()}
+            waiting, after_ns = [], until_ns
+    yield Window(after_ns, _FOREVER, _joined(pending, waiting))
+
+
+def _joined(pending: dict[str, Series], waiting: list[dict[str, Series]]) -> dict[str, Series]:
+    """Everything so far, each topic in the order of its log times."""
+    parts = {name: [series] for name, series in pending.items()}
+    for block in waiting:
+        for name, series in block.items():
+            parts.setdefault(name, []).append(series)
+    return {name: _in_order(stretches) for name, stretches in parts.items()}
+
+
+def _in_order(parts: list[Series]) -> Series:
+    stamps = np.concatenate([part.stamp_ns for part in parts])
+    logs = np.concatenate([part.log_ns for part in parts])
+    values = np.concatenate([part.values for part in parts])
+    if (np.diff(logs) < 0).any():
+        order = np.argsort(logs, kind="stable")
+        stamps, logs, values = stamps[order], logs[order], values[order]
+    return Series(stamps, logs, values, parts[0].names, parts[0].frame_id)
+
+
+def _since(series: Series, until_ns: int) -> Series:
+    """What the next window needs: the context before it, and the last sample at any rate."""
+    logs = series.log_ns
+    first = min(
+        int(np.searchsorted(logs, until_ns - CONTEXT_NS)),
+        max(0, int(np.searchsorted(logs, until_ns, side="right")) - 1),
+    )
+    kept = slice(first, None)
+    return Series(
+        series.stamp_ns[kept].copy(), logs[kept].copy(), series.values[kept].copy(),
+        series.names, series.frame_id,
+    )  # fmt: skip
