@@ -1,0 +1,176 @@
+"""Parameters: types, bounds, tuples, nested groups, relations, and what a refusal says."""
+
+import math
+from dataclasses import dataclass, field
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.parameters import build, parameter, specs, values_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spring:
+    stiffness: float = parameter(300.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring")
+    rest: tuple[float, ...] = parameter((0.0, 0.0), unit="m", lower=-1.0, length=2, doc="place")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arm:
+    name: str = parameter("left", choices=("left", "right"), doc="side")
+    count: int = parameter(3, lower=1, fixed=True, doc="joints")
+    is_on: bool = parameter(False, doc="switch")
+    slow: float = parameter(0.1, upper=1.0, doc="slow gain")
+    fast: float = parameter(0.5, doc="fast gain")
+    tags: tuple[str, ...] = parameter((), choices=("a", "b"), doc="marks")
+    spring: Spring = field(default_factory=Spring)
+
+    def __post_init__(self):
+        if self.slow > self.fast:
+            raise ParameterError("slow", self.slow, f"<= fast {self.fast}")
+
+
+def refusal(values, prefix=""):
+    with pytest.raises(ParameterError) as error:
+        build(Arm, values, prefix)
+    return error.value
+
+
+def test_defaults_stand_where_nothing_is_said():
+    assert build(Arm, {}) == Arm()
+
+
+def test_nested_groups_are_reached_by_dotted_names():
+    arm = build(Arm, {"spring.stiffness": 10.0, "spring.rest": (0.1, 0.2), "count": 4})
+    assert arm == Arm(count=4, spring=Spring(stiffness=10.0, rest=(0.1, 0.2)))
+
+
+def test_declarations_come_in_order_with_dotted_names():
+    names = [spec.name for spec in specs(Arm)]
+    assert names == [
+        "name", "count", "is_on", "slow", "fast", "tags", "spring.stiffness", "spring.rest",
+    ]  # fmt: skip
+
+
+def test_declarations_carry_what_the_table_and_ros_need():
+    declared = {spec.name: spec for spec in specs(Arm)}
+    stiffness, tags = declared["spring.stiffness"], declared["tags"]
+    assert (stiffness.unit, stiffness.default, stiffness.kind) == ("N/m", 300.0, float)
+    assert (tags.kind, tags.element, tags.default) == (tuple, str, ())
+    assert declared["count"].fixed
+    assert not stiffness.fixed
+
+
+def test_lists_serve_as_tuples():
+    assert build(Arm, {"spring.rest": [0.3, 0.4]}).spring.rest == (0.3, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("count", 3.0),
+        ("count", True),
+        ("is_on", 1),
+        ("slow", "0.1"),
+        ("slow", None),
+        ("name", 3),
+        ("spring.rest", 0.5),
+        ("spring.rest", (0.1, 1)),
+        ("tags", "a"),
+    ],
+)
+def test_another_type_is_refused_by_name(name, value):
+    error = refusal({name: value})
+    assert error.name == name
+    assert "type" in error.requirement or "list" in error.requirement
+
+
+def test_whole_number_for_a_real_one_is_refused_with_the_way_out():
+    assert "1.0" in refusal({"slow": 1}).requirement
+
+
+@pytest.mark.parametrize("name", ["slow", "fast", "spring.stiffness"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_nan_and_infinity_are_refused_with_and_without_bounds(name, value):
+    error = refusal({name: value})
+    assert error.name == name
+    assert "finite" in error.requirement
+
+
+def test_nan_inside_a_list_is_refused():
+    assert refusal({"spring.rest": (0.0, math.nan)}).name == "spring.rest"
+
+
+def test_bounds_themselves_are_allowed():
+    assert build(Arm, {"spring.stiffness": 1.0}).spring.stiffness == 1.0
+    assert build(Arm, {"spring.stiffness": 5000.0}).spring.stiffness == 5000.0
+
+
+@given(st.one_of(st.floats(max_value=math.nextafter(1.0, 0.0)), st.floats(min_value=5000.1)))
+def test_every_number_outside_the_bounds_is_refused_with_range_and_unit(value):
+    error = refusal({"spring.stiffness": value})
+    assert error.value == value
+    assert "between 1 and 5000 N/m" in error.requirement
+
+
+@pytest.mark.parametrize("value", [(), (0.1,), (0.1, 0.2, 0.3)])
+def test_tuple_of_another_length_is_refused(value):
+    assert "2 values" in refusal({"spring.rest": value}).requirement
+
+
+def test_each_element_of_a_tuple_is_held_to_the_bounds():
+    assert "at least -1 m" in refusal({"spring.rest": (0.0, -1.5)}).requirement
+
+
+def test_name_that_is_no_choice_is_refused_with_the_choices():
+    error = refusal({"name": "middle"})
+    assert isinstance(error, UnknownNameError)
+    assert error.alternatives == ("left", "right")
+
+
+def test_choices_hold_for_each_element_of_a_tuple():
+    assert refusal({"tags": ("a", "c")}).value == "c"
+
+
+@pytest.mark.parametrize("name", ["nam", "spring", "spring.", "spring.stiff", "stiffness", ""])
+def test_unknown_name_is_refused_with_all_names(name):
+    error = refusal({name: 1.0})
+    assert isinstance(error, UnknownNameError)
+    assert "spring.stiffness" in error.alternatives
+
+
+def test_broken_relation_between_values_is_refused():
+    assert refusal({"slow": 0.6}).requirement == "<= fast 0.5"
+
+
+def test_relation_is_checked_against_the_values_given_together():
+    assert build(Arm, {"slow": 0.6, "fast": 0.7}).slow == 0.6
+
+
+def test_refusal_names_the_stage_too():
+    assert refusal({"spring.stiffness": 0.0}, "master.").name == "master.spring.stiffness"
+
+
+@given(
+    st.builds(
+        lambda slow, more, name, rest, count: {
+            "slow": slow, "fast": slow + more, "name": name, "spring.rest": rest, "count": count,
+        },
+        st.floats(-10.0, 1.0), st.floats(0.0, 10.0), st.sampled_from(["left", "right"]),
+        st.tuples(st.floats(-1.0, 10.0), st.floats(-1.0, 10.0)), st.integers(1, 1000),
+    )
+)  # fmt: skip
+def test_values_of_a_group_build_it_again(values):
+    arm = build(Arm, values)
+    assert build(Arm, values_of(arm)) == arm
+
+
+def test_field_of_a_type_that_no_parameter_can_have_is_a_programming_error():
+    @dataclass(frozen=True)
+    class Wrong:
+        maybe: float | None = parameter(None, doc="")
+
+    with pytest.raises(TypeError, match="maybe"):
+        list(specs(Wrong))
