@@ -1,0 +1,198 @@
+"""Configuration: layers of files and settings over the defaults, and what a refusal says."""
+
+import dataclasses
+
+import pytest
+import yaml
+
+from teleop_core.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.session.configuration import (
+    GROUPS,
+    Configuration,
+    config_folder,
+    configure,
+    list_scenarios,
+    load_file,
+    parse_layer,
+    parse_setting,
+)
+
+SCENARIOS = ("coarse_box", "fine_box", "free_motion", "mode_switching")
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_scenario_builds_every_group_and_says_what_it_is(name):
+    assert list_scenarios()[name]
+    assert set(configure(name).groups) == set(GROUPS)
+
+
+def test_unknown_scenario_is_refused_with_the_scenarios():
+    with pytest.raises(UnknownNameError) as error:
+        configure("coarse")
+    assert set(SCENARIOS) <= set(error.value.alternatives)
+
+
+def test_default_file_changes_no_default_of_the_code():
+    defaults = Configuration.from_layers([])
+    assert configure().groups == defaults.groups
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_text_of_a_configuration_reads_back_the_same(name):
+    configuration = configure(name, settings=["seed=7", "bandwidth=[50,50,50,70,70,70]"])
+    layer = parse_layer(yaml.safe_load(configuration.text()), "text")
+    assert Configuration.from_layers([layer], name) == configuration
+
+
+def test_setting_with_its_stage_sets_that_parameter_alone():
+    assert parse_setting("haptic_master.hand.stiffness=250") == {
+        "haptic_master": {"hand.stiffness": 250.0}
+    }
+
+
+def test_bare_key_sets_every_stage_that_has_it():
+    layer = parse_setting("robot=mma")
+    assert layer == {"inverse_kinematics": {"robot": "mma"}, "slave_sim": {"robot": "mma"}}
+
+
+@pytest.mark.parametrize(
+    ("text", "stage", "name", "value"),
+    [
+        ("duration=3", "teleop", "duration", 3.0),
+        ("duration=1e1", "teleop", "duration", 10.0),
+        (" duration = 3 ", "teleop", "duration", 3.0),
+        ("hand.mass=0.2", "haptic_master", "hand.mass", 0.2),
+        ("seed=5", "haptic_master", "seed", 5),
+        ("path.kind=circle", "haptic_master", "path.kind", "circle"),
+        ("path.bag=17", "haptic_master", "path.bag", "17"),
+        ("path.center=[0, 0.01, 1e-3]", "haptic_master", "path.center", (0.0, 0.01, 0.001)),
+        ("buttons.clutch=[]", "haptic_master", "buttons.clutch", ()),
+        ("reference_filter.is_on=false", "slave_sim", "reference_filter.is_on", False),
+    ],
+)
+def test_setting_is_read_as_its_declaration_wants(text, stage, name, value):
+    layer = parse_setting(text)
+    assert layer == {stage: {name: value}}
+    assert type(layer[stage][name]) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("key", "meant"),
+    [
+        ("duratoin", "duration"),
+        ("motion_scaling.coarse_gian", "motion_scaling.coarse_gain"),
+        ("hand.stifness", "hand.stiffness"),
+    ],
+)
+def test_unknown_key_suggests_the_near_ones(key, meant):
+    with pytest.raises(UnknownNameError) as error:
+        parse_setting(f"{key}=1")
+    assert meant in error.value.alternatives
+    assert len(error.value.alternatives) <= 3
+
+
+def test_key_like_no_other_is_refused_with_all_keys():
+    with pytest.raises(UnknownNameError) as error:
+        parse_setting("zzzzzz=1")
+    assert "motion_scaling.coarse_gain" in error.value.alternatives
+
+
+def test_setting_without_equals_sign_is_refused():
+    with pytest.raises(TeleopError, match="key=value"):
+        parse_setting("duration")
+
+
+def test_setting_whose_value_is_no_yaml_is_refused():
+    with pytest.raises(TeleopError, match="YAML"):
+        parse_setting("duration=[1")
+
+
+@pytest.mark.parametrize(
+    ("setting", "name"),
+    [
+        ("duration=-1", "teleop.duration"),
+        ("duration=.nan", "teleop.duration"),
+        ("duration=soon", "teleop.duration"),
+        ("duration=", "teleop.duration"),
+        ("seed=1.5", "haptic_master.seed"),
+        ("path.kind=square", "haptic_master.path.kind"),
+        ("path.center=[0, 0]", "haptic_master.path.center"),
+        ("fine_gain=11", "motion_scaling.fine_gain"),
+    ],
+)
+def test_setting_that_breaks_its_declaration_is_refused_by_full_name(setting, name):
+    with pytest.raises(ParameterError) as error:
+        configure(settings=[setting])
+    assert error.value.name == name
+
+
+def test_fine_gain_above_the_coarse_one_is_refused():
+    with pytest.raises(ParameterError) as error:
+        configure(settings=["fine_gain=2"])
+    assert error.value.name.endswith("fine_gain")
+
+
+def test_two_stages_for_different_robots_are_refused():
+    with pytest.raises(ParameterError) as error:
+        configure(settings=["slave_sim.robot=mma"])
+    assert error.value.name == "robot"
+
+
+def write(path, content):
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def test_settings_win_over_files_and_files_over_the_scenario(tmp_path):
+    def file(name, **values):
+        return write(tmp_path / name, {"haptic_master": {"ros__parameters": values}})
+
+    first = file("first.yaml", seed=11, path={"period": 5.0, "rotation": 0.1})
+    second = file("second.yaml", path={"period": 6.0})
+    groups = configure("coarse_box", [first, second], ["path.rotation=0.3"]).groups
+    master = groups["haptic_master"]
+    assert (master.seed, master.path.period, master.path.rotation) == (11, 6.0, 0.3)
+    assert master.path.tilt == (-0.5, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "stages"),
+        ("[1, 2]", "stages"),
+        ("slave_sim: 3", "ros__parameters"),
+        ("slave_sim: {robot: rcrt1}", "ros__parameters"),
+        ("slave: {ros__parameters: {}}", "slave_sim"),
+        ("a: [", "YAML"),
+    ],
+)
+def test_file_of_another_shape_is_refused_with_its_name(tmp_path, text, says):
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    with pytest.raises(TeleopError, match=says) as error:
+        load_file(path)
+    assert "mine.yaml" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_missing_file_is_refused_with_its_name(tmp_path):
+    with pytest.raises(TeleopError, match=r"nowhere\.yaml.*cannot be read"):
+        load_file(tmp_path / "nowhere.yaml")
+
+
+def test_unknown_name_in_a_file_is_refused_with_its_stage(tmp_path):
+    path = write(tmp_path / "mine.yaml", {"slave_sim": {"ros__parameters": {"speed": 1.0}}})
+    with pytest.raises(UnknownNameError) as error:
+        configure(files=[path])
+    assert "slave_sim" in error.value.name
+    assert "command_timeout" in error.value.alternatives
+
+
+def test_parameter_files_lie_where_the_package_finds_them():
+    assert (config_folder() / "teleop.yaml").is_file()
+
+
+def test_groups_of_a_configuration_cannot_be_changed_behind_its_back():
+    scaling = configure().groups["motion_scaling"]
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        scaling.coarse_gain = 2.0
