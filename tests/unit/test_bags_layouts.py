@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from teleop_core.bags import ros_types, topics
@@ -49,6 +49,7 @@ def streams(draw):
     return form, np.array(stamps, np.int64), np.array(rows, float)
 
 
+@settings(deadline=None)
 @given(streams())
 def test_bytes_are_those_that_rosbags_writes(stream):
     form, stamps, values = stream
@@ -57,6 +58,7 @@ def test_bytes_are_those_that_rosbags_writes(stream):
         assert row.tobytes() == ros_types.serialise(message)
 
 
+@settings(deadline=None)
 @given(streams())
 def test_decoding_gives_back_what_was_encoded(stream):
     form, stamps, values = stream
@@ -67,6 +69,7 @@ def test_decoding_gives_back_what_was_encoded(stream):
     np.testing.assert_array_equal(decoded, values)
 
 
+@settings(deadline=None)
 @given(streams())
 def test_single_messages_have_the_bytes_of_the_batch(stream):
     form, stamps, values = stream
@@ -79,12 +82,14 @@ def test_single_messages_have_the_bytes_of_the_batch(stream):
         np.testing.assert_array_equal(decoded[1], numbers)
 
 
+@settings(deadline=None)
 @given(streams())
 def test_a_stream_is_recognised_by_its_first_message(stream):
     form, stamps, values = stream
     assert discover(form.kind, form.encode_one(int(stamps[0]), values[0])) is form
 
 
+@settings(deadline=None)
 @given(streams())
 def test_reading_by_attribute_agrees_with_reading_bytes(stream):
     form, stamps, values = stream
@@ -96,6 +101,7 @@ def test_reading_by_attribute_agrees_with_reading_bytes(stream):
     np.testing.assert_array_equal(result[1], values[0])
 
 
+@settings(deadline=None)
 @given(streams(), st.data())
 def test_any_other_constant_byte_is_noticed_one_by_one_and_in_batches(stream, data):
     form, stamps, values = stream

@@ -4,7 +4,7 @@ from types import SimpleNamespace as Record
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from teleop_core.bags.messages import (
@@ -128,6 +128,7 @@ def test_stamps_that_stand_still_or_go_back_are_refused(last):
 TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"))
 
 
+@settings(deadline=None)
 @given(
     st.integers(0, 2**31 * 10**9 - 1), TEXT, st.integers(0, 3), TEXT, st.dictionaries(TEXT, TEXT)
 )

@@ -1,6 +1,7 @@
 """Writing recordings: what rosbags and the mcap library find in them."""
 
 import hashlib
+import struct
 from itertools import pairwise
 from pathlib import Path
 
@@ -292,6 +293,26 @@ def test_blocks_that_do_not_fit_are_refused_at_once(tmp_path):
         with pytest.raises(ParameterError) as refused:
             writer.write_block({topics.DIAGNOSTICS: (stamps, np.zeros((3, 0)), stamps)})
         assert refused.value.value == "diagnostics"
+
+
+@pytest.mark.parametrize("log_ns", [[-1, 0, 1], [0, 2, 1]])
+def test_log_times_never_go_back_within_a_block(tmp_path, log_ns):
+    times = np.array(log_ns)
+    with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
+        with pytest.raises(ParameterError) as caught:
+            writer.write_block({topics.SLAVE_MEASURED_CP: (times, np.zeros((3, 7)), times)})
+        assert caught.value.requirement == "not negative, not decreasing"
+
+
+def test_a_message_that_cannot_be_stored_does_not_cost_those_before_it(tmp_path, rng):
+    def fail():
+        with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
+            writer.write_block(block(rng, 0, 10))
+            writer.write(topics.DIAGNOSTICS, -1, b"")
+
+    with pytest.raises(struct.error):
+        fail()
+    assert len(Bag(tmp_path / "bag").read(topics.SLAVE_MEASURED_CP)) == 10
 
 
 def test_live_messages_wait_for_a_chunk_no_longer_than_a_second_of_log_time(tmp_path):

@@ -7,6 +7,7 @@ that the same calls give the same bytes. Everything given to the writer is copie
 import queue
 import threading
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -145,6 +146,7 @@ class BagWriter:
 
         Raises:
             RecordingError: Writing has failed, now or earlier.
+            ParameterError: Log times are negative or decrease, or the topic carries reports.
             ShapeError: Arrays of a topic do not fit each other or the topic.
             UnknownNameError: A topic was not announced.
         """
@@ -222,8 +224,10 @@ class BagWriter:
             self._finish()
         except OSError as error:
             self._failure = self._salvage(error)
-        except BaseException as error:
+        except BaseException as error:  # a fault of ours: what is written stays readable
             self._failure = error
+            with suppress(OSError):
+                self._finish()
         finally:
             self._mcap.close()
         for _ in jobs:  # callers must never wait for a dead thread
@@ -268,6 +272,8 @@ def _stretch(
         raise ParameterError("topic of a block", topic.name, "a stream; write() takes reports")
     if values.shape != (len(log_ns), form.width) or stamp_ns.shape != log_ns.shape:
         raise ShapeError(f"values of {topic.name}", (len(log_ns), form.width), values.shape)
+    if len(log_ns) and (log_ns[0] < 0 or (log_ns[1:] < log_ns[:-1]).any()):
+        raise ParameterError(f"log times of {topic.name}", log_ns, "not negative, not decreasing")
     part = slice(-channel.seen % channel.every, None, channel.every) if channel.every else slice(0)
     return Stretch(
         channel.number,
