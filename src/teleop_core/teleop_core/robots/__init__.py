@@ -17,6 +17,9 @@ _MODULES = {
     "stewart": "stewart",
     "rps3": "rps3",
     "puma560": "puma560",
+    "scara": "scara",
+    "planar_3r": "planar_3r",
+    "five_axis": "five_axis",
 }
 
 

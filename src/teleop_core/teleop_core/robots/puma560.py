@@ -322,7 +322,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
 
 
 def make(**geometry: float | str) -> Robot:
-    """PUMA 560; ``a2`` upper arm, ``a3`` elbow offset, ``d3`` shoulder offset, ``d4`` forearm [m]."""
+    """PUMA 560; ``a2`` upper arm, ``d4`` forearm, ``d3`` and ``a3`` their offsets [m]."""
     row = geometry_of(GEOMETRY, geometry)
     for symbol, value in row.items():
         if abs(value) > 10.0:

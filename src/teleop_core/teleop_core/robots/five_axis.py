@@ -1,0 +1,256 @@
+"""Five-axis articulated arm: yaw, three parallel pitches, roll; four branches.
+
+Modified (Craig) Denavit-Hartenberg table: alpha = 0, -90, 0, 0, -90, 0 degrees, a = 0, 0, a2, a3,
+0, 0, d = d1, 0, 0, 0, 0, d5, the last row without a joint. The tool stays in the vertical plane of
+joint 1, so the arm controls position, pitch in that plane and roll about the tool. At home the
+tool points down and the direction it lacks is the turn about x.
+
+With psi = q2 + q3 + q4 the rotation is R = Rz(q1) Ry(psi) Rz(-q5) Rx(180°).
+
+Source:
+    Table 3.4 of the MMA thesis (its Microbot Alpha II and Rhino XR-3), joint 4 home corrected. It
+    prints no lengths; the defaults are assumed, of the size of these arms.
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.compiled import kernel
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import Array, quaternion_from_rotation
+from teleop_core.robots.branches import OUTSIDE, bounded, is_allowed, move_cost, turned, wrapped
+from teleop_core.robots.planar_3r import (
+    NEAR,
+    elbow_angle,
+    first_angle,
+    pointing,
+    second_angle,
+)
+from teleop_core.robots.robot import (
+    REACHED,
+    Drives,
+    IkStatus,
+    Kernels,
+    Robot,
+    geometry_of,
+    independent_axes,
+    is_askable,
+    pose_residual,
+)
+
+JOINTS = tuple(f"theta{i}" for i in range(1, 6))
+GEOMETRY = {"d1": 0.215, "a2": 0.1778, "a3": 0.1778, "d5": 0.1295}
+_DEGREES = math.pi / 180.0
+# Assumed.
+LOWER = np.array([-150.0, -145.0, -10.0, -150.0, -270.0]) * _DEGREES
+UPPER = np.array([150.0, 35.0, 150.0, 150.0, 270.0]) * _DEGREES
+# Upper arm 60 degrees up, forearm 30 degrees down, tool straight down.
+HOME = np.array([0.0, -60.0, 90.0, -30.0, 0.0]) * _DEGREES
+
+DRIVES = Drives(  # assumed
+    inertia=np.array([0.15, 0.15, 0.08, 0.02, 0.01]),
+    viscous=np.array([0.3, 0.3, 0.2, 0.05, 0.02]),
+    coulomb=np.array([0.2, 0.2, 0.15, 0.05, 0.02]),
+    friction_speed=np.full(5, 0.01),
+    effort_limit=np.array([15.0, 15.0, 10.0, 4.0, 2.0]),
+    speed_limit=np.array([1.5, 1.5, 2.0, 3.0, 4.0]),
+    encoder_step=np.full(5, 5e-5),
+    bandwidth=np.full(5, 60.0),
+)
+# Below this sine two axes count as one line and a joint keeps its value.
+_COLLINEAR = 1e-10
+_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+
+
+@kernel
+def fk(q: Array, geometry: Array, T: Array) -> None:
+    """Write ``T_base_tip``, (4, 4), of joints (5,).
+
+    Source:
+        Product of table 3.4 of the MMA thesis, derived.
+    """
+    psi, q23 = q[1] + q[2] + q[3], q[1] + q[2]
+    c1, s1, c, s = math.cos(q[0]), math.sin(q[0]), math.cos(psi), math.sin(psi)
+    c5, s5 = math.cos(q[4]), math.sin(q[4])
+    T[0, 0], T[0, 1], T[0, 2] = c1 * c * c5 + s1 * s5, -c1 * c * s5 + s1 * c5, -c1 * s
+    T[1, 0], T[1, 1], T[1, 2] = s1 * c * c5 - c1 * s5, -s1 * c * s5 - c1 * c5, -s1 * s
+    T[2, 0], T[2, 1], T[2, 2] = -s * c5, s * s5, -c
+    d1, a2, a3, d5 = geometry[0], geometry[1], geometry[2], geometry[3]
+    r = a2 * math.cos(q[1]) + a3 * math.cos(q23) - d5 * s
+    T[0, 3], T[1, 3] = c1 * r, s1 * r
+    T[2, 3] = d1 - a2 * math.sin(q[1]) - a3 * math.sin(q23) - d5 * c
+    T[3, 0] = T[3, 1] = T[3, 2] = 0.0
+    T[3, 3] = 1.0
+
+
+@kernel
+def jacobian(q: Array, geometry: Array, J: Array) -> None:
+    """Write the geometric Jacobian (6, 5): rows linear, then angular, in base axes."""
+    c1, s1 = math.cos(q[0]), math.sin(q[0])
+    psi = q[1] + q[2] + q[3]
+    # From the tool back to the shoulder: horizontal and downward distance to each pitch axis.
+    along, down = -geometry[3] * math.sin(psi), geometry[3] * math.cos(psi)
+    for j in range(3, 0, -1):
+        if j < 3:
+            angle = q[1] + (q[2] if j == 2 else 0.0)
+            along += geometry[j] * math.cos(angle)
+            down += geometry[j] * math.sin(angle)
+        J[0, j], J[1, j], J[2, j] = -c1 * down, -s1 * down, -along
+        J[3, j], J[4, j], J[5, j] = -s1, c1, 0.0
+    J[0, 0], J[1, 0], J[2, 0] = -s1 * along, c1 * along, 0.0
+    J[3, 0], J[4, 0], J[5, 0] = 0.0, 0.0, 1.0
+    J[0, 4], J[1, 4], J[2, 4] = 0.0, 0.0, 0.0
+    J[3, 4], J[4, 4], J[5, 4] = -c1 * math.sin(psi), -s1 * math.sin(psi), -math.cos(psi)
+
+
+@kernel
+def pitch_and_roll(T: Array, q1: float, psi: float, q5: float) -> tuple[float, float]:
+    """Pitch and joint 5 [rad] whose rotation is next to that of T, in the plane of joint 1.
+
+    The quaternion w, x, y, z of Rz(-q1) R Rx(180°) is to be near that of Ry(2a) Rz(2b). Their
+    product w cos a cos b + x sin a sin b + y sin a cos b + z cos a sin b is greatest at
+    a - b = atan2(y - z, w + x) and a + b = atan2(y + z, w - x); where one of them is undefined,
+    the tool being normal to the plane, it keeps its value from the given ``psi`` and ``q5``.
+
+    Source:
+        Derived.
+    """
+    N, quaternion = np.empty((3, 3)), np.empty(4)
+    c, s = math.cos(q1), math.sin(q1)
+    for j in range(3):
+        sign = 1.0 if j == 0 else -1.0
+        N[0, j] = sign * (c * T[0, j] + s * T[1, j])
+        N[1, j] = sign * (c * T[1, j] - s * T[0, j])
+        N[2, j] = sign * T[2, j]
+    quaternion_from_rotation(N, quaternion)
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    difference, total = 0.5 * (psi + q5), 0.5 * (psi - q5)
+    if math.hypot(y - z, w + x) > _COLLINEAR:
+        difference = math.atan2(y - z, w + x)
+    if math.hypot(y + z, w - x) > _COLLINEAR:
+        total = math.atan2(y + z, w - x)
+    return total + difference, difference - total
+
+
+@kernel
+def _solve(T: Array, geometry: Array, is_back: bool, seed: Array, rows: Array) -> bool:
+    """Write the two branches (2, 5), elbow up first, of an arm that faces or turns its back."""
+    d1, a2, a3, d5 = geometry[0], geometry[1], geometry[2], geometry[3]
+    q1 = pointing(T[0, 3], T[1, 3], seed[0]) + (math.pi if is_back else 0.0)
+    r = math.cos(q1) * T[0, 3] + math.sin(q1) * T[1, 3]
+    psi, q5 = pitch_and_roll(T, q1, seed[1] + seed[2] + seed[3], seed[4])
+    x, y = r + d5 * math.sin(psi), d1 - T[2, 3] - d5 * math.cos(psi)
+    elbow, is_reachable = elbow_angle(x, y, a2, a3)
+    for row in range(2):
+        q = rows[row]
+        q[0], q[2], q[4] = q1, (elbow if row == 0 else -elbow), q5
+        q[1] = first_angle(x, y, a2, a3, q[2], seed[1])
+        q[3] = psi - q[1] - q[2]
+    return is_reachable
+
+
+@kernel
+def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
+    """Keep a branch inside limits and steps; each joint makes the best of those before it."""
+    d1, a2, d5 = geometry[0], geometry[1], geometry[3]
+    psi, x, y, is_path = 0.0, 0.0, 0.0, math.isfinite(limits[2, 0])
+    for i in range(5):
+        if i == 1:
+            psi, q[4] = pitch_and_roll(T, q[0], seed[1] + seed[2] + seed[3], seed[4])
+            x = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3] + d5 * math.sin(psi)
+            y = d1 - T[2, 3] - d5 * math.cos(psi)
+            q[1] = first_angle(x, y, a2, geometry[2], q[2], seed[1])
+        elif i == 2:
+            q[2] = second_angle(x, y, a2, q[1], seed[2])
+        elif i == 3:
+            q[3] = psi - q[1] - q[2]
+        q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
+        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+
+
+@kernel
+def _is_met(q: Array, T: Array) -> bool:
+    """Whether pitch and roll are the wanted ones."""
+    psi = q[1] + q[2] + q[3]
+    pitch, roll = pitch_and_roll(T, q[0], psi, q[4])
+    turn = max(abs(wrapped(pitch - psi)), abs(wrapped(roll - q[4])))
+    return turn <= REACHED
+
+
+@kernel
+def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
+    """Write joints (5,) next to ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
+
+    The position is followed; of the rotations that the arm has there, the nearest one. What is
+    left, the turn of the tool out of the arm's plane, is residual.
+
+    Source:
+        Derived from table 3.4 of the MMA thesis.
+    """
+    if not is_askable(T, seed):
+        return -1
+    rows, best, is_path = np.empty((2, 5)), math.inf, math.isfinite(limits[2, 0])
+    is_reachable = is_arm = False
+    for branch in range(4):
+        trial = rows[branch % 2]
+        if branch % 2 == 0:
+            is_arm = _solve(T, geometry, branch == 2, seed, rows)
+            is_reachable = is_reachable or is_arm
+        for i in range(5):
+            trial[i] = turned(trial[i], seed[i], limits[0, i], limits[1, i], is_path)
+        cost = move_cost(trial, seed, limits, 0, 5) + (0.0 if is_arm else 10.0 * OUTSIDE)
+        if cost < best:
+            best = cost
+            for i in range(5):
+                q[i] = trial[i]
+    is_free = is_allowed(q, seed, limits)
+    if not is_free:
+        _settle(T, seed, limits, geometry, q)
+    reached = np.empty((4, 4))
+    fk(q, geometry, reached)
+    pose_residual(reached, T, residual)
+    if residual[0] > REACHED or not (is_free or _is_met(q, T)):
+        return _LIMITED if is_reachable else _UNREACHABLE
+    reach = geometry[1] + geometry[2]
+    is_near = abs(math.sin(q[2])) < NEAR or math.hypot(T[0, 3], T[1, 3]) < NEAR * reach
+    return _NEAR_SINGULAR if is_near else _FOLLOWED
+
+
+@kernel
+def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
+    """Write the branches (k, 5), front first, elbow up first, of the whole pose; their number.
+
+    A pose whose tool leaves the vertical plane through axis 1 has none.
+    """
+    reached, residual, count = np.empty((4, 4)), np.empty(2), 0
+    for side in range(2):
+        rows = solutions[count : count + 2]
+        if _solve(T, geometry, side == 1, np.zeros(5), rows):
+            fk(rows[0], geometry, reached)
+            if pose_residual(reached, T, residual):
+                for i in range(5):
+                    rows[0, i], rows[1, i] = wrapped(rows[0, i]), wrapped(rows[1, i])
+                count += 2
+    return count
+
+
+def make(**geometry: float | str) -> Robot:
+    """Five-axis arm; ``d1`` shoulder height, ``a2``, ``a3`` links, ``d5`` tool [m]."""
+    row = geometry_of(GEOMETRY, geometry)
+    for symbol, value in row.items():
+        if not 0.0 <= value <= 10.0 or (value == 0.0 and symbol[0] == "a"):
+            raise ParameterError(symbol, value, "at least 0 (a2, a3: above 0) and at most 10 m")
+    return Robot(
+        name="five_axis",
+        joint_names=JOINTS,
+        lower=LOWER.copy(),
+        upper=UPPER.copy(),
+        home=HOME.copy(),
+        geometry=row,
+        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        drives=DRIVES,
+        dynamics=independent_axes(DRIVES.inertia.copy()),
+        task_mask=(True, True, True, False, True, True),
+    )
