@@ -69,9 +69,7 @@ MASTER_MEASURED_CF = Topic(
     "master/measured_cf", Kind.WRENCH, "force really applied at this sample", "master_base"
 )
 MASTER_BUTTONS = Topic("master/buttons", Kind.BUTTONS, "time of the sample", "master_base")
-MASTER_SERVO_CF = Topic(
-    "master/servo_cf", Kind.WRENCH, "the measured_cp it answers", "master_base"
-)
+MASTER_SERVO_CF = Topic("master/servo_cf", Kind.WRENCH, "the measured_cp it answers", "master_base")
 SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, "the measured_cp used", "slave_base")
 SLAVE_SERVO_JP = Topic("slave/servo_jp", Kind.JOINTS, "passed on from servo_cp", "slave_base")
 SLAVE_SETPOINT_JS = Topic(
