@@ -190,6 +190,21 @@ def _wrist_branch(M: Array, is_flipped: bool, seed: float, wrist: Array) -> None
 
 
 @kernel
+def _share_roll(M: Array, limits: Array, wrist: Array) -> None:
+    """With axes 4 and 6 in line, let joint 4 do the part of the roll that joint 6 cannot."""
+    if math.hypot(M[0, 2], M[1, 2]) > _COLLINEAR:
+        return
+    low, high = limits[0, 5], limits[1, 5]
+    rest = wrist[2] - min(max(wrist[2], low), high)
+    if (
+        rest != 0.0 and not limits[0, 3] <= wrist[0] + rest <= limits[1, 3]
+    ):  # from joint 6's other end
+        rest -= math.copysign(2.0 * math.pi - (high - low), rest)
+    wrist[0] += rest
+    wrist[2] = _wrapped(wrist[2] - rest)
+
+
+@kernel
 def _cost(q: Array, seed: Array, limits: Array) -> float:
     """Largest joint move from the seed; branches outside the limits come after all others.
 
@@ -213,6 +228,7 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> 
         _wrist_frame(T, trial[0], trial[1], M)
         for wrist in range(2):
             _wrist_branch(M, wrist == 1, seed[3], trial[3:])
+            _share_roll(M, limits, trial[3:])
             cost = _cost(trial, seed, limits)
             if cost < best:
                 best = cost
