@@ -6,6 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# Examples are the same in every run, and no clock decides: compiling may take its time.
+settings.register_profile("teleop", deadline=None, derandomize=True, database=None)
+settings.load_profile("teleop")
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
