@@ -196,9 +196,8 @@ def _share_roll(M: Array, limits: Array, wrist: Array) -> None:
         return
     low, high = limits[0, 5], limits[1, 5]
     rest = wrist[2] - min(max(wrist[2], low), high)
-    if (
-        rest != 0.0 and not limits[0, 3] <= wrist[0] + rest <= limits[1, 3]
-    ):  # from joint 6's other end
+    is_legal = limits[0, 3] <= wrist[0] + rest <= limits[1, 3]
+    if rest != 0.0 and not is_legal:  # then from the other end of joint 6
         rest -= math.copysign(2.0 * math.pi - (high - low), rest)
     wrist[0] += rest
     wrist[2] = _wrapped(wrist[2] - rest)
