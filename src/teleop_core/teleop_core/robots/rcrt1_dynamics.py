@@ -117,7 +117,7 @@ DYNAMICS = Dynamics(
 _RPM = 2.0 * math.pi / 60.0
 DRIVES = Drives(
     # Motors plus, at home, the links on axes 1-3.
-    inertia=np.array([0.115, 0.12, 26.95, LINKS["J4"], LINKS["J5"], LINKS["J6"]]),
+    inertia=np.array([0.117, 0.12, 26.95, LINKS["J4"], LINKS["J5"], LINKS["J6"]]),
     viscous=np.array([0.4, 0.4, 30.0, 0.004, 0.002, 0.002]),  # assumed
     coulomb=np.array([0.15, 0.15, 1.0, 0.010, 0.005, 0.005]),  # assumed
     friction_speed=np.array([2e-3, 2e-3, 2e-4, 2e-2, 2e-2, 2e-2]),  # assumed
