@@ -18,20 +18,22 @@ from teleop_core.geometry import Array
 from teleop_core.robots.branches import bounded
 from teleop_core.robots.damped import (
     ZERO,
+    assign,
     damped_move,
     free_joints,
     pose_error,
     smallest_singular_value,
+    weigh,
 )
 from teleop_core.robots.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
 from teleop_core.robots.mma_forward import fk, groups, jacobian
 from teleop_core.robots.robot import IkStatus, is_askable, pose_residual
 
 LENGTH = 0.1  # distance [m] that weighs as much as one radian
-_ROUNDS, _PATH_ROUNDS = 60, 10  # of the local search
+_ROUNDS, _PATH_ROUNDS = 60, 12  # of the local search
 _STALLED = 1e-5  # share of the squared error that a round must take off
-# Damping per squared error at the start, and the value above which no step helps any more.
-_DAMPING, _HOPELESS = 1e-2, 1e10
+# Damping per squared error: at the start, at least, and where no step helps any more.
+_DAMPING, _LEAST_DAMPING, _HOPELESS = 1e-2, 1e-6, 1e10
 _KICK = 0.02  # joint move that leaves a singular stand-still [rad]
 _STEP = math.radians(5.0)  # of θ10 between two looks at the branches
 _NEAR = 0.02  # singular value under which one radian of tool takes more than 50 of joints
@@ -41,39 +43,47 @@ _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACH
 
 @kernel
 def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
-    """Lower the pose error from ``q`` (7,), inside a box (2, 7), until it is zero or least.
+    """Lower the pose error from ``q`` (7,), inside a box, until it is zero or least.
+
+    Args:
+        T: Wanted ``T_base_tip`` (4, 4).
+        box: Lower and upper joint positions, then rows that do not matter (2 or more, 7).
+        geometry: Row of the robot.
+        rounds: Most evaluations.
+        q: Start inside the box (7,), then the result.
 
     Returns:
         Squared weighted error that is left.
     """
-    J, reached, error = np.empty((6, 7)), np.empty((4, 4)), np.empty(6)
-    left, is_free, trial = np.empty(6), np.empty(7), np.empty(7)
-    fk(q, geometry, reached)
-    square, damping, is_new = pose_error(reached, T, LENGTH, error), _DAMPING, True
+    J, reached, is_free = np.empty((6, 7)), np.empty((4, 4)), np.empty(7)
+    error, left, trial = np.empty(6), np.empty(6), np.empty(7)
+    assign(trial, q)
+    square, damping = math.inf, _DAMPING
     for _ in range(rounds):
-        if square <= ZERO or damping > _HOPELESS:
-            break
-        if is_new:
-            jacobian(q, geometry, J)
-            J[:3] /= LENGTH
-            if free_joints(J, error, q, box, is_free) <= 1e-9 * math.sqrt(square):
-                break
-        damped_move(J, error, damping * square, is_free, box, q, trial)
         fk(trial, geometry, reached)
         trial_square = pose_error(reached, T, LENGTH, left)
-        is_new = trial_square < square
-        damping = max(0.2 * damping, 1e-6) if is_new else 10.0 * damping
-        if is_new:
+        if trial_square < square:
             is_stalled = trial_square > (1.0 - _STALLED) * square
-            square, error[:], q[:] = trial_square, left, trial
-            if is_stalled:
+            square, damping = trial_square, max(0.2 * damping, _LEAST_DAMPING)
+            assign(error, left)
+            assign(q, trial)
+            if square <= ZERO or is_stalled:
                 break
+            jacobian(q, geometry, J)
+            weigh(J, LENGTH)
+            if free_joints(J, error, q, box, is_free) <= 1e-9 * math.sqrt(square):
+                break
+        else:
+            damping *= 10.0
+            if damping > _HOPELESS:
+                break
+        damped_move(J, error, damping * square, is_free, box, q, trial)
     return float(square)
 
 
 @kernel
 def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
-    """Move ``q`` (7,) inside a box (2, 7) to the pose T, or as near as a neighbourhood allows.
+    """Move ``q`` (7,) inside a box to the pose T, or as near as a neighbourhood allows.
 
     Where the error points along a direction that the arm has just lost, no step lowers it at
     first order; a small move of all joints then leaves the stand-still, and is kept only if the
@@ -82,18 +92,17 @@ def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> f
     Returns:
         Squared weighted error that is left.
     """
-    trial = np.empty(7)
-    for i in range(7):
-        q[i] = min(max(q[i], box[0, i]), box[1, i])
-    square = _descend(T, box, geometry, rounds, q)
-    if square <= ZERO:
-        return float(square)
-    for i in range(7):
-        move = _KICK if i % 2 == 0 else -_KICK
-        trial[i] = min(max(q[i] + move, box[0, i]), box[1, i])
-    left = _descend(T, box, geometry, rounds, trial)
-    if left < 0.99 * square:
-        q[:], square = trial, left
+    trial, square = np.empty(7), math.inf
+    for kick in (0.0, _KICK):
+        for i in range(7):
+            move = kick if i % 2 == 0 else -kick
+            trial[i] = min(max(q[i] + move, box[0, i]), box[1, i])
+        left = _descend(T, box, geometry, rounds, trial)
+        if left < 0.99 * square:
+            square = left
+            assign(q, trial)
+        if square <= ZERO:
+            break
     return float(square)
 
 
@@ -139,7 +148,8 @@ def _refine(T: Array, seed: Array, limits: Array, geometry: Array, found: Array,
             place = centre + (width if side == 0 else -width)
             cost = _cost(T, place, choice, seed, limits, geometry, trial)
             if cost < best:
-                best, turn, q[:] = cost, place, trial
+                best, turn = cost, place
+                assign(q, trial)
         width *= 0.5
     return float(best)
 
@@ -147,7 +157,8 @@ def _refine(T: Array, seed: Array, limits: Array, geometry: Array, found: Array,
 @kernel
 def _nearest_miss(T: Array, seed: Array, geometry: Array, q: Array) -> float:
     """Write the branch whose wrist stays away least over a full turn of θ10; that distance [m]."""
-    found, least, width = np.array((seed[6], 0.0)), math.inf, 2.0 * _STEP
+    found, least, width = np.empty(2), math.inf, 2.0 * _STEP
+    found[0], found[1] = seed[6], 0.0
     for k in range(36):
         least = least_miss(T, seed[6] + width * k, seed, geometry, least, found)
         if least == 0.0:
@@ -173,27 +184,29 @@ def _can_reach(T: Array, q: Array, geometry: Array) -> bool:
 
 
 @kernel
-def _search(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> float:
-    """Write the reaching joints nearest to the seed, by local search and over all branches.
+def _search_branches(
+    T: Array, seed: Array, limits: Array, geometry: Array, left: float, q: Array
+) -> None:
+    """Replace ``q`` by joints that reach the pose and lie nearer to the seed, where there are any.
 
-    Returns:
-        Squared weighted error that is left.
+    Args:
+        T: Wanted ``T_base_tip`` (4, 4).
+        seed: Joints (7,) to stay next to.
+        limits: Rows lower, upper and more (3, 7).
+        geometry: Row of the robot.
+        left: Squared weighted error of ``q``; while it is not zero, any solution is nearer.
+        q: Result (7,) of the local search, then of this one.
     """
     found, trial, bound = np.empty(2), np.empty(7), math.inf
-    q[:] = seed
-    left = _approach(T, limits[:2], geometry, _ROUNDS, q)
     if left <= ZERO:
         bound = unwrapped(q, seed, limits)
     if _scan(T, seed, limits, geometry, bound, found) < bound:
         _refine(T, seed, limits, geometry, found, q)
-        return 0.0
-    if left > ZERO:
+    elif left > ZERO:
         _nearest_miss(T, seed, geometry, trial)
         unwrapped(trial, seed, limits)
-        other = _approach(T, limits[:2], geometry, _ROUNDS, trial)
-        if other < left:
-            left, q[:] = other, trial
-    return float(left)
+        if _approach(T, limits, geometry, _ROUNDS, trial) < left:
+            assign(q, trial)
 
 
 @kernel
@@ -205,17 +218,15 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """
     if not is_askable(T, seed):
         return -1
-    box, J = np.empty((2, 7)), np.empty((6, 7))
-    if math.isfinite(limits[2, 0]):
-        for i in range(7):
-            step = limits[2, i]
-            box[0, i] = bounded(-math.inf, seed[i], limits[0, i], limits[1, i], step)
-            box[1, i] = bounded(math.inf, seed[i], limits[0, i], limits[1, i], step)
-        q[:] = seed
-        _approach(T, box, geometry, _PATH_ROUNDS, q)
-    else:
-        _search(T, seed, limits, geometry, q)
-    reached = np.empty((4, 4))
+    is_path = math.isfinite(limits[2, 0])
+    box, J, reached = np.empty((2, 7)), np.empty((6, 7)), np.empty((4, 4))
+    for i in range(7):
+        box[0, i] = bounded(-math.inf, seed[i], limits[0, i], limits[1, i], limits[2, i])
+        box[1, i] = bounded(math.inf, seed[i], limits[0, i], limits[1, i], limits[2, i])
+    assign(q, seed)
+    left = _approach(T, box, geometry, _PATH_ROUNDS if is_path else _ROUNDS, q)
+    if not is_path:
+        _search_branches(T, seed, limits, geometry, left, q)
     fk(q, geometry, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if _can_reach(T, q, geometry) else _UNREACHABLE
@@ -231,16 +242,15 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     The arm has one joint more than a pose needs, so each branch stands for a curve of joint
     vectors; :func:`branch` gives the others. Angles lie within half a turn of home.
     """
-    count, q = 0, np.empty(7)
-    home = np.array((0.0, -0.5 * math.pi, 0.0, 0.5 * math.pi, 0.5 * math.pi, 0.0, 0.0))
-    free = np.empty((2, 7))
-    free[0], free[1] = -math.inf, math.inf
+    count, home, free = 0, np.zeros(7), np.empty((2, 7))
+    home[1], home[3], home[4] = -0.5 * math.pi, 0.5 * math.pi, 0.5 * math.pi
+    for i in range(7):
+        free[0, i], free[1, i] = -math.inf, math.inf
     for choice in range(BRANCHES):
         for k in range(73):
             turn = _STEP * ((k + 1) // 2) * (1.0 if k % 2 == 0 else -1.0)
-            if branch(T, turn, choice, geometry, home, q) == 0.0:
-                unwrapped(q, home, free)
-                solutions[count] = q
+            if branch(T, turn, choice, geometry, home, solutions[count]) == 0.0:
+                unwrapped(solutions[count], home, free)
                 count += 1
                 break
     return count

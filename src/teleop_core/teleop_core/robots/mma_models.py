@@ -28,6 +28,11 @@ LINKS, JOINTS = 10, 10  # base included; the joint of three links counts twice
 _QUARTER = 0.5 * math.pi
 
 
+def independent_loops(links: int, joints: int) -> int:
+    """Number of independent loops, base counted as a link (Singh 2014, eq. 3.16)."""
+    return joints - (links - 1)
+
+
 class Row(NamedTuple):
     """Row of a modified D-H table: a, alpha before the joint, d, and θ fixed or of a joint."""
 

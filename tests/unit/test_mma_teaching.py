@@ -1,0 +1,136 @@
+"""Teaching examples beside the MMA: conventions agree, the parallelogram closes (H10-H13)."""
+
+import math
+
+import numpy as np
+import pytest
+import roboticstoolbox as rtb
+
+from teleop_core.geometry import rotation, transform
+from teleop_core.robots.mma_models import (
+    JOINTS,
+    LINKS,
+    Row,
+    frames,
+    independent_loops,
+    joints_of_model,
+)
+
+EXACT = 1e-12
+QUARTER = 0.5 * math.pi
+
+
+def distal(rows):
+    """Product of standard D-H rows (a, alpha, d, theta), by roboticstoolbox."""
+    links = [rtb.RevoluteDH(a=a, alpha=alpha, d=d) for a, alpha, d, _ in rows]
+    return rtb.DHRobot(links).fkine([theta for *_, theta in rows]).A
+
+
+def proximal(rows):
+    """Product of modified D-H rows (a, alpha, d, theta), by the table of the MMA."""
+    table = [Row(str(i), a, alpha, d, -1, theta) for i, (a, alpha, d, theta) in enumerate(rows)]
+    return list(frames(tuple(table), np.empty(0)).values())[-1]
+
+
+def along(axis, distance):
+    return transform(np.eye(3), distance * np.eye(3)["xyz".index(axis)])
+
+
+def about(axis, angle):
+    return transform(rotation(axis, angle), np.zeros(3))
+
+
+def sheth_uicker(rows):
+    """Product of rows (theta, a, b, c, alpha, beta, gamma): joint, then shape of the link."""
+    pose = np.eye(4)
+    for theta, a, b, c, alpha, beta, gamma in rows:
+        pose = pose @ about("z", theta + gamma) @ along("z", c) @ about("x", alpha)
+        pose = pose @ along("x", a) @ about("z", beta) @ along("z", b)
+    return pose
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(11)
+
+
+def test_scara_is_the_same_in_distal_and_proximal_rows(rng):  # H11
+    for _ in range(50):
+        t1, t2, t4 = rng.uniform(-math.pi, math.pi, 3)
+        a1, a2, d1, d3, d4 = rng.uniform(0.05, 0.5, 5)
+        left = distal([(a1, math.pi, d1, t1), (a2, 0, 0, t2), (0, 0, d3, 0), (0, 0, d4, t4)])
+        right = proximal(
+            [(0, 0, d1, t1), (a1, 0, 0, -t2), (a2, 0, -d3, 0), (0, math.pi, d4, t4), (0, 0, 0, 0)]
+        )
+        assert np.abs(left - right).max() < EXACT
+
+
+def test_scara_is_the_same_in_the_sheth_uicker_notation(rng):  # H11
+    for _ in range(50):
+        t1, t2, t4 = rng.uniform(-math.pi, math.pi, 3)
+        a1, a2, d1, d3, d4 = rng.uniform(0.05, 0.5, 5)
+        left = distal([(a1, math.pi, d1, t1), (a2, 0, 0, t2), (0, 0, d3, 0), (0, 0, d4, t4)])
+        right = sheth_uicker(
+            [
+                (t1, a1, 0, d1, math.pi, 0, 0),
+                (t2, a2, 0, 0, 0, 0, 0),
+                (0, 0, 0, d3, 0, 0, 0),
+                (t4, 0, 0, d4, 0, 0, 0),
+            ]
+        )
+        assert np.abs(left - right).max() < EXACT
+
+
+def test_five_axis_arm_is_the_same_in_distal_and_proximal_rows(rng):  # H12
+    for _ in range(50):
+        t = rng.uniform(-math.pi, math.pi, 5)
+        a2, a3, d1, d5 = rng.uniform(0.05, 0.5, 4)
+        left = distal(
+            [(0, -QUARTER, d1, t[0]), (a2, 0, 0, t[1]), (a3, 0, 0, t[2]),
+             (0, -QUARTER, 0, t[3]), (0, 0, d5, t[4])]
+        )  # fmt: skip
+        right = proximal(
+            [(0, 0, d1, t[0]), (0, -QUARTER, 0, t[1]), (a2, 0, 0, t[2]), (a3, 0, 0, t[3]),
+             (0, -QUARTER, 0, t[4]), (0, 0, d5, 0)]
+        )  # fmt: skip
+        assert np.abs(left - right).max() < EXACT
+
+
+def closing(theta_1, theta_base):
+    """Passive angles of the teaching parallelogram, eqs. 3.33 and 3.34."""
+    theta_2 = theta_base - theta_1
+    return theta_2, math.pi - theta_2
+
+
+def test_teaching_parallelogram_closes_with_the_corrected_home(rng):  # H10
+    theta_2, theta_3 = closing(0.0, math.radians(-120.0))
+    assert math.isclose(theta_2, math.radians(-120.0))
+    assert math.isclose(theta_3, math.radians(300.0))
+    for first, second in rng.uniform(0.05, 0.5, (50, 2)):
+        over = distal([(first, 0, 0, 0.0), (second, 0, 0, theta_2), (first, 0, 0, theta_3)])
+        direct = distal([(second, 0, 0, math.radians(-120.0))])
+        assert np.abs(over[:3, 3] - direct[:3, 3]).max() < EXACT
+
+
+def test_teaching_parallelogram_with_the_printed_home_stays_open():  # H10
+    angles = np.radians([0.0, -30.0, -60.0])
+    over = distal([(a, 0, 0, t) for a, t in zip((0.3, 0.2, 0.3), angles, strict=True)])
+    direct = distal([(0.2, 0, 0, math.radians(-120.0))])
+    assert np.linalg.norm(over[:3, 3] - direct[:3, 3]) > 0.1
+
+
+def test_parallelogram_closes_for_every_pair_of_its_two_drives(rng):  # H10
+    for theta_1, theta_base in rng.uniform(-math.pi, math.pi, (50, 2)):
+        theta_2, theta_3 = closing(theta_1, theta_base)
+        over = distal([(0.3, 0, 0, theta_1), (0.2, 0, 0, theta_2), (0.3, 0, 0, theta_3)])
+        direct = distal([(0.2, 0, 0, theta_base)])
+        assert np.abs(over[:3, 3] - direct[:3, 3]).max() < EXACT
+
+
+def test_handle_and_parallelogram_have_one_loop_each():  # H13
+    assert independent_loops(LINKS, JOINTS) == 1
+    assert independent_loops(links=5, joints=5) == 1
+
+
+def test_planar_loop_leaves_seven_of_the_ten_joints_free():  # H13
+    assert JOINTS - 3 * independent_loops(LINKS, JOINTS) == len(joints_of_model(np.zeros(7), "B"))
