@@ -67,10 +67,10 @@ def _row(
 
 
 def number(value: float | None, missing: str = MISSING) -> str:
-    """Text with three decimals, more for small values; ``missing`` for None."""
+    """Text with three decimals, two significant digits for small values; ``missing`` for None."""
     if value is None:
         return missing
-    return f"{value:.3f}" if value == 0.0 or abs(value) >= 0.0995 else f"{value:.2g}"
+    return f"{value:.3f}" if value == 0.0 or abs(value) >= 0.0995 else f"{value:#.2g}"
 
 
 def _command(score: Score) -> list[Row]:

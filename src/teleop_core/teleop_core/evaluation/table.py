@@ -46,12 +46,12 @@ def score_table(scores: Sequence[Score]) -> Table:
 
 def heading(session: Session) -> str:
     """Name of a recording and what it was, in three lines."""
-    gain = "" if session.gain is None else f", gain {session.gain:g}"
+    gain = "" if session.gain is None else f"gain {session.gain:g}, "
     mode = published_for(session.gain)
     seed = "" if session.seed is None else f", seed {session.seed}"
     return "\n".join(
-        (session.title, f"{session.duration_s:.1f} s{gain}", f"{session.robot or 'unknown'}{seed}")
-    ) + (f"\nlike {mode.mode} mode" if mode else "")
+        (session.title, f"{gain}{session.duration_s:.3g} s", f"{session.robot or 'unknown'}{seed}")
+    ) + (f"\nmode {mode.mode}" if mode else "")
 
 
 def _cell(row: Row) -> str:

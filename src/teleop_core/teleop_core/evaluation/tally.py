@@ -17,7 +17,7 @@ from teleop_core.evaluation.fixture_scores import FixtureTally
 from teleop_core.evaluation.pairing import NONE, latest, same_tick
 from teleop_core.evaluation.pose_errors import PoseErrors, pose_errors
 from teleop_core.evaluation.score import OrientationError, Samples
-from teleop_core.evaluation.state_history import StateHistory
+from teleop_core.evaluation.state_history import StateHistory, States
 from teleop_core.evaluation.streams import DelayTally, StampTally
 from teleop_core.evaluation.traces import Drawing
 from teleop_core.evaluation.windows import Window
@@ -114,14 +114,16 @@ class Tally:
         is_valid = np.isfinite(against.position_mm) & np.isfinite(against.angle_deg)
         self._unpaired += int((partner == NONE).sum())
         self._invalid += int((~is_valid & (partner != NONE)).sum())
-        self._draw(measured.log_ns[own], (commands, setpoints, poses), against, behind)
+        self._draw(measured.log_ns[own], (commands, setpoints, poses), states)
+        self._draw_errors(measured.log_ns[own], against, behind)
 
-    def _draw(
-        self, logs: Integers, poses: tuple[Array, ...], against: PoseErrors, behind: PoseErrors
-    ) -> None:
+    def _draw(self, logs: Integers, poses: tuple[Array, ...], states: States) -> None:
         rows = np.concatenate([pose[:, :3] for pose in poses], axis=1) * 1e3
         self.drawing.position.add(logs, rows)
-        self.drawing.path.add(rows[:, 3:])
+        is_on = states.column("is_fixture_on")[:, None]
+        self.drawing.path.add(np.concatenate((rows[:, 3:], is_on), axis=1))
+
+    def _draw_errors(self, logs: Integers, against: PoseErrors, behind: PoseErrors) -> None:
         turns = (*against.roll_pitch_yaw_deg.T, against.angle_deg)
         errors = np.stack((against.position_mm, behind.position_mm, *turns), axis=1)
         self.drawing.error.add(logs, errors)

@@ -1,0 +1,41 @@
+"""Figure: one plot of the report page, before it is encoded."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from teleop_core.geometry import Array
+
+COMMAND, REFERENCE, MEASURED, BOX = "#8a94a0", "#9ed0fb", "#c2370a", "#2b8a3e"
+# Three curves that must be told apart, also without seeing red or green (Okabe and Ito 2008).
+FIRST, SECOND, THIRD = "#0072b2", "#009e73", "#cc79a7"
+DARK = "#343a40"
+DRAWN_BOXES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A plot: what it is, one sentence on what one sees, and plotly.js' traces and layout.
+
+    Arrays among the traces stand as they are; the page encodes them.
+    """
+
+    title: str
+    sentence: str
+    traces: list[dict[str, Any]]
+    layout: dict[str, Any] = field(default_factory=dict)
+    height: int = 420
+
+
+def line(
+    x: Array, y: Array, name: str, color: str, width: float, unit: str = "mm"
+) -> dict[str, Any]:
+    """Trace of a line in a plane; ``unit`` is that of y."""
+    return {
+        "type": "scatter", "mode": "lines", "name": name, "legendgroup": name, "x": x, "y": y,
+        "line": {"color": color, "width": width}, "hovertemplate": f"%{{y:.4g}} {unit}",
+    }  # fmt: skip
+
+
+def time_axis() -> dict[str, Any]:
+    """Axis of time from the start of the recording."""
+    return {"title": {"text": "time [s]"}}
