@@ -1,0 +1,119 @@
+"""Dexterity: singular values and manipulability of a pose, and the workspace they fill."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import Array
+from teleop_core.robots.robot import Robot
+
+COLUMNS = ("x_m", "y_m", "z_m", "manipulability")
+
+
+def controlled_jacobian(robot: Robot, q: object, length: float = 1.0) -> Array:
+    """Jacobian rows of the directions that the robot controls.
+
+    Args:
+        robot: The arm.
+        q: Joint vector (n,) [rad, m].
+        length: Distance [m] that counts as much as one radian; linear rows are divided by it.
+
+    Returns:
+        (k, n), k the number of directions in the task mask.
+
+    Raises:
+        ShapeError: ``q`` has another shape.
+        ParameterError: NaN or infinity; or the length is not above 0.
+    """
+    if not (math.isfinite(length) and length > 0.0):
+        raise ParameterError("length", length, "finite and above 0 m")
+    jacobian = robot.jacobian(q)
+    jacobian[:3] /= length
+    return jacobian[np.array(robot.task_mask)]
+
+
+def singular_values(robot: Robot, q: object, length: float = 1.0) -> Array:
+    """Speeds of the tip per unit of joint speed along the axes of the manipulability ellipsoid.
+
+    Args:
+        robot: The arm.
+        q: Joint vector (n,) [rad, m].
+        length: Distance [m] that counts as much as one radian.
+
+    Returns:
+        (min(k, n),), falling; the last is 0 at a singularity.
+
+    Raises:
+        ShapeError: ``q`` has another shape.
+        ParameterError: NaN or infinity; or the length is not above 0.
+    """
+    jacobian = controlled_jacobian(robot, q, length)
+    return np.asarray(np.linalg.svd(jacobian, compute_uv=False), dtype=np.float64)
+
+
+def manipulability(robot: Robot, q: object, length: float = 1.0) -> float:
+    """Volume of the manipulability ellipsoid but for a constant: the product of singular values.
+
+    It is sqrt(det(J Jᵀ)) for arms with as many joints as controlled directions or more, and 0 at a
+    singularity. Arguments and errors as :func:`singular_values`.
+
+    Source:
+        Yoshikawa 1985, eq. 6.
+    """
+    return float(np.prod(singular_values(robot, q, length)))
+
+
+def condition_number(robot: Robot, q: object, length: float = 1.0) -> float:
+    """Largest over smallest singular value: 1 where all directions are alike, inf when singular.
+
+    Arguments and errors as :func:`singular_values`.
+    """
+    values = singular_values(robot, q, length)
+    return math.inf if values[-1] == 0.0 else float(values[0] / values[-1])
+
+
+def sample_workspace(
+    robot: Robot, count: int, rng: np.random.Generator, length: float = 1.0
+) -> tuple[Array, Array]:
+    """Tip positions and manipulability of joint vectors drawn evenly inside the limits.
+
+    Even in the joints is not even in space: the density of points says how many postures reach a
+    place.
+
+    Args:
+        robot: The arm.
+        count: Number of samples, at least 1.
+        rng: Source of the draws.
+        length: Distance [m] that counts as much as one radian in the manipulability.
+
+    Returns:
+        Points in the base (count, 3) [m], and manipulability (count,).
+
+    Raises:
+        ParameterError: The count is below 1, or the length is not above 0.
+    """
+    if count < 1:
+        raise ParameterError("count", count, "at least 1")
+    joints = rng.uniform(robot.lower, robot.upper, (count, robot.n))
+    points = np.ascontiguousarray(robot.fk(joints)[:, :3, 3])
+    jacobians = np.stack([controlled_jacobian(robot, q, length) for q in joints])
+    values = np.linalg.svd(jacobians, compute_uv=False).prod(axis=-1)
+    return points, np.asarray(values, dtype=np.float64)
+
+
+def write_workspace_csv(path: Path | str, points: Array, values: Array) -> None:
+    """Write samples as CSV with the header :data:`COLUMNS`, all digits, one row per sample.
+
+    Args:
+        path: New or existing file; it is replaced.
+        points: (N, 3) [m].
+        values: Manipulability (N,).
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    rows = np.column_stack((points, values))
+    lines = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in rows.tolist())]
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")

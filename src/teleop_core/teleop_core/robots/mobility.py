@@ -1,0 +1,100 @@
+"""Mobility: how many freedoms and independent loops a mechanism of links and joints has."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from teleop_core.errors import ParameterError
+
+SPATIAL, PLANAR = 6, 3
+
+
+def degrees_of_freedom(
+    links: int, joints: int, joint_freedoms: int, *, space: int = SPATIAL
+) -> int:
+    """Mobility by counting: ``space (links - joints - 1) + joint_freedoms``.
+
+    It assumes constraints in general position: mechanisms with special geometry, such as parallel
+    axes counted in space, can move although the count says no. A negative count means
+    overconstrained.
+
+    Args:
+        links: Number of links, the fixed one included.
+        joints: Number of joints that connect two links each; one that joins three counts twice.
+        joint_freedoms: Sum of the freedoms of all joints.
+        space: 6 in space, 3 in a plane (:data:`SPATIAL`, :data:`PLANAR`).
+
+    Returns:
+        The degrees of freedom.
+
+    Raises:
+        ParameterError: A count that no mechanism has.
+
+    Source:
+        Grübler 1883, Kutzbach 1929, as Ghosal 2020, lecture 11, eq. 1.
+    """
+    _check_counts(links, joints)
+    if space not in {SPATIAL, PLANAR}:
+        raise ParameterError("space", space, "6 (spatial) or 3 (planar)")
+    if not joints <= joint_freedoms <= space * joints:
+        raise ParameterError("joint_freedoms", joint_freedoms, f"1 to {space} for each joint")
+    return space * (links - joints - 1) + joint_freedoms
+
+
+def independent_loops(links: int, joints: int) -> int:
+    """Number of loops that are independent of each other: ``joints - links + 1``.
+
+    Raises:
+        ParameterError: A count that no connected mechanism has.
+
+    Source:
+        Singh 2014, eq. 3.16.
+    """
+    _check_counts(links, joints)
+    return joints - links + 1
+
+
+def passive_joints(joints: int, freedoms: int) -> int:
+    """Number of joints without a motor, of a mechanism with as many motors as freedoms.
+
+    Raises:
+        ParameterError: More freedoms than joints, or negative counts.
+    """
+    if not 0 <= freedoms <= joints:
+        raise ParameterError("freedoms", freedoms, f"0 to {joints}, the number of joints")
+    return joints - freedoms
+
+
+def loop_rank(edges: Sequence[tuple[int, int]], loops: Iterable[Sequence[int]]) -> int:
+    """How many of the given loops are independent.
+
+    Args:
+        edges: The two links that each joint connects.
+        loops: Links in the order in which a loop visits them, the first not repeated.
+
+    Returns:
+        Rank of the loops in the space of all loops, at most :func:`independent_loops`.
+
+    Raises:
+        ParameterError: A loop passes from one link to another that no joint connects.
+    """
+    index = {}
+    for number, (first, second) in enumerate(edges):
+        index[first, second], index[second, first] = (number, 1.0), (number, -1.0)
+    rows = []
+    for loop in loops:
+        row = np.zeros(len(edges))
+        for step in zip(loop, [*loop[1:], *loop[:1]], strict=True):
+            if step not in index:
+                raise ParameterError("loops", step, "two links that a joint connects")
+            number, direction = index[step]
+            row[number] += direction
+        rows.append(row)
+    return int(np.linalg.matrix_rank(np.array(rows))) if rows else 0
+
+
+def _check_counts(links: int, joints: int) -> None:
+    if links < 1:
+        raise ParameterError("links", links, "at least 1, the fixed link")
+    if joints < links - 1:
+        raise ParameterError("joints", joints, f"at least {links - 1}, to connect every link")
