@@ -1,0 +1,106 @@
+"""Virtual fixture: published wall, and a box whose force points back from edges and corners too."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from teleop_core.mapping.fixtures import box_penetration, wall_force
+
+# Products of numbers up to four.
+ROUNDING = 1e-12
+WIDTH, STIFFNESS, LARGEST = 0.03, 3300.0, 3.3
+BOX = np.full(3, WIDTH)
+CENTER = np.zeros(3)
+places = st.tuples(*[st.floats(-0.05, 0.05)] * 3).map(np.array)
+
+
+def penetration(position, center=CENTER, size=BOX):
+    depth = np.full(3, math.nan)
+    length = box_penetration(np.asarray(position, dtype=float), center, size, depth)
+    return depth, length
+
+
+def force(position, stiffness=STIFFNESS, largest=LARGEST, center=CENTER, size=BOX):
+    depth, length = penetration(position, center, size)
+    push = np.full(3, math.nan)
+    wall_force(depth, length, stiffness, largest, push)
+    return push
+
+
+@pytest.mark.parametrize(
+    ("mm", "newton"), [(14.9, 0.0), (15.5, -1.65), (16.0, -3.3), (17.0, -3.3), (-15.5, 1.65)]
+)
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_wall_pushes_with_the_published_force(mm, newton, axis):  # case 23
+    position, expected = np.zeros(3), np.zeros(3)
+    position[axis], expected[axis] = mm * 1e-3, newton
+    assert np.allclose(force(position), expected, rtol=0, atol=ROUNDING)
+
+
+def test_printed_sign_pushes_the_hand_further_out():  # misprint 15
+    outside = np.array([0.0155, 0.0, 0.0])
+    printed = STIFFNESS * (outside - CENTER - 0.5 * WIDTH)
+    assert printed[0] > 0.0
+    assert force(outside)[0] < 0.0
+
+
+@pytest.mark.parametrize("boundary", [0.015, 0.016])
+def test_soft_wall_has_no_step_where_it_begins_and_where_it_is_full(boundary):
+    before, after = force((boundary - 1e-9, 0, 0)), force((boundary + 1e-9, 0, 0))
+    # 2 nm at 3300 N/m.
+    assert np.abs(after - before).max() <= 6.7e-6
+
+
+def test_hard_wall_pushes_fully_at_once():
+    assert np.array_equal(force((0.0150001, 0, 0), math.inf), (-LARGEST, 0.0, 0.0))
+    assert not force((0.0149999, 0, 0), math.inf).any()
+
+
+@pytest.mark.parametrize("stiffness", [STIFFNESS, math.inf])
+@pytest.mark.parametrize("position", [(0, 0, 0), (0.015, 0, 0), (0.015, -0.015, 0.015)])
+def test_inside_and_on_the_wall_there_is_no_force(stiffness, position):
+    assert not force(position, stiffness).any()
+
+
+@given(places)
+def test_force_never_exceeds_its_limit_and_points_back_to_the_box(position):
+    for stiffness in (STIFFNESS, math.inf):
+        push = force(position, stiffness)
+        depth, length = penetration(position)
+        assert np.linalg.norm(push) <= LARGEST * (1.0 + ROUNDING)
+        # Along the penetration, against it: right at edges and corners too.
+        assert np.allclose(np.cross(push, depth), 0.0, atol=ROUNDING)
+        assert push @ depth <= 0.0
+        assert length == 0.0 or push @ depth < 0.0
+
+
+def test_per_axis_force_of_the_source_is_too_large_in_a_corner():
+    corner = np.full(3, 0.017)
+    per_axis = np.full(3, -LARGEST)
+    assert np.linalg.norm(per_axis) > 1.7 * LARGEST
+    assert math.isclose(np.linalg.norm(force(corner)), LARGEST, rel_tol=ROUNDING)
+
+
+@given(places, places, st.tuples(*[st.floats(1e-4, 0.05)] * 3).map(np.array))
+def test_penetration_leads_to_the_nearest_point_of_the_box(position, center, size):
+    depth, length = penetration(position, center, size)
+    nearest = np.clip(position, center - 0.5 * size, center + 0.5 * size)
+    assert np.allclose(position - depth, nearest, rtol=0, atol=1e-16)
+    assert math.isclose(length, np.linalg.norm(position - nearest), abs_tol=1e-16)
+
+
+@given(places)
+def test_force_is_even_in_every_axis(position):
+    assert np.array_equal(force(-position), -force(position))
+
+
+@pytest.mark.parametrize("depth", [5e-324, 1e-308, 1e-160])
+@pytest.mark.parametrize("stiffness", [STIFFNESS, math.inf])
+def test_smallest_penetrations_give_finite_forces(depth, stiffness):
+    out = np.full(3, math.nan)
+    wall_force(np.array([depth, 0.0, 0.0]), depth, stiffness, LARGEST, out)
+    assert np.isfinite(out).all()
+    assert np.linalg.norm(out) <= LARGEST * (1.0 + ROUNDING)
