@@ -1,5 +1,6 @@
 """Slave simulator: the 1 kHz arm that follows joint references under PID."""
 
+import math
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
@@ -28,12 +29,17 @@ class CommandStatus(IntEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceFilterParameters:
-    """First-order lag on every joint reference."""
+    """First-order lag on every joint reference; at rest its output is its input."""
 
     is_on: bool = parameter(True, doc="whether references pass the filter")
     gain: float = parameter(0.1, lower=0.0, upper=1.0, doc="gain for fast motion")
     zero: float = parameter(100.0, unit="rad/s", lower=0.0, upper=1000.0, doc="zero")
     pole: float = parameter(10.0, unit="rad/s", lower=0.01, upper=1000.0, doc="pole")
+
+    def __post_init__(self) -> None:
+        if not math.isclose(self.gain * self.zero, self.pole, rel_tol=1e-9):
+            needed = f"such that gain ({self.gain}) * zero = pole ({self.pole})"
+            raise ParameterError("reference_filter.zero", self.zero, needed)
 
 
 @dataclass(frozen=True, kw_only=True)
