@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 import roboticstoolbox as rtb
 
-from teleop_core.geometry import rotation, transform
-from teleop_core.robots.mma_models import (
-    JOINTS,
-    LINKS,
-    Row,
-    frames,
-    independent_loops,
-    joints_of_model,
-)
+from teleop_core.robots.dh import DhRow, DhTable
+from teleop_core.robots.mma_models import JOINTS, LINKS, joints_of_model
+from teleop_core.robots.mobility import PLANAR, degrees_of_freedom, independent_loops
 
 EXACT = 1e-12
 QUARTER = 0.5 * math.pi
@@ -27,25 +21,24 @@ def distal(rows):
 
 
 def proximal(rows):
-    """Product of modified D-H rows (a, alpha, d, theta), by the table of the MMA."""
-    table = [Row(str(i), a, alpha, d, -1, theta) for i, (a, alpha, d, theta) in enumerate(rows)]
-    return list(frames(tuple(table), np.empty(0)).values())[-1]
-
-
-def along(axis, distance):
-    return transform(np.eye(3), distance * np.eye(3)["xyz".index(axis)])
-
-
-def about(axis, angle):
-    return transform(rotation(axis, angle), np.zeros(3))
+    """Product of modified D-H rows (a, alpha, d, theta), by our tables."""
+    return product("modified", ("a", "alpha", "d", "theta"), rows)
 
 
 def sheth_uicker(rows):
-    """Product of rows (theta, a, b, c, alpha, beta, gamma): joint, then shape of the link."""
+    """Product of rows (gamma with the joint's theta, a, c, alpha), b and beta zero."""
+    return product("sheth_uicker", ("gamma", "a", "c", "alpha"), rows)
+
+
+def product(convention, symbols, rows):
+    table = DhTable(
+        name="teaching",
+        convention=convention,
+        rows=tuple(DhRow(constants=dict(zip(symbols, row, strict=True))) for row in rows),
+    )
     pose = np.eye(4)
-    for theta, a, b, c, alpha, beta, gamma in rows:
-        pose = pose @ about("z", theta + gamma) @ along("z", c) @ about("x", alpha)
-        pose = pose @ along("x", a) @ about("z", beta) @ along("z", b)
+    for step in table.link_transforms(np.empty(0)):
+        pose = pose @ step
     return pose
 
 
@@ -70,14 +63,7 @@ def test_scara_is_the_same_in_the_sheth_uicker_notation(rng):  # H11
         t1, t2, t4 = rng.uniform(-math.pi, math.pi, 3)
         a1, a2, d1, d3, d4 = rng.uniform(0.05, 0.5, 5)
         left = distal([(a1, math.pi, d1, t1), (a2, 0, 0, t2), (0, 0, d3, 0), (0, 0, d4, t4)])
-        right = sheth_uicker(
-            [
-                (t1, a1, 0, d1, math.pi, 0, 0),
-                (t2, a2, 0, 0, 0, 0, 0),
-                (0, 0, 0, d3, 0, 0, 0),
-                (t4, 0, 0, d4, 0, 0, 0),
-            ]
-        )
+        right = sheth_uicker([(t1, a1, d1, math.pi), (t2, a2, 0, 0), (0, 0, d3, 0), (t4, 0, d4, 0)])
         assert np.abs(left - right).max() < EXACT
 
 
@@ -132,5 +118,8 @@ def test_handle_and_parallelogram_have_one_loop_each():  # H13
     assert independent_loops(links=5, joints=5) == 1
 
 
-def test_planar_loop_leaves_seven_of_the_ten_joints_free():  # H13
-    assert JOINTS - 3 * independent_loops(LINKS, JOINTS) == len(joints_of_model(np.zeros(7), "B"))
+def test_handle_has_seven_freedoms():  # H13
+    # Counted in the plane of its loop, where all ten joints turn about one axis each.
+    planar_loop = PLANAR * independent_loops(LINKS, JOINTS)
+    assert JOINTS - planar_loop == len(joints_of_model(np.zeros(7), "B")) == 7
+    assert degrees_of_freedom(links=5, joints=5, joint_freedoms=5, space=PLANAR) == 2

@@ -14,36 +14,26 @@ Source:
 
 import math
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
 from teleop_core.errors import ShapeError, UnknownNameError
 from teleop_core.geometry import Array, checked_array
+from teleop_core.robots.dh import DhJoint, DhRow, DhTable
 
-MODELS = ("A", "B", "C")
 # Half of d5: the thesis only gives the sum of the two equal symbols a3 + a4'.
 SHORT_SIDE = 0.03391
 LINKS, JOINTS = 10, 10  # base included; the joint of three links counts twice
 _QUARTER = 0.5 * math.pi
-
-
-def independent_loops(links: int, joints: int) -> int:
-    """Number of independent loops, base counted as a link (Singh 2014, eq. 3.16)."""
-    return joints - (links - 1)
-
-
-class Row(NamedTuple):
-    """Row of a modified D-H table: a, alpha before the joint, d, and θ fixed or of a joint."""
-
-    name: str
-    a: float
-    alpha: float
-    d: float
-    joint: int
-    """Index in the model's joint vector; -1 for a fixed θ."""
-    theta: float = 0.0
-    """Fixed θ [rad]."""
+# Frames of the tables from the base to the tool.
+FRAMES = {
+    "A": ("1", "2", "3", "4", "5", "6", "7", "8"),
+    "B": ("1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12"),
+    "C": ("1", "2", "3", "3''", "4'", "5", "6", "7", "8", "9", "10", "11", "12"),
+}
+MODELS = tuple(FRAMES)
 
 
 class Loop(NamedTuple):
@@ -55,6 +45,11 @@ class Loop(NamedTuple):
     """Point reached over link 3 (3,) [m]."""
     frame_4: Array
     """Origin of frame 4', where link 4 leaves the parallelogram (3,) [m]."""
+
+
+def _check_model(model: str) -> None:
+    if model not in MODELS:
+        raise UnknownNameError("model", model, MODELS)
 
 
 def vector(name: str, value: object, size: int) -> Array:
@@ -70,91 +65,91 @@ def vector(name: str, value: object, size: int) -> Array:
     return array
 
 
-def _arm(g: Mapping[str, float]) -> list[Row]:
-    return [
-        Row("1", 0.0, 0.0, g["d1"], 0),
-        Row("2", 0.0, -_QUARTER, 0.0, 1),
-    ]
+def model_table(model: str, g: Mapping[str, float], short_side: float = SHORT_SIDE) -> DhTable:
+    """D-H table of model "A", "B" or "C" over a geometry [m]; in A, d8 is d11 + d12.
+
+    The alpha of the last row of B, printed as 90°, is corrected to 0.
+
+    Raises:
+        UnknownNameError: No such model.
+    """
+    _check_model(model)
+    wrist = {"A": _wrist_a, "B": _wrist_b, "C": _wrist_c}[model]
+    rows = (
+        _row("theta1", d=g["d1"]),
+        _row("theta2", alpha=-_QUARTER),
+        _row("theta3", a=g["a2"]),
+        *wrist(g, short_side),
+    )
+    return DhTable(name=model, convention="modified", rows=rows)
 
 
-def _handle(g: Mapping[str, float], first: int) -> list[Row]:
-    """Rows 6 to 12 of tables 4.4 and 4.10, less the a and alpha of row 6."""
-    return [
-        Row("7", 0.0, -_QUARTER, -g["d7"], -1, -_QUARTER),
-        Row("8", g["a7"], 0.0, 0.0, first),
-        Row("9", 0.0, -_QUARTER, -g["d9"], -1, _QUARTER),
-        Row("10", g["a9"], 0.0, 0.0, first + 1),
-        Row("11", 0.0, _QUARTER, g["d11"], -1, -_QUARTER),
-        Row("12", g["a11"], 0.0, g["d12"], -1, g["theta12"]),
-    ]
-
-
-def table_a(g: Mapping[str, float]) -> tuple[Row, ...]:
-    """Conventional table 4.1 of a geometry [m]; its d8 is d11 + d12."""
-    return (
-        *_arm(g),
-        Row("3", g["a2"], 0.0, 0.0, 2),
-        Row("4", g["a3"], 0.0, 0.0, 3),
-        Row("5", 0.0, _QUARTER, g["d5"], 4),
-        Row("6", 0.0, -_QUARTER, -g["d7"], 5),
-        Row("7", 0.0, -_QUARTER, -g["d9"], 6),
-        Row("8", 0.0, _QUARTER, g["d11"] + g["d12"], -1),
+def _row(
+    joint: str = "", *, a: float = 0.0, alpha: float = 0.0, d: float = 0.0, theta: float = 0.0
+) -> DhRow:
+    return DhRow(
+        constants={"a": a, "alpha": alpha, "d": d, "theta": theta},
+        joint=DhJoint(name=joint, symbol="theta", sign=1.0, lower=-math.pi, upper=math.pi, home=0.0)
+        if joint
+        else None,
     )
 
 
-def table_b(g: Mapping[str, float]) -> tuple[Row, ...]:
-    """Table 4.4 of a geometry [m], serial with dummy frames; alpha of the last row corrected."""
+def _wrist_a(g: Mapping[str, float], _short_side: float) -> tuple[DhRow, ...]:
     return (
-        *_arm(g),
-        Row("3", g["a2"], 0.0, 0.0, 2),
-        Row("4", g["a3"], 0.0, 0.0, 3),
-        Row("5", 0.0, _QUARTER, g["d5"], -1, -_QUARTER),
-        Row("6", g["a5"], 0.0, 0.0, 4),
-        *_handle(g, 5),
+        _row("theta4", a=g["a3"]),
+        _row("theta5", alpha=_QUARTER, d=g["d5"]),
+        _row("theta6", alpha=-_QUARTER, d=-g["d7"]),
+        _row("theta7", alpha=-_QUARTER, d=-g["d9"]),
+        _row(alpha=_QUARTER, d=g["d11"] + g["d12"]),
     )
 
 
-def table_c(g: Mapping[str, float], short_side: float = SHORT_SIDE) -> tuple[Row, ...]:
-    """Table 4.10 of a geometry [m]: over links 3a and 3b of the parallelogram to the tool."""
+def _wrist_b(g: Mapping[str, float], _short_side: float) -> tuple[DhRow, ...]:
     return (
-        *_arm(g),
-        Row("3", g["a2"], 0.0, 0.0, 2),
-        Row("3''", short_side, 0.0, 0.0, 3),
-        Row("4'", g["a3"], 0.0, 0.0, 4),
-        Row("5", short_side - g["d5"], _QUARTER, 0.0, -1, -_QUARTER),
-        Row("6", g["a5"], _QUARTER, 0.0, 5),
-        *_handle(g, 6),
+        _row("theta4", a=g["a3"]),
+        _row(alpha=_QUARTER, d=g["d5"], theta=-_QUARTER),
+        _row("theta6", a=g["a5"]),
+        *_handle(g),
     )
 
 
-def frames(table: tuple[Row, ...], joints: Array) -> dict[str, Array]:
-    """Transforms (4, 4) from the base to every frame of a table.
+def _wrist_c(g: Mapping[str, float], short_side: float) -> tuple[DhRow, ...]:
+    """Over links 3a and 3b of the parallelogram."""
+    return (
+        _row("theta3''", a=short_side),
+        _row("theta4'", a=g["a3"]),
+        _row(a=short_side - g["d5"], alpha=_QUARTER, theta=-_QUARTER),
+        _row("theta6", a=g["a5"], alpha=_QUARTER),
+        *_handle(g),
+    )
+
+
+def _handle(g: Mapping[str, float]) -> tuple[DhRow, ...]:
+    """Rows 7 to 12 of tables 4.4 and 4.10."""
+    return (
+        _row(alpha=-_QUARTER, d=-g["d7"], theta=-_QUARTER),
+        _row("theta8", a=g["a7"]),
+        _row(alpha=-_QUARTER, d=-g["d9"], theta=_QUARTER),
+        _row("theta10", a=g["a9"]),
+        _row(alpha=_QUARTER, d=g["d11"], theta=-_QUARTER),
+        _row(a=g["a11"], d=g["d12"], theta=g["theta12"]),
+    )
+
+
+def frames(table: DhTable, joints: object) -> dict[str, Array]:
+    """Transforms (4, 4) from the base to every frame of a model's table, by :data:`FRAMES`.
 
     Args:
-        table: Rows.
-        joints: Joint vector in the order of the table's model [rad].
+        table: From :func:`model_table`.
+        joints: Joint vector in the order of the model [rad].
 
-    Returns:
-        Frame name to transform; the last is the tool.
-
-    Source:
-        Craig 2005; Singh 2014, eq. 4.1.
+    Raises:
+        ShapeError: Another shape.
+        ParameterError: NaN or infinity.
     """
-    transform, out = np.eye(4), {}
-    for row in table:
-        theta = row.theta if row.joint < 0 else joints[row.joint]
-        c, s, ca, sa = math.cos(theta), math.sin(theta), math.cos(row.alpha), math.sin(row.alpha)
-        step = np.array(
-            [
-                [c, -s, 0.0, row.a],
-                [s * ca, c * ca, -sa, -sa * row.d],
-                [s * sa, c * sa, ca, ca * row.d],
-                [0.0, 0.0, 0.0, 1.0],
-            ]
-        )
-        transform = transform @ step
-        out[row.name] = transform
-    return out
+    steps = accumulate(table.link_transforms(joints), np.matmul)
+    return dict(zip(FRAMES[table.name], steps, strict=True))
 
 
 def passive_angles(q: object) -> Array:
@@ -176,8 +171,7 @@ def joints_of_model(q: object, model: str) -> Array:
         ShapeError: Another shape.
         ParameterError: NaN or infinity.
     """
-    if model not in MODELS:
-        raise UnknownNameError("model", model, MODELS)
+    _check_model(model)
     joints = vector("q", q, 7)
     if model == "C":
         return np.concatenate((joints[:3], passive_angles(joints), joints[4:]))
