@@ -96,6 +96,17 @@ def pose_from_transform(transform: Array, pose: Array) -> None:
 
 
 @kernel
+def compose(a: Array, b: Array, product: Array) -> None:
+    """Write the transform ``a @ b`` (4, 4) into ``product``, which is neither of them."""
+    for i in range(3):
+        for j in range(4):
+            product[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
+        product[i, 3] += a[i, 3]
+        product[3, i] = 0.0
+    product[3, 3] = 1.0
+
+
+@kernel
 def rotation_angle_between(a: Array, b: Array) -> float:
     """Angle [rad] of the rotation between two matrices; exact for small and for large angles."""
     trace = 0.0

@@ -10,11 +10,19 @@ from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import (
     Array,
-    multiply_quaternions,
     quaternion_from_rotation,
     rotate_by_vector,
     rotation,
+    transform,
 )
+from teleop_core.master.device import (
+    DeviceParameters,
+    make_handle,
+    measure_twist,
+    read_handle,
+    read_phantom,
+)
+from teleop_core.master.hand import HandParameters, move_hand, tremble
 from teleop_core.master.paths import Path, PathParameters
 from teleop_core.parameters import parameter
 from teleop_core.signals import DT, make_signals
@@ -25,46 +33,6 @@ REST_TILT = math.radians(-23.4)
 REST_POSITION = (0.0, -0.065511, -0.088114)
 BLOCK = 1000
 """Ticks for which the wanted path and the noise are drawn at once."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class DeviceParameters:
-    """The Phantom Omni as its maker publishes it (Vongbunyong 2008, table 5.1)."""
-
-    workspace: tuple[float, ...] = parameter(
-        (0.16, 0.12, 0.07), unit="m", lower=0.01, upper=1.0, length=3,
-        doc="width, height, depth within which the tip can move",
-    )  # fmt: skip
-    start: tuple[float, ...] = parameter(
-        (0.0, 0.0, -0.03), unit="m", lower=-0.5, upper=0.5, length=3, fixed=True,
-        doc="place of the inkwell relative to the middle of the workspace",
-    )  # fmt: skip
-    position_resolution: float = parameter(
-        0.055e-3, unit="m", lower=0.0, upper=1e-2, doc="step of the position reading; 0: none"
-    )
-    gimbal_noise: float = parameter(
-        2e-3, unit="rad", lower=0.0, upper=0.1, doc="largest noise of each gimbal potentiometer"
-    )
-    peak_force: float = parameter(3.3, unit="N", lower=0.0, upper=50.0, doc="largest force")
-    apparent_mass: float = parameter(0.045, unit="kg", lower=1e-3, upper=5.0, doc="mass at the tip")
-    friction: float = parameter(0.26, unit="N", lower=0.0, upper=5.0, doc="backdrive friction")
-
-
-@dataclass(frozen=True, kw_only=True)
-class HandParameters:
-    """The operator's hand: a mass on a spring and damper that wants to follow the path."""
-
-    mass: float = parameter(0.15, unit="kg", lower=0.01, upper=5.0, doc="mass moved with the tip")
-    stiffness: float = parameter(
-        300.0, unit="N/m", lower=1.0, upper=5000.0, doc="how firmly the hand holds its path"
-    )
-    damping: float = parameter(12.0, unit="N·s/m", lower=0.1, upper=200.0, doc="damping of the arm")
-    tremor_amplitude: float = parameter(
-        0.1e-3, unit="m", lower=0.0, upper=5e-3, doc="amplitude of the wanted tremor on each axis"
-    )
-    tremor_frequency: float = parameter(
-        10.0, unit="Hz", lower=8.0, upper=12.0, doc="middle of the tremor's band, which is ±2 Hz"
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,84 +77,25 @@ _STATE = np.dtype(
     [(name, "f8", (3,)) for name in ("position", "speed", "wanted", "phase", "wander", "reading",
      "rate", "turning")] + [("attitude", "f8", (4,))]
 )  # fmt: skip
-# Coulomb friction of the device grows smoothly up to about this speed [m/s].
-_FRICTION_SPEED = 5e-3
-_STEPS = 4
-
-
-@kernel
-def _tremble(p: Any, s: Any, noise: Array, tremor: Array) -> None:
-    """Write the wanted tremor (3,) [m]: one line per axis whose frequency wanders in its band."""
-    for i in range(3):
-        # Ornstein-Uhlenbeck process of unit variance and half a second of memory.
-        s.wander[i] += -s.wander[i] * (1e-3 / 0.5) + noise[i] * math.sqrt(2.0 * 1e-3 / 0.5)
-        s.phase[i] += 2.0 * math.pi * 1e-3 * (p.frequency + 2.0 * math.tanh(s.wander[i]))
-        tremor[i] = p.tremor * math.sin(s.phase[i])
-
-
-@kernel
-def _move_hand(p: Any, s: Any, wanted: Array, force: Array) -> None:
-    """Move tip and hand on by one tick under the device's force (3,) [N].
-
-    Symplectic Euler in four steps of 0.25 ms; the fastest mode of hand and device is 70 rad/s.
-    """
-    h = 1e-3 / _STEPS
-    for i in range(3):
-        aim_speed = (wanted[i] - s.wanted[i]) / 1e-3
-        for step in range(_STEPS):
-            aim = s.wanted[i] + aim_speed * h * (step + 1)
-            v = s.speed[i]
-            drag = p.friction * v / math.sqrt(v * v + _FRICTION_SPEED * _FRICTION_SPEED)
-            pull = p.stiffness * (aim - s.position[i]) + p.damping * (aim_speed - v)
-            s.speed[i] += h * (pull + force[i] - drag) / p.mass
-            s.position[i] += h * s.speed[i]
-        s.wanted[i] = wanted[i]
-        low, high = p.center[i] - p.half[i], p.center[i] + p.half[i]
-        if s.position[i] < low or s.position[i] > high:  # the device's stops
-            s.position[i] = min(max(s.position[i], low), high)
-            s.speed[i] = 0.0
-
-
-@kernel
-def _read_device(p: Any, s: Any, attitude: Array, noise: Array, row: Any) -> None:
-    """Write measured_cp and measured_cv: quantised place, noisy attitude, filtered rates (5 ms)."""
-    pose, twist = row.master_measured_cp, row.master_measured_cv
-    share = 1e-3 / (1e-3 + 5e-3)
-    for i in range(3):
-        reading = s.position[i]
-        if p.resolution > 0.0:
-            reading = round(reading / p.resolution) * p.resolution
-        s.rate[i] += ((reading - s.reading[i]) / 1e-3 - s.rate[i]) * share
-        s.reading[i] = reading
-        pose[i], twist[i] = reading, s.rate[i]
-    wobble = np.empty(3)
-    for i in range(3):
-        # The noise counts as two standard deviations and never exceeds its bound.
-        wobble[i] = p.gimbal * min(max(0.5 * noise[3 + i], -1.0), 1.0)
-    rotate_by_vector(attitude, wobble[0], wobble[1], wobble[2], pose[3:7])
-    back = np.empty(4)
-    back[0] = s.attitude[0]
-    for i in range(1, 4):
-        back[i] = -s.attitude[i]
-    multiply_quaternions(pose[3:7], back, back)
-    sign = 1.0 if back[0] >= 0.0 else -1.0
-    for i in range(3):
-        # Small turn between two samples: twice the vector part, in base axes.
-        s.turning[i] += (sign * 2.0 * back[1 + i] / 1e-3 - s.turning[i]) * share
-        twist[3 + i] = s.turning[i]
-    for i in range(4):
-        s.attitude[i] = pose[3 + i]
 
 
 @kernel
 def haptic_master_step(
-    p: Any, s: Any, wanted: Array, attitude: Array, noise: Array, buttons: Array, row: Any
+    p: Any,
+    s: Any,
+    handle: Any,
+    wanted: Array,
+    attitude: Array,
+    noise: Array,
+    buttons: Array,
+    row: Any,
 ) -> None:
     """One tick: feel master_servo_cf, move, and write master_measured_cp, _cv, _cf and _buttons.
 
     Args:
         p: Parameter record.
         s: State record; written.
+        handle: None for the Phantom, else as :func:`teleop_core.master.device.make_handle` gives.
         wanted: Where the hand wants to be (3,) [m], master's base.
         attitude: How it holds the stylus, quaternion (4,).
         noise: Standard normal numbers (6,): tremor x, y, z, gimbal x, y, z.
@@ -198,12 +107,16 @@ def haptic_master_step(
     size = math.sqrt(command[0] ** 2 + command[1] ** 2 + command[2] ** 2)
     share = 1.0 if size <= p.peak_force else p.peak_force / size
     tremor = np.empty(3)
-    _tremble(p, s, noise, tremor)
+    tremble(p, s, noise, tremor)
     for i in range(3):
         force[i] = share * command[i]
         tremor[i] += wanted[i]
-    _move_hand(p, s, tremor, force)
-    _read_device(p, s, attitude, noise, row)
+    move_hand(p, s, tremor, force)
+    if handle is None:
+        read_phantom(p, s.position, attitude, noise[3:6], row.master_measured_cp)
+    else:
+        read_handle(handle, s.position, attitude, row.master_measured_cp)
+    measure_twist(s, row.master_measured_cp, row.master_measured_cv)
     for i in range(3):
         row.master_measured_cf[i] = force[i]
         row.master_measured_cf[3 + i] = 0.0
@@ -244,6 +157,8 @@ class HapticMaster:
         self._block: tuple[Array, ...] | None = None
         self._rest = np.empty(4)
         quaternion_from_rotation(rotation("x", REST_TILT), self._rest)
+        rest = transform(rotation("x", REST_TILT), np.array(REST_POSITION))
+        self.handle = make_handle(self._fixed.device, rest)
         for name in _STATE.names or ():
             self.state[name] = 0.0
         for name in ("position", "wanted", "reading"):
@@ -296,7 +211,14 @@ class HapticMaster:
         i = self._used
         self._used += 1
         haptic_master_step(
-            self.parameters, self.state, wanted[i], attitudes[i], noise[i], buttons[i], self.signals
+            self.parameters,
+            self.state,
+            self.handle,
+            wanted[i],
+            attitudes[i],
+            noise[i],
+            buttons[i],
+            self.signals,
         )
 
 

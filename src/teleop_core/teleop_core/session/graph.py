@@ -88,7 +88,8 @@ def _run_block(
     """Run the whole graph for each row of ``block`` and write the signals there."""
     wanted, attitudes, noise, buttons = drawn
     for i in range(block.shape[0]):
-        haptic_master_step(master[0], master[1], wanted[i], attitudes[i], noise[i], buttons[i], row)
+        p, s, handle = master
+        haptic_master_step(p, s, handle, wanted[i], attitudes[i], noise[i], buttons[i], row)
         _tick(first_ns + i * 1_000_000, scaling, ik, slave, row)
         block[i] = row
 
@@ -143,7 +144,7 @@ class Graph:
             Signals after each tick, a structured array (ticks,).
         """
         block = make_signals(self.robot.n, ticks)
-        master = (self.master.parameters, self.master.state)
+        master = (self.master.parameters, self.master.state, self.master.handle)
         first_ns = self.now_ns + TICK_NS
         _run_block(first_ns, master, self.master.draw(ticks), *self._stages(), self.signals, block)
         self.now_ns += ticks * TICK_NS

@@ -1,0 +1,134 @@
+"""Device: what the haptic master reads of the hand, as a Phantom Omni or as a jointed handle."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from teleop_core.compiled import kernel
+from teleop_core.geometry import (
+    Array,
+    compose,
+    multiply_quaternions,
+    pose_from_transform,
+    rotate_by_vector,
+    transform_from_pose,
+)
+from teleop_core.parameters import parameter
+from teleop_core.robots import load_robot_set
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceParameters:
+    """The Phantom Omni as its maker publishes it (Vongbunyong 2008, table 5.1)."""
+
+    workspace: tuple[float, ...] = parameter(
+        (0.16, 0.12, 0.07), unit="m", lower=0.01, upper=1.0, length=3,
+        doc="width, height, depth within which the tip can move",
+    )  # fmt: skip
+    start: tuple[float, ...] = parameter(
+        (0.0, 0.0, -0.03), unit="m", lower=-0.5, upper=0.5, length=3, fixed=True,
+        doc="place of the inkwell relative to the middle of the workspace",
+    )  # fmt: skip
+    position_resolution: float = parameter(
+        0.055e-3, unit="m", lower=0.0, upper=1e-2, doc="step of the position reading; 0: none"
+    )
+    gimbal_noise: float = parameter(
+        2e-3, unit="rad", lower=0.0, upper=0.1, doc="largest noise of each gimbal potentiometer"
+    )
+    peak_force: float = parameter(3.3, unit="N", lower=0.0, upper=50.0, doc="largest force")
+    apparent_mass: float = parameter(0.045, unit="kg", lower=1e-3, upper=5.0, doc="mass at the tip")
+    friction: float = parameter(0.26, unit="N", lower=0.0, upper=5.0, doc="backdrive friction")
+    handle: str = parameter(
+        "", fixed=True, doc="robot whose joints read the hand, such as mma; empty: the Phantom's"
+    )
+    handle_geometry: tuple[str, ...] = parameter(
+        (), fixed=True, doc="symbol=value in place of the handle's lengths and options [m, rad]"
+    )
+
+
+@kernel
+def read_phantom(p: Any, position: Array, attitude: Array, noise: Array, pose: Array) -> None:
+    """Write the pose (7,) that the Phantom reads: place in steps, attitude with noise (3,)."""
+    wobble = np.empty(3)
+    for i in range(3):
+        pose[i] = position[i]
+        if p.resolution > 0.0:
+            pose[i] = round(position[i] / p.resolution) * p.resolution
+        # The noise counts as two standard deviations and never exceeds its bound.
+        wobble[i] = p.gimbal * min(max(0.5 * noise[i], -1.0), 1.0)
+    rotate_by_vector(attitude, wobble[0], wobble[1], wobble[2], pose[3:7])
+
+
+@kernel
+def read_handle(handle: Any, position: Array, attitude: Array, pose: Array) -> None:
+    """Write the pose (7,) that a jointed handle reads: its joints in encoder steps, through fk.
+
+    The hand moves the tip; the joints that go with it come from the inverse kinematics, next to
+    those of the last sample.
+    """
+    ik, fk, limits, geometry, T_base_handle, T_handle_base, step, joints, work = handle
+    T, U, q, residual = work
+    for i in range(3):
+        pose[i] = position[i]
+    for i in range(4):
+        pose[3 + i] = attitude[i]
+    transform_from_pose(pose, T)
+    compose(T_handle_base, T, U)
+    ik(U, joints, limits, geometry, q, residual)
+    for i in range(q.shape[0]):
+        joints[i] = q[i]
+        q[i] = round(q[i] / step[i]) * step[i]
+    fk(q, geometry, U)
+    compose(T_base_handle, U, T)
+    pose_from_transform(T, pose)
+
+
+@kernel
+def measure_twist(s: Any, pose: Array, twist: Array) -> None:
+    """Write the twist (6,) from the readings of two samples through a 5 ms low-pass."""
+    share = 1e-3 / (1e-3 + 5e-3)
+    for i in range(3):
+        s.rate[i] += ((pose[i] - s.reading[i]) / 1e-3 - s.rate[i]) * share
+        s.reading[i] = pose[i]
+        twist[i] = s.rate[i]
+    back = np.empty(4)
+    back[0] = s.attitude[0]
+    for i in range(1, 4):
+        back[i] = -s.attitude[i]
+    multiply_quaternions(pose[3:7], back, back)
+    sign = 1.0 if back[0] >= 0.0 else -1.0
+    for i in range(3):
+        # Small turn between two samples: twice the vector part, in base axes.
+        s.turning[i] += (sign * 2.0 * back[1 + i] / 1e-3 - s.turning[i]) * share
+        twist[3 + i] = s.turning[i]
+    for i in range(4):
+        s.attitude[i] = pose[3 + i]
+
+
+def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Any:
+    """Arguments of :func:`read_handle` for the wanted handle, None for the Phantom.
+
+    The handle's home is laid onto the place where the stylus rests, so that the same paths and
+    the same motion scaling serve every device.
+
+    Args:
+        parameters: Which handle.
+        T_base_rest: Pose of the resting tip in the master's base (4, 4).
+
+    Returns:
+        Tuple of pointers and arrays; its joints start at home.
+
+    Raises:
+        UnknownNameError: No such robot or symbol.
+    """
+    if not parameters.handle:
+        return None
+    robot = load_robot_set(parameters.handle, parameters.handle_geometry)
+    T_base_handle = T_base_rest @ np.linalg.inv(robot.fk(robot.home))
+    step = np.full(robot.n, 1e-5) if robot.drives is None else robot.drives.encoder_step.copy()
+    work = (np.eye(4), np.eye(4), np.zeros(robot.n), np.zeros(2))
+    return (
+        robot.ik_pointer, robot.fk_pointer, robot.limits(), robot.geometry_row,
+        T_base_handle, np.linalg.inv(T_base_handle), step, robot.home.copy(), work,
+    )  # fmt: skip

@@ -1,0 +1,63 @@
+"""Hand: the operator as a mass on a spring and damper that wants to follow a path, with tremor."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from teleop_core.compiled import kernel
+from teleop_core.geometry import Array
+from teleop_core.parameters import parameter
+
+# Coulomb friction of the device grows smoothly up to about this speed [m/s].
+_FRICTION_SPEED = 5e-3
+_STEPS = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandParameters:
+    """The operator's hand: a mass on a spring and damper that wants to follow the path."""
+
+    mass: float = parameter(0.15, unit="kg", lower=0.01, upper=5.0, doc="mass moved with the tip")
+    stiffness: float = parameter(
+        300.0, unit="N/m", lower=1.0, upper=5000.0, doc="how firmly the hand holds its path"
+    )
+    damping: float = parameter(12.0, unit="N·s/m", lower=0.1, upper=200.0, doc="damping of the arm")
+    tremor_amplitude: float = parameter(
+        0.1e-3, unit="m", lower=0.0, upper=5e-3, doc="amplitude of the wanted tremor on each axis"
+    )
+    tremor_frequency: float = parameter(
+        10.0, unit="Hz", lower=8.0, upper=12.0, doc="middle of the tremor's band, which is ±2 Hz"
+    )
+
+
+@kernel
+def tremble(p: Any, s: Any, noise: Array, tremor: Array) -> None:
+    """Write the wanted tremor (3,) [m]: one line per axis whose frequency wanders in its band."""
+    for i in range(3):
+        # Ornstein-Uhlenbeck process of unit variance and half a second of memory.
+        s.wander[i] += -s.wander[i] * (1e-3 / 0.5) + noise[i] * math.sqrt(2.0 * 1e-3 / 0.5)
+        s.phase[i] += 2.0 * math.pi * 1e-3 * (p.frequency + 2.0 * math.tanh(s.wander[i]))
+        tremor[i] = p.tremor * math.sin(s.phase[i])
+
+
+@kernel
+def move_hand(p: Any, s: Any, wanted: Array, force: Array) -> None:
+    """Move tip and hand on by one tick under the device's force (3,) [N].
+
+    Symplectic Euler in four steps of 0.25 ms; the fastest mode of hand and device is 70 rad/s.
+    """
+    h = 1e-3 / _STEPS
+    for i in range(3):
+        aim_speed = (wanted[i] - s.wanted[i]) / 1e-3
+        for step in range(_STEPS):
+            aim = s.wanted[i] + aim_speed * h * (step + 1)
+            v = s.speed[i]
+            drag = p.friction * v / math.sqrt(v * v + _FRICTION_SPEED * _FRICTION_SPEED)
+            pull = p.stiffness * (aim - s.position[i]) + p.damping * (aim_speed - v)
+            s.speed[i] += h * (pull + force[i] - drag) / p.mass
+            s.position[i] += h * s.speed[i]
+        s.wanted[i] = wanted[i]
+        low, high = p.center[i] - p.half[i], p.center[i] + p.half[i]
+        if s.position[i] < low or s.position[i] > high:  # the device's stops
+            s.position[i] = min(max(s.position[i], low), high)
+            s.speed[i] = 0.0
