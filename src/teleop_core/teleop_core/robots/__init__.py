@@ -16,6 +16,7 @@ _MODULES = {
     "parallelogram": "parallelogram",
     "stewart": "stewart",
     "rps3": "rps3",
+    "scara_stewart": "scara_stewart",
     "puma560": "puma560",
     "scara": "scara",
     "planar_3r": "planar_3r",

@@ -13,6 +13,7 @@ from teleop_core.geometry import Array
 from teleop_core.robots.damped import factorise, solve
 
 _ITERATIONS = 100
+_ROUNDING = 1e-28  # squared relative error that more iterations cannot improve
 _LARGEST_TURN = 0.5  # rad, of one iteration
 
 
@@ -114,7 +115,7 @@ def settle(lengths: Array, b: float, a: float, theta: Array) -> float:
     gap, turn, trial = np.empty(3), np.empty(3), np.empty(3)
     G, H = np.empty((3, 3)), np.empty((3, 3))
     constraints(lengths, theta, b, a, gap, G, H)
-    scale = a * a * a * a
+    scale = (a * a + b * b) ** 2
     cost, damping = np.dot(gap, gap), 1e-3 * scale
     for _ in range(_ITERATIONS):
         if cost <= 1e-31 * scale or damping > 1e8 * scale:
@@ -125,6 +126,8 @@ def settle(lengths: Array, b: float, a: float, theta: Array) -> float:
         constraints(lengths, trial, b, a, gap, G, H)
         trial_cost = np.dot(gap, gap)
         if trial_cost >= cost:
+            if cost <= _ROUNDING * scale:
+                break
             constraints(lengths, theta, b, a, gap, G, H)
             damping = max(10.0 * damping, 1e-12 * scale)
             continue

@@ -151,7 +151,7 @@ class Layout:
         if self.is_architecturally_singular:
             gap = float(np.abs(self.legs(T) - wanted).max())
             return DirectResult(T, DirectStatus.ARCHITECTURALLY_SINGULAR, gap)
-        gap = direct(wanted, self.base, self.platform, self.size, T)
+        gap = direct(wanted, self.base, self.platform, self.size, False, T)
         if gap > CLOSED:
             return DirectResult(T, DirectStatus.CANNOT_ASSEMBLE, gap)
         values = self.singular_values(T)
@@ -196,7 +196,7 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     T[:] = np.eye(4)
     T[2, 3] = geometry[_Z0]
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
-    direct(q, base, platform, geometry[_SIZE], T)
+    direct(q, base, platform, geometry[_SIZE], False, T)
     if geometry[_SINGULAR] > 0.0:
         T[:3, :4] = math.nan
 
@@ -228,7 +228,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if geometry[_SINGULAR] > 0.0:
         # The legs of the pose, though they do not hold it; a pose next to it if they fell short.
         reached[:] = T
-        direct(q, base, platform, size, reached)
+        direct(q, base, platform, size, False, reached)
         pose_residual(reached, T, residual)
         return _NEAR_SINGULAR if is_there else _LIMITED
     fk(q, geometry, reached)

@@ -18,6 +18,7 @@ from teleop_core.robots.damped import factorise, solve
 # Legs count as closed within this error of length [m].
 CLOSED = 1e-11
 _ITERATIONS = 100
+_ROUNDING = 1e-26  # squared relative error that more iterations cannot improve
 _LARGEST_TURN = 0.5  # rad, of one iteration
 
 
@@ -85,6 +86,11 @@ def _damped_move(J: Array, gap: Array, damping: float, size: float, move: Array)
 
 
 @kernel
+def _largest(move: Array) -> float:
+    return float(np.abs(move).max())
+
+
+@kernel
 def _gaps(wanted: Array, lengths: Array, gap: Array) -> float:
     """Write what the legs lack (6,) [m]; the sum of squares."""
     square = 0.0
@@ -95,7 +101,9 @@ def _gaps(wanted: Array, lengths: Array, gap: Array) -> float:
 
 
 @kernel
-def direct(wanted: Array, base: Array, platform: Array, size: float, T: Array) -> float:
+def direct(
+    wanted: Array, base: Array, platform: Array, size: float, is_pinned: bool, T: Array
+) -> float:
     """Move T from where it is to the platform pose with these leg lengths.
 
     Damping shrinks with success, so that convergence ends quadratic; lengths that no pose near
@@ -106,6 +114,7 @@ def direct(wanted: Array, base: Array, platform: Array, size: float, T: Array) -
         base: Base joints (6, 3) [m].
         platform: Platform joints (6, 3) [m].
         size: Length [m] at which one metre weighs as one radian.
+        is_pinned: Whether the platform's origin stays where it is, so that T only turns.
         T: Start, and result (4, 4).
 
     Returns:
@@ -114,10 +123,11 @@ def direct(wanted: Array, base: Array, platform: Array, size: float, T: Array) -
     J, trial_J, trial = np.empty((6, 6)), np.empty((6, 6)), np.empty((4, 4))
     lengths, gap, move = np.empty(6), np.empty(6), np.empty(6)
     leg_system(T, base, platform, lengths, J)
-    cost, damping = _gaps(wanted, lengths, gap), 1e-4
+    cost, damping, pinned = _gaps(wanted, lengths, gap), 1e-4, 3 if is_pinned else 0
     for _ in range(_ITERATIONS):
-        if cost <= 1e-31 * size * size or damping > 1e8:
+        if cost <= 1e-29 * size * size or damping > 1e8:
             break
+        J[:, :pinned] = 0.0
         _damped_move(J, gap, damping, size, move)
         moved(T, move, trial)
         leg_system(trial, base, platform, lengths, trial_J)
@@ -125,6 +135,8 @@ def direct(wanted: Array, base: Array, platform: Array, size: float, T: Array) -
         for i in range(6):
             trial_cost += (wanted[i] - lengths[i]) ** 2
         if trial_cost >= cost:
+            if cost <= _ROUNDING * size * size or _largest(move) < 1e-13:
+                break
             damping = max(10.0 * damping, 1e-12)
             continue
         gained = cost - trial_cost

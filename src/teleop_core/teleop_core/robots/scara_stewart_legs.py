@@ -1,0 +1,174 @@
+"""Orientation of the hybrid's platform: its leg layout, and the turn that six legs stand for.
+
+Legs i = 1..6 stand at 60° (i - 1), base joints shifted by ∓sigma_b and platform joints by ±sigma_m
+(upper sign for odd i). The published layout has no shifts: two similar hexagons in line, which is
+architecturally singular. Its legs give the orientation only because the hybrid holds the
+platform's centre at (0, 0, w_z), and never whether a level platform has turned left or right.
+
+With the centre held, squared leg lengths are linear in the upper left block and the third row of
+R. The layout's symmetry splits the six equations into sums that are solved by hand.
+
+Source:
+    Kucuk and Gungor 2016, eqs. 17-25 (legs); the way back is derived from them.
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.compiled import kernel
+from teleop_core.geometry import Array
+from teleop_core.robots.stewart_legs import direct, leg_system
+
+# Sine of sigma_b + sigma_m under which the layout counts as similar hexagons.
+_SIMILAR = 1e-9
+# Sine of the largest tilt of the platform, 75°: its ball joints' assumed limit.
+TILT = math.sin(math.radians(75.0))
+
+
+@kernel
+def is_similar(sigma_b: float, sigma_m: float) -> bool:
+    """Whether base and platform joints are similar hexagons: architecturally singular."""
+    return abs(math.sin(sigma_b + sigma_m)) < _SIMILAR
+
+
+@kernel
+def layout(r_b: float, r_m: float, sigma_b: float, sigma_m: float, joints: Array) -> None:
+    """Write base joints and platform joints of the legs (2, 6, 3) [m]."""
+    for i in range(6):
+        sign = 1.0 if i % 2 == 0 else -1.0
+        b, m = math.pi / 3.0 * i - sign * sigma_b, math.pi / 3.0 * i + sign * sigma_m
+        joints[0, i, 0], joints[0, i, 1], joints[0, i, 2] = (
+            r_b * math.cos(b),
+            r_b * math.sin(b),
+            0.0,
+        )
+        joints[1, i, 0], joints[1, i, 1], joints[1, i, 2] = (
+            r_m * math.cos(m),
+            r_m * math.sin(m),
+            0.0,
+        )
+
+
+@kernel
+def turned_and_tilted(turn: float, x: float, y: float, T: Array) -> None:
+    """Write the rotation of T: Rz(turn) after the least tilt whose third row begins x, y."""
+    z = math.sqrt(max(1.0 - x * x - y * y, 0.0))
+    c, s = math.cos(turn), math.sin(turn)
+    t11, t12, t22 = 1.0 - x * x / (1.0 + z), -x * y / (1.0 + z), 1.0 - y * y / (1.0 + z)
+    T[0, 0], T[0, 1], T[0, 2] = c * t11 - s * t12, c * t12 - s * t22, -c * x + s * y
+    T[1, 0], T[1, 1], T[1, 2] = s * t11 + c * t12, s * t12 + c * t22, -s * x - c * y
+    T[2, 0], T[2, 1], T[2, 2] = x, y, z
+
+
+@kernel
+def wanted_platform(T: Array, heading: float, w_z: float, platform: Array) -> None:
+    """Write the platform pose in the Stewart base for T's attitude, tilted as far as it may be."""
+    c, s = math.cos(heading), math.sin(heading)
+    for j in range(3):
+        x, y = T[0, j], T[1, j]
+        platform[0, j], platform[1, j], platform[2, j] = c * x + s * y, c * y - s * x, T[2, j]
+        platform[j, 3] = platform[3, j] = 0.0
+    platform[2, 3], platform[3, 3] = w_z, 1.0
+    x, y = T[2, 0], T[2, 1]
+    sine = math.hypot(x, y)
+    if T[2, 2] > 0.0 and sine <= TILT:
+        return
+    turn = math.atan2(platform[1, 0] - platform[0, 1], platform[0, 0] + platform[1, 1])
+    if sine < 1e-9:  # upside down, every direction is as near
+        x, y, sine = 1.0, 0.0, 1.0
+    turned_and_tilted(turn, TILT / sine * x, TILT / sine * y, platform)
+
+
+@kernel
+def _turn_of_hexagons(cosine: float, z1: complex, tilt: complex, up: float) -> float:
+    """Turn of a platform of similar hexagons, from its cosine and from where the tilt shows.
+
+    z1 = -e^(i turn) tilt² / (2 (1 + up)) tells the sign, and the sine where it is small beside
+    the square of the tilt. On a level platform the sign is not there: plus is taken.
+    """
+    square = tilt.real * tilt.real + tilt.imag * tilt.imag
+    seen = (-2.0 * (1.0 + up) * z1 * (tilt * tilt).conjugate()).imag
+    sine = math.sqrt(max(1.0 - cosine * cosine, 0.0))
+    if sine >= square:
+        return math.atan2(math.copysign(sine, seen), cosine)
+    most = max(2.0 * sine, square)
+    return math.atan2(min(max(seen / (square * square), -most), most), cosine)
+
+
+@kernel
+def _sums(legs: Array, constant: float, sums: Array) -> None:
+    """Write mean and first harmonic of squared legs less ``constant``, odd and even: (2, 2)."""
+    for half in range(2):
+        sums[half, 0] = sums[half, 1] = 0.0
+        for i in range(half, 6, 2):
+            value = (legs[i] * legs[i] - constant) / 3.0
+            angle = math.pi / 3.0 * i
+            sums[half, 0] += value
+            sums[half, 1] += value * complex(math.cos(angle), math.sin(angle))
+
+
+@kernel
+def orientation(legs: Array, g: Array, T: Array) -> None:
+    """Write the platform pose that legs (6,) [m] stand for when its centre is at (0, 0, w_z).
+
+    Args:
+        legs: Leg lengths (6,) [m]; of legs that contradict each other a turn close to them.
+        g: r_b, r_m, w_z [m], sigma_b, sigma_m [rad].
+        T: Platform in the Stewart base (4, 4); its z points up.
+    """
+    r_b, r_m, w_z, sigma_b, sigma_m = g[0], g[1], g[2], g[3], g[4]
+    sums = np.empty((2, 2), np.complex128)
+    _sums(legs, w_z * w_z + r_b * r_b + r_m * r_m, sums)
+    odd, even, K = sums[0], sums[1], r_b * r_m
+    shift = sigma_m - sigma_b
+    e_shift = complex(math.cos(shift), math.sin(shift))
+    e_joint = complex(math.cos(sigma_m), math.sin(sigma_m))
+    share = 0.5 / math.cos(shift + sigma_m)
+    tilt = (odd[1] * e_shift.conjugate() + even[1] * e_shift) * share / (w_z * r_m)
+    z1 = ((even[1] * e_joint.conjugate() - odd[1] * e_joint) * share / K).conjugate()
+    length = abs(tilt)
+    if length > 0.9999:
+        tilt *= 0.9999 / length
+    up = math.sqrt(1.0 - tilt.real**2 - tilt.imag**2)
+    cosine = -(odd[0] + even[0]).real / (2.0 * K * math.cos(sigma_b + sigma_m) * (1.0 + up))
+    if is_similar(sigma_b, sigma_m):
+        turn = _turn_of_hexagons(cosine, z1, tilt, up)
+    else:
+        sine = (odd[0] - even[0]).real / (2.0 * K * math.sin(sigma_b + sigma_m) * (1.0 + up))
+        turn = math.atan2(sine, cosine)
+    turned_and_tilted(turn, tilt.real, tilt.imag, T)
+    T[0, 3] = T[1, 3] = T[3, 0] = T[3, 1] = T[3, 2] = 0.0
+    T[2, 3], T[3, 3] = w_z, 1.0
+
+
+@kernel
+def platform_pose(legs: Array, g: Array, T: Array) -> None:
+    """Write the platform pose (4, 4) in the Stewart base that six legs hold best.
+
+    Similar hexagons: the turn of least squared leg errors about the held centre. Other layouts:
+    the pose with all six freedoms, found from the one with the centre held.
+    """
+    joints = np.empty((2, 6, 3))
+    layout(g[0], g[1], g[3], g[4], joints)
+    orientation(legs, g, T)
+    direct(legs, joints[0], joints[1], g[1], is_similar(g[3], g[4]), T)
+
+
+@kernel
+def leg_lengths(T: Array, g: Array, legs: Array, J: Array) -> None:
+    """Write leg lengths (6,) [m] and leg Jacobian (6, 6) of a platform pose (4, 4)."""
+    joints = np.empty((2, 6, 3))
+    layout(g[0], g[1], g[3], g[4], joints)
+    leg_system(T, joints[0], joints[1], legs, J)
+
+
+@kernel
+def is_blind(T: Array, J: Array, g: Array) -> bool:
+    """Whether the legs hardly tell the platform's turn about the vertical."""
+    square = T[2, 0] ** 2 + T[2, 1] ** 2
+    turning = 0.0
+    for i in range(6):
+        turning += J[i, 5] * J[i, 5]
+    is_level = is_similar(g[3], g[4]) and square < 1e-4
+    return bool(is_level or math.sqrt(turning / 6.0) < 0.02 * g[1])

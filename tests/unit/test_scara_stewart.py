@@ -1,0 +1,351 @@
+"""SCARA + Stewart hybrid: the published example, both elbows and headings, paths, way back."""
+
+import math
+
+import numpy as np
+import pytest
+
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.geometry import rotation, rotation_angle_between, transform
+from teleop_core.robots import IkStatus, list_robots, load_robot
+from teleop_core.robots.stewart import Layout
+
+# The source prints centimetres with four decimals; its inputs are rounded likewise, and near the
+# stretched arm that becomes 2e-4 degrees.
+PRINTED_M, PRINTED_DEG = 1e-6, 2e-4
+# Leg errors of rounding, over the square of the tilt by which similar hexagons see a turn.
+SOLVED = 1e-9
+PAIRS = {"sigma_b": math.radians(15.0), "sigma_m": math.radians(15.0)}
+ROBOTS = [{}, {"heading": "carried"}, PAIRS, {**PAIRS, "heading": "carried"}]
+
+
+def attitude(alpha, beta, gamma):
+    """The source's product Rx Ry Rz, angles in degrees."""
+    a, b, c = np.radians([alpha, beta, gamma])
+    return rotation("x", a) @ rotation("y", b) @ rotation("z", c)
+
+
+def poses(rng, count, tilt=40.0):
+    """Poses with the SCARA inside its ring, platform turned up to ``tilt`` about each axis."""
+    for _ in range(count):
+        R = attitude(*rng.uniform(-tilt, tilt, 3))
+        radius, angle = rng.uniform(0.1, 0.95), rng.uniform(-1.5, 1.5)
+        s = np.array([radius * math.cos(angle), radius * math.sin(angle), rng.uniform(0.05, 0.45)])
+        yield transform(R, s + [0.0, 0.0, 0.2] + 0.1 * R[:, 2])
+
+
+EXAMPLE = transform(attitude(30.0, 0.0, 0.0), np.array([0.933013, 0.20, 0.436603]))
+EXAMPLE_LEGS = [0.223607, 0.267095, 0.267095, 0.223607, 0.191569, 0.191569]
+
+
+def assert_path_is_followed_within_the_drives(robot, path, seed, dt=1e-3):
+    result = robot.follow(path, seed=seed, dt=dt)
+    steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
+    assert (steps <= robot.drives.speed_limit * dt * (1.0 + 1e-9)).all()
+    assert (result.q >= robot.lower).all()
+    assert (result.q <= robot.upper).all()
+    assert np.isfinite(result.residual).all()
+    return result
+
+
+def test_published_example_has_the_published_legs_and_joints():
+    q = load_robot("scara_stewart").ik_all(EXAMPLE)[0]
+    assert np.allclose(q[3:], EXAMPLE_LEGS, atol=PRINTED_M)
+    assert np.allclose(np.degrees(q[:2]), [0.0, 30.0], atol=PRINTED_DEG)
+    assert math.isclose(q[2], 0.15, abs_tol=PRINTED_M)
+
+
+def test_the_other_elbow_of_the_published_example():
+    q = load_robot("scara_stewart").ik_all(EXAMPLE)
+    assert len(q) == 2
+    assert np.allclose(np.degrees(q[1, :2]), [30.0, -30.0], atol=PRINTED_DEG)
+    assert np.allclose(q[1, 2:], q[0, 2:], atol=1e-15)
+
+
+def test_forward_kinematics_of_the_published_joints_is_the_published_tip():
+    robot = load_robot("scara_stewart")
+    legs = robot.ik_all(EXAMPLE)[0, 3:]
+    T = robot.fk([0.0, math.radians(30.0), 0.15, *legs])
+    assert np.allclose(T[:3, 3], [0.933013, 0.20, 0.436603], atol=PRINTED_M)
+    assert np.allclose(T[:3, :3], attitude(30.0, 0.0, 0.0), atol=SOLVED)
+
+
+def test_tool_offset_uses_the_printed_product_and_not_the_printed_name():
+    robot = load_robot("scara_stewart", l1=0.5, l2=0.5)
+    R = attitude(10.0, 20.0, -15.0)
+    T = transform(R, np.array([0.8, 0.0, 0.5]))
+    q = robot.ik_all(T)[0]
+    s = [
+        0.5 * (math.cos(q[0]) + math.cos(q[0] + q[1])),
+        0.5 * (math.sin(q[0]) + math.sin(q[0] + q[1])),
+        q[2] + 0.2,
+    ]
+    assert np.allclose(T[:3, 3] - s, [0.03420201, -0.01631759, 0.09254166], atol=1e-8)
+    fixed_axes = rotation("z", math.radians(-15.0)) @ rotation("y", math.radians(20.0))
+    fixed_axes = fixed_axes @ rotation("x", math.radians(10.0))
+    assert np.allclose(0.1 * fixed_axes[:, 2], [0.02804036, -0.02549077, 0.09254166], atol=1e-8)
+
+
+def test_tool_offset_and_scara_tip_of_the_published_example():
+    # K2 and K3: P_STWR and what is left to the SCARA.
+    offset = np.array([0.0, 0.0, 0.2]) + 0.1 * EXAMPLE[:3, 2]
+    assert np.allclose(offset, [0.0, -0.05, 0.286603], atol=PRINTED_M)
+    assert np.allclose(EXAMPLE[:3, 3] - offset, [0.933013, 0.25, 0.15], atol=PRINTED_M)
+
+
+def test_level_platform_has_equal_legs():
+    q = load_robot("scara_stewart").ik_all(transform(np.eye(3), np.array([0.7, 0.0, 0.5])))[0]
+    assert np.allclose(q[3:], 0.2236068, atol=5e-8)
+
+
+def test_legs_numbered_from_sixty_degrees_would_not_be_the_published_ones():
+    angles = np.radians([60.0, 120.0, 180.0, 240.0, 300.0, 360.0])
+    layout = Layout.circular(0.2, angles, 0.1, angles)
+    legs = layout.legs(transform(attitude(30.0, 0.0, 0.0), np.array([0.0, 0.0, 0.2])))
+    assert np.allclose(legs, [0.2671, 0.2671, 0.2236, 0.1916, 0.1916, 0.2236], atol=5e-5)
+
+
+def test_rejected_sign_of_equation_fifteen_ends_elsewhere():
+    robot = load_robot("scara_stewart")
+    q = robot.ik_all(EXAMPLE)[0]
+    q[0] = math.radians(-150.0)
+    tip = robot.fk(q)[:3, 3] - EXAMPLE[:3, 3] + [0.933013, 0.25, 0.15]
+    assert np.allclose(tip[:2], [-0.6830, -0.6830], atol=5e-5)
+
+
+def test_universal_joints_at_both_ends_would_lock_the_platform():
+    assert 6 * (14 - 18 - 1) + 6 * (2 + 1 + 2) == 0
+    assert 6 * (14 - 18 - 1) + 6 * (2 + 1 + 3) == 6
+
+
+def test_base_bolted_to_link_two_moves_the_published_tip():
+    carried = load_robot("scara_stewart", heading="carried")
+    legs = load_robot("scara_stewart").ik_all(EXAMPLE)[0, 3:]
+    T = carried.fk([0.0, math.radians(30.0), 0.15, *legs])
+    assert np.allclose(T[:3, 3], [0.95801270, 0.20669873, 0.43660254], atol=PRINTED_M)
+
+
+@pytest.mark.parametrize("options", ROBOTS)
+def test_forward_of_inverse_is_the_pose_for_both_elbows(options):
+    robot, rng = load_robot("scara_stewart", **options), np.random.default_rng(1)
+    for T in poses(rng, 500):
+        solutions = robot.ik_all(T)
+        assert len(solutions) == 2
+        for q in solutions:
+            assert np.allclose(robot.fk(q), T, atol=SOLVED)
+
+
+@pytest.mark.parametrize("options", ROBOTS)
+def test_inverse_takes_the_elbow_next_to_the_seed(options):
+    robot, rng = load_robot("scara_stewart", **options), np.random.default_rng(2)
+    found = 0
+    for T in poses(rng, 200, tilt=20.0):
+        for q in robot.ik_all(T):
+            if (q < robot.lower).any() or (q > robot.upper).any():
+                continue
+            result = robot.ik(T, seed=np.clip(q + 0.02, robot.lower, robot.upper))
+            assert result.status in {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
+            assert np.allclose(result.q, q, atol=SOLVED)
+            found += 1
+    assert found > 250
+
+
+def test_a_general_scara_with_unequal_links_and_a_raised_base():
+    robot = load_robot("scara_stewart", l1=0.6, l2=0.35, h1=0.1)
+    rng = np.random.default_rng(3)
+    for theta2 in (0.5, 2.5, -0.5, -2.5):  # where l1 + l2 cos(theta2) is of both signs, l1 < l2 too
+        legs = robot.ik_all(next(poses(rng, 1)) @ np.eye(4))
+        q = np.array([0.4, theta2, 0.2, *(legs[0, 3:] if len(legs) else robot.home[3:])])
+        T = robot.fk(q)
+        assert np.abs(robot.ik_all(T) - q).max(axis=1).min() < 1e-7
+    swapped = load_robot("scara_stewart", l1=0.35, l2=0.6)
+    q = np.array([0.4, 2.5, 0.2, *robot.home[3:]])
+    assert np.abs(swapped.ik_all(swapped.fk(q)) - q).max(axis=1).min() < SOLVED
+
+
+@pytest.mark.parametrize("options", ROBOTS)
+def test_jacobian_is_the_finite_difference_where_all_legs_count(options):
+    robot, rng, step = load_robot("scara_stewart", **options), np.random.default_rng(4), 1e-6
+    T0 = robot.fk(robot.home)
+    for _ in range(5):
+        wanted = T0.copy()
+        wanted[:3, :3] = T0[:3, :3] @ attitude(*rng.uniform(-10.0, 10.0, 3))
+        wanted[:3, 3] += rng.uniform(-0.1, 0.1, 3)
+        q = robot.ik(wanted).q
+        J, T = robot.jacobian(q), robot.fk(q)
+        for joint in range(9):
+            change = step * np.eye(9)[joint]
+            slope = (robot.fk(q + change) - robot.fk(q - change)) / (2.0 * step)
+            spin = slope[:3, :3] @ T[:3, :3].T
+            numeric = [*slope[:3, 3], spin[2, 1], spin[0, 2], spin[1, 0]]
+            # Legs that contradict each other by a step bend the turn by its square over tilt⁴.
+            assert np.allclose(J[:, joint], numeric, atol=1e-4, rtol=1e-5)
+
+
+def test_out_of_the_ring_is_unreachable_and_finite():
+    robot = load_robot("scara_stewart")
+    R = attitude(20.0, 0.0, 0.0)
+    T = transform(R, np.array([1.3, 0.0, 0.4]) + 0.1 * R[:, 2])
+    result = robot.ik(T)
+    assert result.status == IkStatus.UNREACHABLE
+    assert np.isfinite(result.q).all()
+    assert math.isclose(result.residual[0], 0.3, abs_tol=1e-6)
+    assert result.residual[1] < SOLVED  # the legs still turn the tool as wanted
+    assert robot.ik_all(T).shape == (0, 9)
+    uneven = load_robot("scara_stewart", l1=0.6, l2=0.3)
+    inside = transform(R, np.array([0.1, 0.0, 0.4]) + 0.1 * R[:, 2])
+    assert uneven.ik(inside).status == IkStatus.UNREACHABLE
+
+
+def test_a_platform_tilted_too_far_is_limited_to_the_nearest_tilt():
+    robot = load_robot("scara_stewart")
+    for alpha, missing in ((100.0, 25.0), (170.0, 95.0)):
+        R = attitude(alpha, 0.0, 0.0)
+        T = transform(R, np.array([0.6, 0.0, 0.45]) + 0.1 * R[:, 2])
+        result = robot.ik(T)
+        assert result.status == IkStatus.LIMITED
+        angle = rotation_angle_between(np.ascontiguousarray(robot.fk(result.q)[:3, :3]), R)
+        assert math.isclose(math.degrees(angle), missing, abs_tol=1e-6)
+
+
+def test_a_platform_upside_down_is_limited_and_finite():
+    robot = load_robot("scara_stewart")
+    for R in (attitude(180.0, 0.0, 0.0), attitude(180.0, 0.0, 40.0)):
+        result = robot.ik(transform(R, np.array([0.6, 0.0, 0.3])))
+        assert result.status == IkStatus.LIMITED
+        assert np.isfinite(result.residual).all()
+        assert robot.fk(result.q)[2, 2] < 0.3
+
+
+def test_similar_hexagons_hide_the_turn_of_a_level_platform_and_say_so():
+    robot = load_robot("scara_stewart")
+    left, right = (
+        transform(rotation("z", angle), np.array([0.6, 0.0, 0.5])) for angle in (0.3, -0.3)
+    )
+    results = robot.ik(left), robot.ik(right)
+    assert np.allclose(results[0].q, results[1].q, atol=1e-15)
+    assert results[0].status == results[1].status == IkStatus.NEAR_SINGULAR
+    # Legs in pairs tell the two apart.
+    paired = load_robot("scara_stewart", **PAIRS)
+    for T in (left, right):
+        result = paired.ik(T)
+        assert result.status == IkStatus.FOLLOWED
+        assert np.allclose(paired.fk(result.q), T, atol=SOLVED)
+
+
+def test_the_turn_of_the_published_layout_is_known_as_the_square_of_the_tilt():
+    robot = load_robot("scara_stewart")
+    error = 1e-7  # of one leg [m]
+    for alpha in (1.0, 5.0, 30.0):
+        R = attitude(alpha, 0.0, 0.0)
+        q = robot.ik_all(transform(R, np.array([0.6, 0.0, 0.45])))[0]
+        q[4] += error
+        T = robot.fk(q)
+        lost = rotation_angle_between(np.ascontiguousarray(T[:3, :3]), R)
+        assert lost < 100.0 * error / math.radians(alpha) ** 2
+        assert np.isfinite(robot.jacobian(q)).all()
+
+
+def test_in_pairs_the_platform_shifts_with_a_leg_and_in_line_its_centre_is_held():
+    q = load_robot("scara_stewart").home.copy()
+    q[3:] += 1e-3
+    held = load_robot("scara_stewart").fk(q)
+    s = held[:3, 3] - 0.1 * held[:3, 2]
+    assert math.isclose(s[2], 0.25 + 0.2, abs_tol=1e-12)
+    paired = load_robot("scara_stewart", **PAIRS)
+    q = paired.home.copy()
+    q[3:] += 1e-3
+    T = paired.fk(q)
+    assert T[2, 3] - 0.1 * T[2, 2] > 0.45 + 5e-4
+
+
+@pytest.mark.parametrize("heading", ["fixed", "carried"])
+@pytest.mark.parametrize("beside", [0.0, 1e-6, -1e-6, 0.02, -0.02])
+def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(heading, beside):
+    robot = load_robot("scara_stewart", heading=heading)
+    R = attitude(30.0, 0.0, 0.0)
+    x = np.concatenate((np.linspace(0.4, -0.4, 4000), np.full(4000, -0.4)))
+    path = np.array([transform(R, np.array([value, beside, 0.4]) + 0.1 * R[:, 2]) for value in x])
+    start = robot.ik(path[0], seed=robot.home).q
+    result = assert_path_is_followed_within_the_drives(robot, path, start)
+    # Passing slowly on one side turns joint 1 into its end stop; there it waits.
+    is_stopped = math.isclose(abs(result.q[-1, 0]), robot.upper[0])
+    assert is_stopped == (beside == -0.02)
+    assert is_stopped or result.residual[-1, 0] < SOLVED
+
+
+@pytest.mark.parametrize("heading", ["fixed", "carried"])
+@pytest.mark.parametrize("reach", [0.9999, 1.0, 1.05])
+def test_a_path_to_the_stretched_arm_and_back_keeps_its_elbow(heading, reach):
+    robot = load_robot("scara_stewart", heading=heading)
+    R = attitude(0.0, 25.0, 0.0)
+    x = 0.8 + (reach - 0.8) * np.sin(np.linspace(0.0, math.pi, 6000))
+    way = np.array([math.cos(0.1), math.sin(0.1), 0.0])
+    up = np.array([0.0, 0.0, 0.4])
+    path = np.array([transform(R, value * way + up + 0.1 * R[:, 2]) for value in x])
+    for elbow in range(2):
+        start = robot.ik_all(path[0])[elbow]
+        result = assert_path_is_followed_within_the_drives(robot, path, start)
+        assert result.residual[-1].max() < SOLVED
+        assert np.allclose(result.q[-1], start, atol=1e-6)
+    assert (result.status == IkStatus.UNREACHABLE).any() == (reach > 1.0)
+
+
+@pytest.mark.parametrize("options", ROBOTS)
+def test_a_path_through_the_level_platform_goes_on(options):
+    robot = load_robot("scara_stewart", **options)
+    angles = np.linspace(30.0, -30.0, 3000)
+    path = np.array(
+        [
+            transform(R, np.array([0.7, 0.0, 0.4]) + 0.1 * R[:, 2])
+            for R in (attitude(angle, 0.1 * angle, 5.0) for angle in angles)
+        ]
+    )
+    start = robot.ik(path[0], seed=robot.home).q
+    result = assert_path_is_followed_within_the_drives(robot, path, start)
+    assert result.residual.max() < SOLVED
+    # The joints draw one smooth curve: neighbouring steps differ by little.
+    assert np.abs(np.diff(result.q, n=2, axis=0)).max() < 1e-5
+
+
+def test_legs_that_are_held_back_slow_down_together():
+    robot = load_robot("scara_stewart")
+    start = robot.home
+    T = robot.fk(start)
+    T[:3, :3] = T[:3, :3] @ attitude(-20.0, 10.0, 0.0)
+    result = robot.follow(T[None], seed=start, dt=1e-3)
+    wanted = robot.ik(T, seed=start).q - start
+    moved = result.q[0] - start
+    assert result.status[0] == IkStatus.LIMITED
+    assert math.isclose(np.abs(moved[3:]).max(), robot.drives.speed_limit[3] * 1e-3)
+    assert np.allclose(moved[3:] / wanted[3:], moved[3] / wanted[3])
+
+
+def test_it_is_a_slave_with_nine_actuators_and_a_home_it_can_hold():
+    robot = load_robot("scara_stewart")
+    assert "scara_stewart" in list_robots()
+    assert robot.n == 9
+    assert robot.drives is not None
+    assert robot.dynamics is not None
+    assert all(np.shape(table) == (9,) for table in vars(robot.drives).values())
+    for options in ROBOTS:
+        arm = load_robot("scara_stewart", **options)
+        result = arm.ik(arm.fk(arm.home), seed=arm.home)
+        assert result.status == IkStatus.FOLLOWED
+        assert np.allclose(result.q, arm.home, atol=SOLVED)
+
+
+def test_bad_options_and_lengths_are_refused():
+    with pytest.raises(UnknownNameError) as refusal:
+        load_robot("scara_stewart", heading="floating")
+    assert refusal.value.alternatives == ("fixed", "carried")
+    with pytest.raises(UnknownNameError):
+        load_robot("scara_stewart", r_s=0.1)
+    for symbol in ("l1", "r_b", "w_z"):
+        with pytest.raises(ParameterError) as refusal:
+            load_robot("scara_stewart", **{symbol: 0.0})
+        assert refusal.value.name == symbol
+    with pytest.raises(ParameterError):
+        load_robot("scara_stewart", sigma_b=1.0)
+    with pytest.raises(ParameterError):
+        load_robot("scara_stewart").ik(np.full((4, 4), math.nan))
