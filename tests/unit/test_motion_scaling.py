@@ -1,0 +1,386 @@
+"""Motion scaling: published frame mapping and gain ratchet, clutch, modes, box and force."""
+
+import math
+
+import numpy as np
+import pytest
+
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import (
+    pose_from_transform,
+    quaternion_from_rotation,
+    rotation,
+    rotation_from_quaternion,
+    transform,
+)
+from teleop_core.mapping.motion_scaling import (
+    FixtureParameters,
+    MotionScaling,
+    MotionScalingParameters,
+    mapped_orientation,
+    to_slave_axes,
+)
+from teleop_core.master.haptic_master import REST_POSITION, REST_TILT
+from teleop_core.robots import load_robot
+from teleop_core.signals import STATE, TICK_NS
+
+DEGREE, MM = math.pi / 180.0, 1e-3
+# Sums and products of a few numbers of size one.
+ROUNDING = 1e-14
+# Box centres are reported to a nanometre.
+NANOMETRE = 1e-9
+HOME = load_robot("rcrt1").fk(load_robot("rcrt1").home)
+
+
+class Desk:
+    """Motion scaling with a hand to move and a slave that stands where it was told to."""
+
+    def __init__(self, **values):
+        self.scaling = MotionScaling(MotionScalingParameters(**values))
+        self.row = self.scaling.signals
+        self.hand, self.turn = np.array(REST_POSITION), np.eye(3)
+        self.pressed = np.zeros(3)
+        self.row["stamp_ns"] = self.row["setpoint_stamp_ns"] = TICK_NS
+        pose_from_transform(HOME, self.row["slave_setpoint_cp"])
+
+    def step(self, move=(0, 0, 0), turn=None, *, stamp_step_ns=TICK_NS, does_follow=True):
+        """One sample after the hand's step [m]; returns the slave command's place."""
+        row, self.hand = self.row, self.hand + np.asarray(move, dtype=float)
+        self.turn = self.turn if turn is None else turn @ self.turn
+        row["stamp_ns"] += stamp_step_ns
+        pose_from_transform(transform(self.turn, self.hand), row["master_measured_cp"])
+        row["master_buttons"] = self.pressed
+        self.scaling.step()
+        if does_follow:
+            row["slave_setpoint_cp"] = row["slave_servo_cp"]
+            row["setpoint_stamp_ns"] = row["stamp_ns"]
+        return row["slave_servo_cp"][:3].copy()
+
+    def press(self, button):
+        """Sample with a button pressed, then one with it released; the hand rests."""
+        index = ("clutch", "fixture", "mode").index(button)
+        self.pressed[index] = 1.0
+        self.step()
+        self.pressed[index] = 0.0
+        return self.step()
+
+    def hold(self, button, is_held=True):
+        self.pressed[("clutch", "fixture", "mode").index(button)] = float(is_held)
+
+    def attitude(self):
+        out = np.empty((3, 3))
+        rotation_from_quaternion(np.ascontiguousarray(self.row["slave_servo_cp"][3:]), out)
+        return out
+
+    def state(self, name):
+        return self.row["teleop_state"][STATE[name]]
+
+    def box(self):
+        start, size = STATE["fixture_center_x"], STATE["fixture_size_x"]
+        state = self.row["teleop_state"]
+        return state[start : start + 3].copy(), state[size : size + 3].copy()
+
+
+def mapped(stylus, tool_roll):
+    scaling = MotionScaling(MotionScalingParameters(tool_roll=tool_roll))
+    quaternion, tool, out = np.empty(4), np.empty(4), np.empty((3, 3))
+    quaternion_from_rotation(np.ascontiguousarray(stylus), quaternion)
+    mapped_orientation(scaling.parameters, quaternion, tool)
+    rotation_from_quaternion(tool, out)
+    return out
+
+
+def test_identity_stylus_maps_to_the_published_rotation():  # case 17
+    published = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
+    assert np.allclose(mapped(np.eye(3), 0.0), published, rtol=0, atol=ROUNDING)
+
+
+def test_place_maps_to_the_published_axes():  # case 17
+    out = np.empty(3)
+    to_slave_axes(np.array([1.0, 2.0, 3.0]), out)
+    assert np.array_equal(out, (-3.0, -1.0, 2.0))
+
+
+def test_every_stylus_attitude_maps_to_the_published_product():  # case 17
+    rng = np.random.default_rng(2)
+    base = np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]])
+    for angles in rng.uniform(-3.0, 3.0, (50, 3)):
+        stylus = rotation("z", angles[0]) @ rotation("y", angles[1]) @ rotation("x", angles[2])
+        expected = base @ stylus @ np.diag([1, -1, -1])
+        assert np.allclose(mapped(stylus, 0.0), expected, rtol=0, atol=1e-13)
+
+
+def test_stylus_in_the_inkwell_points_the_tool_as_at_home():  # case 18
+    tool = mapped(rotation("x", -23.4 * DEGREE), math.pi / 2)
+    assert np.allclose(tool, HOME[:3, :3], rtol=0, atol=ROUNDING)
+    out = np.empty(3)
+    to_slave_axes(np.array([0.0, -194.414, -416.901]), out)
+    assert np.allclose(out, (416.901, 0.0, -194.414), rtol=0, atol=ROUNDING)
+
+
+def test_without_the_tool_roll_the_tool_is_turned_by_a_right_angle_at_home():  # case 18
+    tool = mapped(rotation("x", -23.4 * DEGREE), 0.0)
+    between = HOME[:3, :3].T @ tool
+    assert np.allclose(between, rotation("z", -math.pi / 2), rtol=0, atol=ROUNDING)
+
+
+def test_other_sign_of_the_inkwell_tilt_points_the_tool_elsewhere():  # case 18
+    approach = mapped(rotation("x", 23.4 * DEGREE), math.pi / 2)[:, 2]
+    assert math.isclose(math.acos(approach[2]) / DEGREE, 66.6, abs_tol=1e-9)
+
+
+def test_home_offset_is_the_published_one_and_its_corrected_form():  # case 19
+    inkwell = np.array(REST_POSITION) / MM
+    printed_home = np.array([0.0, -194.414, -416.901])
+    assert np.allclose(printed_home - inkwell, (0.0, -128.903, -328.787), rtol=0, atol=1e-9)
+    # The same with the home of the joint table: x_P = -y_S, y_P = z_S, z_P = -x_S.
+    x, y, z = HOME[:3, 3] / MM
+    assert np.allclose(np.array([-y, z, -x]) - inkwell, (0, -116.383, -332.218), atol=5e-4)
+
+
+def test_first_command_is_the_home_of_the_slave_and_moves_nothing():
+    desk = Desk()
+    desk.turn = rotation("x", REST_TILT)
+    assert np.array_equal(desk.step(), HOME[:3, 3])
+    assert np.allclose(desk.attitude(), HOME[:3, :3], rtol=0, atol=ROUNDING)
+    # Already aligned: the stylus is followed absolutely from the start.
+    desk.step(turn=rotation("y", 0.3))
+    assert np.allclose(desk.attitude(), mapped(desk.turn, math.pi / 2), rtol=0, atol=ROUNDING)
+
+
+def test_gains_ratchet_the_slave_as_published():  # case 20
+    desk = Desk()
+    start = desk.step()
+    desk.step((10 * MM, 0, 0))
+    between = desk.press("mode")
+    assert np.allclose(between - start, (0, -10 * MM, 0), rtol=0, atol=ROUNDING)
+    desk.step((10 * MM, 0, 0))
+    desk.press("mode")
+    end = desk.step((-10 * MM, 0, 0))
+    assert np.allclose(end - start, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("gain", [0.001, 0.3, 1.0, 10.0])
+def test_gain_scales_the_motion_of_the_hand(gain):
+    desk = Desk(coarse_gain=gain, fine_gain=0.001)
+    start = desk.step()
+    end = desk.step((1 * MM, 2 * MM, 3 * MM))
+    assert np.allclose(end - start, gain * np.array([-3, -1, 2]) * MM, rtol=0, atol=ROUNDING)
+
+
+def test_change_of_gain_at_run_time_moves_nothing():
+    desk = Desk()
+    desk.step()
+    before = desk.step((5 * MM, 0, 0))
+    desk.scaling.retune(MotionScalingParameters(coarse_gain=3.0, fine_gain=0.2))
+    assert np.array_equal(desk.step(), before)
+    assert np.allclose(desk.step((MM, 0, 0)) - before, (0, -3 * MM, 0), rtol=0, atol=ROUNDING)
+
+
+def test_mode_parameter_switches_the_mode_at_run_time():
+    desk = Desk()
+    desk.step()
+    desk.scaling.retune(MotionScalingParameters(mode="fine"))
+    desk.step()
+    assert (desk.state("is_fine"), desk.state("gain")) == (1.0, 0.1)
+
+
+def test_retuning_something_else_leaves_the_mode_of_the_button():
+    desk = Desk()
+    desk.step()
+    desk.press("mode")
+    desk.scaling.retune(MotionScalingParameters(coarse_gain=2.0))
+    desk.step()
+    assert desk.state("is_fine") == 1.0
+
+
+def test_clutched_hand_moves_nothing_and_motion_goes_on_from_there():
+    desk = Desk()
+    desk.step()
+    before = desk.step((4 * MM, 0, 0))
+    desk.hold("clutch")
+    for _ in range(10):
+        assert np.array_equal(desk.step((-2 * MM, 1 * MM, 0), rotation("y", 0.05)), before)
+    assert desk.state("is_clutched") == 1.0
+    desk.hold("clutch", is_held=False)
+    assert np.array_equal(desk.step((-2 * MM, 0, 0)), before)
+    after = desk.step((1 * MM, 0, 0))
+    assert np.allclose(after - before, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)
+
+
+def test_clutched_turning_moves_nothing_and_turning_goes_on_from_there():
+    desk = Desk()
+    desk.step()
+    desk.step(turn=rotation("x", 0.2))
+    before = desk.attitude()
+    desk.hold("clutch")
+    desk.step(turn=rotation("z", 0.7))
+    desk.hold("clutch", is_held=False)
+    desk.step(turn=rotation("y", -0.1))
+    assert np.array_equal(desk.attitude(), before)
+    # A further turn in the stylus' own frame is one in the tool's own frame.
+    desk.step(turn=desk.turn @ rotation("x", 0.3) @ desk.turn.T)
+    stylus_tool = np.diag([1, -1, -1]) @ rotation("z", math.pi / 2)
+    expected = before @ stylus_tool.T @ rotation("x", 0.3) @ stylus_tool
+    assert np.allclose(desk.attitude(), expected, rtol=0, atol=1e-13)
+
+
+def test_clutching_without_turning_keeps_the_attitude_absolute():
+    desk = Desk()
+    desk.turn = rotation("x", REST_TILT)
+    desk.step()
+    desk.hold("clutch")
+    desk.step((3 * MM, 0, 0), rotation("z", 0.4))
+    desk.step((3 * MM, 0, 0), rotation("z", -0.4))
+    desk.hold("clutch", is_held=False)
+    desk.step()
+    desk.step(turn=rotation("y", 0.3))
+    assert np.allclose(desk.attitude(), mapped(desk.turn, math.pi / 2), rtol=0, atol=1e-13)
+
+
+def test_slave_that_does_not_follow_holds_the_command_at_its_setpoint():
+    desk = Desk()
+    desk.step()
+    desk.step((5 * MM, 0, 0), does_follow=False)
+    stuck = desk.row["slave_setpoint_cp"].copy()
+    for _ in range(200):
+        command = desk.step((0.1 * MM, 0, 0), does_follow=False)
+    assert desk.state("is_following") == 0.0
+    assert np.array_equal(command, stuck[:3])
+    assert np.array_equal(desk.step(), stuck[:3])
+
+
+def test_hand_that_comes_back_after_a_pause_starts_from_where_the_slave_is():
+    desk = Desk()
+    desk.step()
+    before = desk.step((5 * MM, 0, 0))
+    after = desk.step((40 * MM, 0, 0), rotation("z", 0.5), stamp_step_ns=200_000_000)
+    assert np.array_equal(after, before)
+    moved = desk.step((1 * MM, 0, 0))
+    assert np.allclose(moved - before, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)
+
+
+def test_pause_within_the_timeout_is_bridged():
+    desk = Desk()
+    desk.step()
+    before = desk.step()
+    after = desk.step((5 * MM, 0, 0), stamp_step_ns=100_000_000)
+    assert np.allclose(after - before, (0, -5 * MM, 0), rtol=0, atol=ROUNDING)
+
+
+def test_reset_starts_again_at_the_setpoint_with_the_box_off_and_the_mode_of_the_parameters():
+    desk = Desk()
+    desk.step()
+    desk.press("fixture")
+    desk.press("mode")
+    before = desk.step((5 * MM, 0, 0))
+    desk.scaling.reset()
+    assert np.array_equal(desk.step((30 * MM, 0, 0), rotation("z", 1.0)), before)
+    assert (desk.state("is_fixture_on"), desk.state("is_fine")) == (0.0, 0.0)
+
+
+def test_change_of_the_tool_roll_turns_nothing():
+    desk = Desk()
+    desk.step(turn=rotation("x", 0.2))
+    before = desk.attitude()
+    desk.scaling.retune(MotionScalingParameters(tool_roll=0.0))
+    desk.step()
+    assert np.allclose(desk.attitude(), before, rtol=0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("button", ["fixture", "mode"])
+def test_button_that_stays_pressed_toggles_once(button):
+    desk = Desk()
+    desk.step()
+    desk.hold(button)
+    name = {"fixture": "is_fixture_on", "mode": "is_fine"}[button]
+    for _ in range(5):
+        desk.step()
+        assert desk.state(name) == 1.0
+
+
+def test_box_is_put_around_the_slave_where_the_button_was_pressed():
+    desk = Desk(fixture=FixtureParameters(size=(0.01, 0.02, 0.03)))
+    desk.step()
+    desk.step((2 * MM, 0, 0))
+    desk.hold("fixture")
+    at_press = desk.step((1 * MM, 0, 0))
+    center, size = desk.box()
+    assert np.allclose(center, at_press, rtol=0, atol=NANOMETRE)
+    # Slave axes are the master's -z, -x, y.
+    assert np.allclose(size, (0.03, 0.01, 0.02), rtol=0, atol=ROUNDING)
+    desk.step((4 * MM, 0, 0))
+    assert np.allclose(desk.box()[0], at_press, rtol=0, atol=NANOMETRE)
+
+
+def test_box_switched_on_while_clutched_stands_around_the_slave():
+    desk = Desk()
+    held = desk.step()
+    desk.hold("clutch")
+    desk.step((1 * MM, 0, 0))
+    desk.hold("fixture")
+    desk.step((1 * MM, 0, 0))
+    assert np.allclose(desk.box()[0], held, rtol=0, atol=NANOMETRE)
+    # Half a box further the hand feels its wall.
+    desk.hold("clutch", is_held=False)
+    desk.step()
+    desk.step((15 * MM, 0, 0))
+    assert math.isclose(np.abs(desk.row["master_servo_cf"]).max(), 0.0, abs_tol=1e-9)
+    desk.step((1 * MM, 0, 0))
+    assert math.isclose(desk.row["master_servo_cf"][0], -1.0, abs_tol=1e-9)
+
+
+def test_box_goes_with_the_hand_while_clutched_and_stays_at_the_slave():
+    desk = Desk()
+    desk.step()
+    desk.press("fixture")
+    desk.step((3 * MM, 1 * MM, 0))
+    before, _ = desk.box()
+    desk.hold("clutch")
+    for _ in range(20):
+        desk.step((-1 * MM, 2 * MM, 1 * MM))
+        assert np.allclose(desk.box()[0], before, rtol=0, atol=NANOMETRE)
+        assert not desk.row["master_servo_cf"].any()
+    desk.hold("clutch", is_held=False)
+    desk.step()
+    assert np.allclose(desk.box()[0], before, rtol=0, atol=NANOMETRE)
+
+
+def test_size_of_the_box_on_the_slave_follows_the_gain():
+    desk = Desk()
+    desk.step()
+    desk.press("fixture")
+    assert np.allclose(desk.box()[1], 30 * MM, rtol=0, atol=ROUNDING)
+    desk.press("mode")
+    assert np.allclose(desk.box()[1], 3 * MM, rtol=0, atol=ROUNDING)
+
+
+def test_second_press_takes_the_box_and_its_force_away():
+    desk = Desk()
+    desk.step()
+    desk.press("fixture")
+    desk.step((20 * MM, 0, 0))
+    assert desk.row["master_servo_cf"][0] < 0.0
+    place = desk.press("fixture")
+    assert not desk.row["master_servo_cf"].any()
+    assert not np.concatenate(desk.box()).any()
+    assert np.array_equal(desk.step(), place)
+
+
+@pytest.mark.parametrize(
+    ("wall", "mm", "newton"),
+    [("soft", 15.5, -0.5), ("soft", 17.0, -2.0), ("soft", 30.0, -3.3), ("hard", 15.1, -3.3)],
+)
+def test_wall_pushes_the_hand_back(wall, mm, newton):
+    desk = Desk(fixture=FixtureParameters(wall=wall))
+    desk.step()
+    desk.press("fixture")
+    desk.step((mm * MM, 0, 0))
+    expected = (newton, 0, 0, 0, 0, 0)
+    assert np.allclose(desk.row["master_servo_cf"], expected, rtol=0, atol=1e-9)
+
+
+def test_fine_gain_above_the_coarse_one_is_refused():
+    with pytest.raises(ParameterError) as error:
+        MotionScalingParameters(coarse_gain=0.5, fine_gain=0.6)
+    assert (error.value.name, error.value.value) == ("fine_gain", 0.6)
