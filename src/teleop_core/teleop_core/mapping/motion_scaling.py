@@ -101,14 +101,19 @@ def mapped_orientation(p: Any, stylus: Array, tool: Array) -> None:
 
 
 @kernel
-def _read_buttons(s: Any, buttons: Array, position: Array) -> None:
-    """Act on the rising edges: fixture toggles at the present position, mode toggles."""
+def _toggle_mode(s: Any, buttons: Array) -> None:
+    """Change the mode at the rising edge of its button."""
+    if buttons[2] > s.buttons[2]:
+        s.is_fine = 1 - s.is_fine
+
+
+@kernel
+def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
+    """Put the box around the present position, or take it away, at the rising edge."""
     if buttons[1] > s.buttons[1]:
         s.is_fixture_on = 1 - s.is_fixture_on
         for i in range(3):
             s.center[i] = position[i]
-    if buttons[2] > s.buttons[2]:
-        s.is_fine = 1 - s.is_fine
 
 
 @kernel
@@ -179,7 +184,7 @@ def motion_scaling_step(p: Any, s: Any, row: Any) -> None:
         Vongbunyong 2008, sections 6.2-6.3.
     """
     pose, buttons = row.master_measured_cp, row.master_buttons
-    _read_buttons(s, buttons, pose)
+    _toggle_mode(s, buttons)
     gain = p.gain[s.is_fine]
     is_following = row.stamp_ns - row.setpoint_stamp_ns <= p.timeout_ns
     tool = np.empty(4)
@@ -192,6 +197,7 @@ def motion_scaling_step(p: Any, s: Any, row: Any) -> None:
         _latch(s, pose, tool)
     else:
         _move(s, gain, pose, tool)
+    _toggle_fixture(s, buttons, pose)
     s.is_engaged, s.must_latch = 1, 0
     for i in range(3):
         s.master[i], s.buttons[i] = pose[i], buttons[i]
