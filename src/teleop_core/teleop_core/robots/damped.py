@@ -148,7 +148,7 @@ def smallest_singular_value(J: Array, length: float) -> float:
 
     By inverse iteration on J Jᵀ from the direction of the smallest pivot: never too small, and
     close where it matters, near a singularity, where one value is much smaller than the others.
-    Below 1e-6 it is 0.
+    Below 1e-6 it is 0. J is overwritten by the weighted one.
     """
     A, x, is_free = np.empty((6, 6)), np.empty(6), np.empty(J.shape[1])
     for i in range(J.shape[1]):
