@@ -237,7 +237,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     g = geometry[_LEGS:_CARRIED]
     is_reachable = _held_arm(T, seed, limits, geometry, q)
     platform, J, reached = np.empty((4, 4)), np.empty((6, 6)), np.empty((4, 4))
-    wantedwanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
+    wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
     leg_lengths(platform, g, q[3:], J)
     if not slowed(q[3:], seed[3:], limits[:, 3:], q[3:]):
         platform_pose(q[3:], g, platform)
@@ -257,7 +257,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
         if not _arm(T, geometry, elbow == 0, 0.0, q):
             return 0
         q[0] = turned(q[0], 0.0, -math.pi, math.pi, False)
-        wantedwanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
+        wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
         leg_lengths(platform, g, q[3:], J)
     return 2 if T[2, 2] > 0.0 and math.hypot(T[2, 0], T[2, 1]) <= TILT else 0
 
