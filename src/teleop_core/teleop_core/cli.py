@@ -44,6 +44,9 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
         sys.stderr.close()
         return 0
+    except OSError as error:  # a file that cannot be read or written speaks for itself
+        print(f"teleop {parsed.command}: {error.filename}: {error.strerror}", file=sys.stderr)
+        return FAILED
     return code
 
 
@@ -107,6 +110,26 @@ def _add_lookups(commands: Any) -> None:
     parameters.add_argument("--markdown", action="store_true", help="as a table for documents")
     robot = _command(commands, "robot", _robot, "show a robot: joints, limits, home, tip pose")
     robot.add_argument("name", nargs="?", help="robot; without one, all are listed")
+    _geometry_argument(robot)
+    robot.add_argument(
+        "--from", type=Path, dest="table", metavar="TABLE.yaml",
+        help="chain from a Denavit-Hartenberg table, as in config/robots",
+    )  # fmt: skip
+    text = "draw where a robot's tip can be"
+    space = _command(commands, "workspace", _workspace, text)
+    space.add_argument("name", metavar="ROBOT", help="one of `teleop robot`")
+    _geometry_argument(space)
+    space.add_argument("--html", type=Path, metavar="FILE", help="page with the picture")
+    space.add_argument("--csv", type=Path, metavar="FILE", help="x, y, z, manipulability")
+    space.add_argument("--samples", type=int, default=20_000, help="joint vectors to draw")
+    space.add_argument("--seed", type=int, default=1, help="seed of the draws")
+
+
+def _geometry_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--geometry", nargs="+", default=[], metavar="SYMBOL=VALUE",
+        help="lengths and options in place of the published ones [m, rad]",
+    )  # fmt: skip
 
 
 def _command(
@@ -255,18 +278,48 @@ def _parameters(arguments: argparse.Namespace) -> int:
 def _robot(arguments: argparse.Namespace) -> int:
     import numpy as np
 
-    from teleop_core.robots import list_robots, load_robot
+    from teleop_core.robots import list_robots, load_robot_set
 
-    if arguments.name is None:
+    if arguments.table is not None:
+        from teleop_core.robots.dh import load_table
+
+        robot = load_table(arguments.table).robot()
+    elif arguments.name is not None:
+        robot = load_robot_set(arguments.name, arguments.geometry)
+    else:
         print("\n".join(list_robots()))
         return 0
-    robot = load_robot(arguments.name)
-    print(f"{robot.name}: {robot.n} joints [rad, m]")
+    directions = ("x", "y", "z", "rx", "ry", "rz")
+    controlled = [d for d, is_free in zip(directions, robot.task_mask, strict=True) if is_free]
+    print(f"{robot.name}: {robot.n} joints [rad, m], controls {', '.join(controlled)} of the tip")
     for row in zip(robot.joint_names, robot.lower, robot.upper, robot.home, strict=True):
-        print("  {:10} {:9.4f} … {:8.4f}   home {:8.4f}".format(*row))
-    print("geometry: " + ", ".join(f"{k} = {v}" for k, v in robot.geometry.items()))
+        print("  {:14} {:9.4f} … {:8.4f}   home {:8.4f}".format(*row))
+    if arguments.table is None:
+        print("geometry: " + ", ".join(f"{k} = {v:g}" for k, v in robot.geometry.items()))
     print("T_base_tip at home:")
     print(np.array2string(robot.fk(robot.home), precision=4, suppress_small=True))
+    return 0
+
+
+def _workspace(arguments: argparse.Namespace) -> int:
+    import numpy as np
+
+    from teleop_core.evaluation.workspace import write_workspace_page
+    from teleop_core.robots import load_robot_set
+    from teleop_core.robots.dexterity import sample_workspace, write_workspace_csv
+
+    robot = load_robot_set(arguments.name, arguments.geometry)
+    rng = np.random.default_rng(arguments.seed)
+    points, values = sample_workspace(robot, arguments.samples, rng)
+    low, high = points.min(axis=0), points.max(axis=0)
+    for axis, begin, end in zip("xyz", low, high, strict=True):
+        print(f"{axis}: {begin:8.4f} … {end:8.4f} m")
+    if arguments.csv is not None:
+        write_workspace_csv(arguments.csv, points, values)
+        print(arguments.csv)
+    if arguments.html is not None:
+        write_workspace_page(robot, points, values, arguments.html)
+        print(arguments.html)
     return 0
 
 

@@ -1,0 +1,55 @@
+"""Workspace picture: where a robot's tip can be, and how freely it moves there."""
+
+from pathlib import Path
+from typing import Any
+
+import plotly.graph_objects as plots
+from plotly.subplots import make_subplots
+
+from teleop_core.geometry import Array
+from teleop_core.robots.robot import Robot
+
+# More points than this make the page slow and the picture no clearer.
+DRAWN = 20_000
+
+
+def write_workspace_page(robot: Robot, points: Array, values: Array, file: Path) -> None:
+    """Write one self-contained page: the points in space, from above and from the side.
+
+    Args:
+        robot: The arm they belong to.
+        points: Tip positions (N, 3) [m], base axes.
+        values: Manipulability at each (N,).
+        file: Page to write; its folder must exist.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    titles = ("in space", "from above: x, y", "from the side: x, z")
+    figure = make_subplots(
+        rows=2, cols=2, column_widths=[0.62, 0.38], subplot_titles=titles,
+        specs=[[{"type": "scene", "rowspan": 2}, {"type": "xy"}], [None, {"type": "xy"}]],
+    )  # fmt: skip
+    x, y, z = points[:DRAWN].T
+    marker: dict[str, Any] = {
+        "size": 2, "color": values[:DRAWN], "colorscale": "Viridis", "opacity": 0.7
+    }  # fmt: skip
+    bar = {"title": "manipulability", "x": -0.08}
+    figure.add_trace(
+        plots.Scatter3d(
+            x=x, y=y, z=z, mode="markers", marker={**marker, "colorbar": bar, "showscale": True}
+        ),
+        row=1, col=1,
+    )  # fmt: skip
+    for row, second in ((1, y), (2, z)):
+        trace = plots.Scattergl(x=x, y=second, mode="markers", marker=marker)
+        figure.add_trace(trace, row=row, col=2)
+        name = "yz"[row - 1]
+        figure.update_yaxes(title_text=f"{name} [m]", scaleanchor=f"x{row}", row=row, col=2)
+        figure.update_xaxes(title_text="x [m]", row=row, col=2)
+    axes = {f"{axis}axis": {"title": f"{axis} [m]"} for axis in "xyz"}
+    figure.update_layout(
+        title=f"Workspace of {robot.name}: {len(points):,} joint vectors drawn within the limits",
+        showlegend=False, height=820, template="plotly_white", scene={**axes, "aspectmode": "data"},
+    )  # fmt: skip
+    figure.write_html(file, include_plotlyjs=True, full_html=True)
