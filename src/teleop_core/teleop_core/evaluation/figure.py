@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from teleop_core.geometry import Array
 
 COMMAND, REFERENCE, MEASURED, BOX = "#8a94a0", "#9ed0fb", "#c2370a", "#2b8a3e"
@@ -39,3 +41,13 @@ def line(
 def time_axis() -> dict[str, Any]:
     """Axis of time from the start of the recording."""
     return {"title": {"text": "time [s]"}}
+
+
+def span(values: Array) -> list[float] | None:
+    """Range of an axis that shows all values with a margin; None without any."""
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    margin = 0.05 * max(high - low, 1e-3)
+    return [low - margin, high + margin]

@@ -10,15 +10,16 @@ NONE = -1
 """Index of a sample that has no partner."""
 _SMOOTHED = 21  # samples; bursts of half as many leave the pairing alone
 _FARTHEST_NS = 50_000_000
+_FAR = 2**62
 
 
 def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:
     """Partners of samples that one node publishes in pairs, tick by tick, without a common stamp.
 
-    The nearest in log time is not always the partner: a recorder that was held up gets several
-    ticks at once. Partners are counted off instead: the difference of the two indices is constant
-    until a message is lost. It is the running median of the difference to the nearest sample,
-    which ignores bursts and follows losses at once (a median keeps edges).
+    Where the nearest sample in log time is far nearer than any other, it is the partner. Where
+    several ticks came at once, partners are counted off: the difference of the two indices is
+    constant until a message is lost. It is the running median of the difference to the nearest
+    sample, which ignores bursts and follows losses at once (a median keeps edges).
 
     Args:
         log_ns: Log times of one topic, shape (N,), in order, [ns].
@@ -28,14 +29,19 @@ def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:
         Index into the other topic for each sample, shape (N,); :data:`NONE` where its partner was
         lost or would be more than 50 ms away.
     """
+    index = np.arange(len(log_ns))
+    if np.array_equal(log_ns, other_log_ns):
+        return index
     if not len(log_ns) or not len(other_log_ns):
         return np.full(len(log_ns), NONE)
-    index = np.arange(len(log_ns))
-    partner = index + _running_median(_nearest(log_ns, other_log_ns) - index)
+    nearest = _nearest(log_ns, other_log_ns)
+    is_clear = _is_clear(log_ns, other_log_ns, nearest)
+    partner = np.where(is_clear, nearest, index + _running_median(nearest - index))
     is_inside = (partner >= 0) & (partner < len(other_log_ns))
     apart = np.abs(other_log_ns[np.where(is_inside, partner, 0)] - log_ns)
-    is_twice = np.diff(partner, prepend=NONE - 1) <= 0
-    return np.where(is_inside & (apart <= _FARTHEST_NS) & ~is_twice, partner, NONE)
+    step = np.diff(partner)
+    is_taken = np.append(step <= 0, False) | np.insert(step <= 0, 0, False)
+    return np.where(is_inside & (apart <= _FARTHEST_NS) & (is_clear | ~is_taken), partner, NONE)
 
 
 def latest(stamp_ns: Integers, other_stamp_ns: Integers) -> Integers:
@@ -76,6 +82,16 @@ def _nearest(times: Integers, others: Integers) -> Integers:
     before, after = np.maximum(after - 1, 0), np.minimum(after, len(others) - 1)
     is_before: NDArray[np.bool_] = times - others[before] < others[after] - times
     return np.where(is_before, before, after)
+
+
+def _is_clear(times: Integers, others: Integers, nearest: Integers) -> NDArray[np.bool_]:
+    """Whether the nearest is four times nearer than the next sample of either topic."""
+    own = np.concatenate(([_FAR], np.diff(times), [_FAR]))
+    padded = np.concatenate(([-_FAR], others, [_FAR]))
+    second = np.minimum(times - padded[nearest], padded[nearest + 2] - times)
+    room = np.minimum(second, np.minimum(own[:-1], own[1:]))
+    clear: NDArray[np.bool_] = 4 * np.abs(others[nearest] - times) < room
+    return clear
 
 
 def _running_median(values: Integers) -> Integers:

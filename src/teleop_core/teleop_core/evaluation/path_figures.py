@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.evaluation.figure import BOX, DRAWN_BOXES, MEASURED, REFERENCE, Figure, line
+from teleop_core.evaluation.figure import BOX, DRAWN_BOXES, MEASURED, REFERENCE, Figure, line, span
 from teleop_core.evaluation.metrics import Study
 from teleop_core.evaluation.summary import number
 from teleop_core.evaluation.traces import Box, Drawing
 from teleop_core.geometry import Array
 
 _PLANES = ((0, 1), (0, 2), (1, 2))
-_CAMERA = {"eye": {"x": 1.35, "y": -1.65, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.12}}
+_CAMERA = {"eye": {"x": 1.25, "y": -1.52, "z": 0.76}, "center": {"x": 0, "y": 0, "z": -0.1}}
 
 
 def _path(drawing: Drawing) -> tuple[Array, Array]:
@@ -39,7 +39,8 @@ def path_in_space(study: Study, boxes: list[Box]) -> Figure:
     """Paths of reference and tip in 3-D, with the box."""
     reference, measured = _path(study.drawing)
     traces = [
-        _line3(reference, "reference", REFERENCE, 8),
+        # Both lines at once would hide each other in turns.
+        {**_line3(reference, "reference", REFERENCE, 4), "visible": "legendonly"},
         _line3(measured, "measured", MEASURED, 4),
         *(_line3(_edges(box), "box", BOX, 3, hidden=i > 0) for i, box in enumerate(largest(boxes))),
     ]
@@ -50,14 +51,14 @@ def path_in_space(study: Study, boxes: list[Box]) -> Figure:
 
 def _path_sentence(study: Study, boxes: list[Box]) -> str:
     score = study.score
-    text = f"The tip follows its reference within {number(score.position_error_mm.max)} mm at worst"
-    if not boxes:
+    text = f"The tip stays within {number(score.position_error_mm.max)} mm of its reference"
+    shown = largest(boxes)
+    if not shown:
         return text + "; no box was on."
-    box = largest(boxes)[0]
-    size = " × ".join(f"{side:.3g}" for side in box.size)
+    sizes = " and ".join(" × ".join(f"{side:.3g}" for side in box.size) for box in shown)
     return (
-        f"{text} and leaves the box of {size} mm by at most "
-        f"{number(score.fixture.penetration_max_mm)} mm; only the time with the box on is drawn."
+        f"{text} and leaves the box ({sizes} mm) by at most "
+        f"{number(score.fixture.penetration_max_mm)} mm. Only the time with the box on is drawn."
     )
 
 
@@ -85,29 +86,41 @@ def _line3(
 def path_in_planes(study: Study, boxes: list[Box]) -> Figure:
     """The same along each axis."""
     reference, measured = _path(study.drawing)
+    shown = largest(boxes)
+    corners = [_edges(box) for box in shown]
+    ranges = [span(np.concatenate((reference, measured, *corners))[:, axis]) for axis in range(3)]
     traces: list[dict[str, Any]] = []
     layout: dict[str, Any] = {"grid": {"rows": 1, "columns": 3, "pattern": "independent"}}
-    layout["shapes"] = []
     for plot, (across, up) in enumerate(_PLANES, start=1):
         place = {"xaxis": f"x{plot}", "yaxis": f"y{plot}", "showlegend": plot == 1}
-        for points, name, color, width in (
-            (reference, "reference", REFERENCE, 6), (measured, "measured", MEASURED, 1.6),
-        ):  # fmt: skip
-            trace = line(points[:, across], points[:, up], name, color, width)
-            traces.append({**trace, **place})
-        layout |= _plane_axes(plot, "xyz"[across], "xyz"[up])
-        layout["shapes"] += [_outline(box, across, up, plot) for box in largest(boxes)]
-    sentence = "The same path seen along each axis; the green outline is the box."
-    if not boxes:
-        sentence = "The same path seen along each axis."
+        traces += [
+            {**line(points[:, across], points[:, up], name, color, width), **place}
+            for points, name, color, width in (
+                (reference, "reference", REFERENCE, 6.0),
+                (measured, "measured", MEASURED, 1.6),
+            )
+        ]
+        layout |= _plane_axes(plot, "xyz"[across], "xyz"[up], ranges[across], ranges[up])
+    layout["shapes"] = [
+        _outline(box, across, up, plot)
+        for plot, (across, up) in enumerate(_PLANES, start=1)
+        for box in shown
+    ]
+    sentence = "The same path seen along each axis" + ("; green: the box." if shown else ".")
     return Figure("Path per plane", sentence, traces, layout, 420)
 
 
-def _plane_axes(plot: int, across: str, up: str) -> dict[str, Any]:
+def _plane_axes(
+    plot: int, across: str, up: str, width: list[float] | None, height: list[float] | None
+) -> dict[str, Any]:
+    """Two axes of the same scale."""
     return {
-        f"xaxis{plot}": {"title": {"text": f"{across} [mm]"}, "constrain": "domain"},
+        f"xaxis{plot}": {
+            "title": {"text": f"{across} [mm]"}, "constrain": "domain", "range": width,
+        },
         f"yaxis{plot}": {
-            "title": {"text": f"{up} [mm]"}, "scaleanchor": f"x{plot}", "constrain": "domain",
+            "title": {"text": f"{up} [mm]"}, "constrain": "domain", "range": height,
+            "scaleanchor": f"x{plot}",
         },
     }  # fmt: skip
 

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from teleop_core.evaluation.figure import (
     BOX,
     COMMAND,
@@ -16,13 +14,13 @@ from teleop_core.evaluation.figure import (
     THIRD,
     Figure,
     line,
+    span,
     time_axis,
 )
 from teleop_core.evaluation.metrics import Study
 from teleop_core.evaluation.streams import STAGES
 from teleop_core.evaluation.summary import number
 from teleop_core.evaluation.traces import Box, Drawing
-from teleop_core.geometry import Array
 
 _STAGE_COLORS = (FIRST, "#e69f00", SECOND, THIRD, DARK)
 
@@ -35,7 +33,7 @@ def position(study: Study, boxes: list[Box]) -> Figure:
     layout, shapes, traces = _rows("xyz", "mm"), [], []
     for row in range(3):
         suffix = _suffix(row)
-        layout[f"yaxis{suffix}"]["range"] = _range(values[is_shown][:, [row + 3, row + 6]])
+        layout[f"yaxis{suffix}"]["range"] = span(values[is_shown][:, [row + 3, row + 6]])
         traces += [
             {**trace, "yaxis": f"y{suffix}", "showlegend": row == 0}
             for trace in (
@@ -83,15 +81,6 @@ def _interesting(drawing: Drawing, boxes: list[Box]) -> tuple[float, float]:
     if not boxes:
         return 0.0, drawing.duration_s
     return boxes[0].begin_s, boxes[-1].end_s
-
-
-def _range(values: Array) -> list[float] | None:
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return None
-    low, high = float(finite.min()), float(finite.max())
-    margin = 0.08 * max(high - low, 1e-3)
-    return [low - margin, high + margin]
 
 
 def _walls(box: Box, axis: int, suffix: str) -> list[dict[str, Any]]:

@@ -1,0 +1,304 @@
+"""Evaluation: statistics, pairing and pose errors against closed forms and independent oracles."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from teleop_core.evaluation.accumulators import Distribution, Moments
+from teleop_core.evaluation.fixture_scores import penetration
+from teleop_core.evaluation.pairing import NONE, latest, same_stamp, same_tick
+from teleop_core.evaluation.pose_errors import pose_errors
+from teleop_core.evaluation.published import COARSE, FINE, published_for
+from teleop_core.evaluation.traces import BUCKETS, PATH_POINTS, Envelope, Thinned
+from teleop_core.geometry import rotations_from_quaternions
+from teleop_core.robots import load_robot
+
+MS = 1_000_000
+# Sums of some thousand squares: relative rounding stays far below.
+ROUNDING = 1e-12
+# Angles in degrees from quaternions with 16 digits.
+DEGREES = 1e-9
+# Table 7.7 prints three decimals; the distances are recomputed from joints with five digits, which
+# differ from the printed ones by up to 0.0035 mm.
+PRINTED_MM = 0.003
+
+POINT_3_TARGET = np.array([np.radians(-30), np.radians(110), 0.4, *np.radians([45, 45, 45])])
+POINT_3_RUNS = np.array(
+    [
+        [-0.52308, 1.92094, 399.99965, 0.78490, 0.78544, 0.78568],
+        [-0.52328, 1.92056, 399.99965, 0.78485, 0.78576, 0.78540],
+        [-0.52334, 1.92058, 400.00015, 0.78455, 0.78568, 0.78548],
+        [-0.52323, 1.92058, 399.99965, 0.78420, 0.78568, 0.78556],
+        [-0.52328, 1.92067, 399.99965, 0.78446, 0.78531, 0.78564],
+        [-0.52332, 1.92063, 400.00015, 0.78468, 0.78525, 0.78580],
+        [-0.52321, 1.92068, 399.99965, 0.78481, 0.78568, 0.78532],
+        [-0.52328, 1.92061, 400.00015, 0.78468, 0.78552, 0.78532],
+        [-0.52330, 1.92073, 399.99965, 0.78459, 0.78532, 0.78568],
+        [-0.52328, 1.92068, 399.99965, 0.78483, 0.78570, 0.78512],
+    ]
+)
+# Printed errors of tables 7.1, 7.5 and 7.6 with their rows of table 7.7.
+POINT_1 = ([0.090, 0.152, 0.151, 0.065, 0.056, 0.053, 0.060, 0.083, 0.065, 0.132],
+           (0.098, 0.039, 0.152))  # fmt: skip
+POINT_5 = ([0.177, 0.173, 0.123, 0.177, 0.138, 0.128, 0.128, 0.112, 0.133, 0.123],
+           (0.143, 0.025, 0.177))  # fmt: skip
+POINT_6 = ([0.064, 0.054, 0.081, 0.081, 0.081, 0.057, 0.059, 0.105, 0.069, 0.095],
+           (0.076, 0.017, 0.105))  # fmt: skip
+
+
+def moments(*stretches):
+    out = Moments()
+    for stretch in stretches:
+        out.add(np.asarray(stretch, float))
+    return out
+
+
+def poses(positions, rotations):
+    x, y, z, w = np.atleast_2d(rotations.as_quat()).T
+    return np.column_stack((positions, w, x, y, z))
+
+
+# -- statistics ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("errors", "table"), [POINT_1, POINT_5, POINT_6])
+def test_spread_gives_table_7_7_from_the_printed_runs(errors, table):
+    spread = moments(errors).spread()
+    # The printed errors are rounded to half a micrometre, the table once more.
+    assert np.allclose((spread.rms, spread.sd, spread.max), table, atol=0.0011)
+
+
+def test_joint_rows_of_point_3_give_its_published_error_statistics():
+    robot = load_robot("rcrt1")
+    rows = POINT_3_RUNS * [1, 1, 1e-3, 1, 1, 1]
+    identity = Rotation.identity(len(rows))
+    tips = np.array([robot.fk(q)[:3, 3] for q in rows])
+    target = np.tile(robot.fk(POINT_3_TARGET)[:3, 3], (len(rows), 1))
+    errors = pose_errors(poses(tips, identity), poses(target, identity)).position_mm
+    spread = moments(errors).spread()
+    assert np.allclose((spread.rms, spread.sd, spread.max), (0.387, 0.050, 0.514), atol=PRINTED_MM)
+
+
+@given(st.lists(st.lists(st.floats(-1e3, 1e3), max_size=20), min_size=1, max_size=6))
+def test_spread_does_not_depend_on_how_the_samples_are_cut(stretches):
+    samples = np.concatenate([np.array(s, float) for s in stretches])
+    spread = moments(*stretches).spread()
+    if not len(samples):
+        assert spread == moments().spread()
+        return
+    assert np.isclose(spread.rms, np.sqrt(np.mean(samples**2)), rtol=ROUNDING, atol=1e-150)
+    assert spread.max == np.abs(samples).max()
+    if len(samples) > 1:
+        assert np.isclose(spread.sd, samples.std(ddof=1), rtol=1e-9, atol=1e-9)
+
+
+def test_sample_deviation_of_a_small_error_on_a_large_mean_keeps_its_digits():
+    samples = 1e6 + np.tile([1e-3, -1e-3], 5000)
+    assert np.isclose(moments(samples[:7], samples[7:]).spread().sd, samples.std(ddof=1), rtol=1e-6)
+
+
+def test_spread_without_samples_is_not_applicable():
+    assert moments([]).spread() == moments([np.nan, np.inf]).spread()
+    assert moments([]).spread().rms is None
+    assert moments([2.0]).spread().sd is None
+
+
+def test_quantiles_are_exact_to_the_microsecond_however_the_durations_are_cut():
+    rng = np.random.default_rng(3)
+    durations = rng.integers(-20, 9000, 5000)
+    spread = Distribution()
+    for part in np.array_split(durations, 7):
+        spread.add(part * 1000)
+    assert spread.count == 5000
+    ordered = np.sort(durations)
+    assert spread.quantile_us(0.5) == ordered[2499]
+    assert spread.quantile_us(0.99) == ordered[4949]
+    assert spread.delay().max == ordered[-1] / 1000
+
+
+def test_histogram_holds_all_durations():
+    spread = Distribution()
+    spread.add(np.random.default_rng(4).exponential(2e6, 4000).astype(np.int64))
+    middles, shares, width = spread.histogram(50)
+    assert len(middles) == len(shares) <= 50
+    assert np.isclose(shares.sum(), 100.0)
+    assert np.allclose(np.diff(middles), width)
+
+
+# -- pairing ---------------------------------------------------------------------------------------
+
+
+def test_ticks_are_paired_by_order_when_the_recorder_was_held_up():
+    measured = np.arange(2000) * MS
+    setpoint = measured - 60_000
+    held = slice(700, 707)  # seven ticks arrive at once, topic by topic
+    measured, setpoint = measured.copy(), setpoint.copy()
+    setpoint[held] = 706 * MS + np.arange(7) * 1000
+    measured[held] = 706 * MS + 10_000 + np.arange(7) * 1000
+    assert (same_tick(measured, setpoint) == np.arange(2000)).all()
+
+
+@pytest.mark.parametrize("offset", [0, 60_000, -60_000])
+def test_pairs_stay_right_when_messages_of_either_topic_are_lost(offset):
+    rng = np.random.default_rng(5)
+    tick = np.arange(20_000)
+    measured = tick[np.sort(rng.permutation(20_000)[:19_950])]
+    setpoint = tick[np.sort(rng.permutation(20_000)[:19_950])]
+    partner = same_tick(measured * MS, setpoint * MS + offset)
+    found = partner != NONE
+    wrong = setpoint[partner[found]] != measured[found]
+    assert not wrong.any()
+    assert found.sum() == len(np.intersect1d(measured, setpoint))
+
+
+def test_samples_far_apart_have_no_partner():
+    assert (same_tick(np.arange(5) * MS, np.arange(5) * MS + 1000 * MS) == NONE).all()
+    assert (same_tick(np.arange(5) * MS, np.empty(0, np.int64)) == NONE).all()
+    assert not len(same_tick(np.empty(0, np.int64), np.arange(5)))
+
+
+def test_latest_command_is_never_from_the_future():
+    stamps = np.array([5, 10, 20])
+    assert latest(np.array([4, 5, 9, 10, 25]), stamps).tolist() == [NONE, 0, 0, 1, 2]
+    assert latest(np.array([4, 12]), stamps[::-1]).tolist() == [NONE, 1]
+    assert latest(np.array([4]), np.empty(0, np.int64)).tolist() == [NONE]
+
+
+def test_same_stamp_finds_the_first_sample_that_carries_it():
+    assert same_stamp(np.array([1, 3, 9]), np.array([1, 3, 3, 4])).tolist() == [0, 1, NONE]
+    assert same_stamp(np.array([1]), np.empty(0, np.int64)).tolist() == [NONE]
+
+
+# -- poses -----------------------------------------------------------------------------------------
+
+
+def test_angle_differences_agree_with_an_independent_library():
+    rng = np.random.default_rng(6)
+    a = Rotation.from_euler("ZYX", rng.uniform(-1, 1, (500, 3)) * [180, 80, 180], degrees=True)
+    b = Rotation.from_euler("ZYX", rng.uniform(-1, 1, (500, 3)) * [180, 80, 180], degrees=True)
+    zero = np.zeros((500, 3))
+    errors = pose_errors(poses(zero, a), poses(zero, b))
+    difference = a.as_euler("ZYX", degrees=True) - b.as_euler("ZYX", degrees=True)
+    wrapped = (difference + 180) % 360 - 180
+    assert np.allclose(errors.roll_pitch_yaw_deg, wrapped, atol=1e-8)
+    assert np.allclose(errors.angle_deg, np.degrees((a * b.inv()).magnitude()), atol=1e-6)
+    assert not errors.is_degenerate.any()
+
+
+def test_published_poses_turn_by_their_published_fixed_angles():
+    joints = [[-30, 130, 0.35, 45, 45, 45], [30, 130, 0.4, 45, 45, 45]]
+    robot = load_robot("rcrt1")
+    scale = np.radians([1, 1, 180 / np.pi, 1, 1, 1])
+    tips = Rotation.from_matrix([robot.fk(np.array(q) * scale)[:3, :3] for q in joints])
+    zero = np.zeros((2, 3))
+    errors = pose_errors(poses(zero, tips), poses(zero, Rotation.identity(2)))
+    expected = [[78.699, -25.695, 158.349], [138.699, -25.695, 158.349]]
+    assert np.allclose(errors.roll_pitch_yaw_deg, expected, atol=1e-3)
+
+
+@given(st.floats(1e-7, 179.0), st.integers(0, 10**6))
+def test_angle_error_is_the_angle_of_the_turn_however_small_it_is(angle, seed):
+    rng = np.random.default_rng(seed)
+    axis = rng.normal(size=3)
+    b = Rotation.random(rng=rng)
+    a = b * Rotation.from_rotvec(np.radians(angle) * axis / np.linalg.norm(axis))
+    zero = np.zeros((1, 3))
+    errors = pose_errors(poses(zero, a), poses(zero, b))
+    assert np.isclose(errors.angle_deg[0], angle, atol=DEGREES * 10)
+
+
+def test_sign_of_a_quaternion_and_its_length_do_not_matter():
+    rng = np.random.default_rng(7)
+    a, b = (poses(rng.normal(size=(50, 3)), Rotation.random(50, rng=rng)) for _ in range(2))
+    flipped = a.copy()
+    flipped[:, 3:] *= -1.7
+    plain, other = pose_errors(a, b), pose_errors(flipped, b)
+    assert np.allclose(plain.angle_deg, other.angle_deg, atol=1e-9)
+    assert np.allclose(plain.roll_pitch_yaw_deg, other.roll_pitch_yaw_deg, atol=1e-9)
+
+
+def test_roll_and_yaw_are_left_out_where_pitch_makes_them_meaningless():
+    near = Rotation.from_euler("ZYX", [[10, 89.6, 20], [10, 88.0, 20]], degrees=True)
+    turned = Rotation.from_euler("ZYX", [[60, 89.6, 70], [11, 88.0, 20]], degrees=True)
+    errors = pose_errors(poses(np.zeros((2, 3)), near), poses(np.zeros((2, 3)), turned))
+    assert errors.is_degenerate.tolist() == [True, False]
+    assert np.isnan(errors.roll_pitch_yaw_deg[0, ::2]).all()
+    assert np.isclose(errors.roll_pitch_yaw_deg[0, 1], 0.0, atol=1e-6)
+    assert errors.angle_deg[0] < 1.0  # the two turns nearly cancel
+
+
+def test_pose_without_direction_has_no_orientation_error():
+    still = np.zeros((1, 7))
+    reference = poses(np.zeros((1, 3)), Rotation.identity(1))
+    errors = pose_errors(still, reference)
+    assert errors.position_mm[0] == 0.0
+    assert np.isnan(errors.angle_deg[0])
+
+
+def test_quaternion_order_is_that_of_the_package():
+    quarter = Rotation.from_euler("Z", 90, degrees=True)
+    row = poses(np.zeros((1, 3)), quarter)
+    assert np.allclose(rotations_from_quaternions(row[:, 3:])[0], quarter.as_matrix())
+
+
+# -- box and published figures ---------------------------------------------------------------------
+
+
+def test_penetration_is_the_distance_to_the_nearest_point_of_the_box():
+    center, size = np.array([[1.0, 2.0, 3.0]]), np.array([[2.0, 4.0, 6.0]])
+    points = center + np.array(
+        [[0.9, -1.9, 2.9], [1.5, 0, 0], [0, 2.3, 0], [1.3, 2.4, 0], [1.2, -2.4, 3.9]]
+    )
+    depth = penetration(points, np.repeat(center, 5, 0), np.repeat(size, 5, 0))
+    assert np.allclose(depth, [0, 0.5, 0.3, 0.5, np.sqrt(0.04 + 0.16 + 0.81)])
+
+
+@pytest.mark.parametrize(
+    ("gain", "mode"), [(1.0, COARSE), (0.5, COARSE), (2.0, COARSE), (0.1, FINE), (0.2, FINE)]
+)
+def test_gain_chooses_the_published_mode(gain, mode):
+    assert published_for(gain) is mode
+
+
+@pytest.mark.parametrize("gain", [None, 0.0])
+def test_without_a_gain_nothing_is_compared(gain):
+    assert published_for(gain) is None
+
+
+# -- drawing ---------------------------------------------------------------------------------------
+
+
+def test_envelope_keeps_every_peak():
+    rng = np.random.default_rng(8)
+    times = np.arange(100_000) * MS
+    values = rng.normal(size=(100_000, 2))
+    values[43_210, 0], values[98_765, 1] = 50.0, -60.0
+    envelope = Envelope(0, int(times[-1]), 2)
+    for part in np.array_split(np.arange(100_000), 9):
+        envelope.add(times[part], values[part])
+    seconds, line = envelope.line()
+    assert len(line) <= 2 * BUCKETS
+    assert (np.diff(seconds) > 0).all()
+    assert line[:, 0].max() == 50.0
+    assert line[:, 1].min() == -60.0
+    assert abs(seconds[line[:, 0].argmax()] - 43.21) <= 100.0 / BUCKETS
+
+
+def test_envelope_of_a_short_recording_is_the_recording():
+    times = np.array([0, 500, 1000]) * MS
+    envelope = Envelope(0, 1000 * MS, 1)
+    envelope.add(times, np.array([[1.0], [3.0], [2.0]]))
+    _, line = envelope.line()
+    assert line.ravel().tolist() == [1.0, 1.0, 3.0, 3.0, 2.0, 2.0]
+
+
+def test_thinning_takes_every_nth_row_wherever_it_is_cut():
+    rows = np.arange(3 * PATH_POINTS, dtype=float)[:, None]
+    whole, parts = Thinned(len(rows)), Thinned(len(rows))
+    whole.add(rows)
+    for part in np.array_split(rows, 13):
+        parts.add(part)
+    assert (whole.rows() == parts.rows()).all()
+    assert (whole.rows()[:, 0] == np.arange(0, 3 * PATH_POINTS, 3)).all()
