@@ -146,7 +146,7 @@ def test_a_straight_wrist_has_valid_branches_and_keeps_the_seed_of_joint_4():
     for q in random_joints(300):
         q[4] = 0.0
         # Room for the seed, and for joint 6 to take over what joint 4 keeps.
-        q *= 0.8
+        q[:] = 0.8 * q
         # Far from the other singularities, whose rounding would bend the wrist by 1e-8.
         q[1:3] = ARM.home[1:3]
         pose = ARM.fk(q)

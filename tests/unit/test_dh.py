@@ -1,0 +1,297 @@
+"""Denavit-Hartenberg tables: conventions, reading, and chains as robots."""
+
+import math
+
+import numpy as np
+import pytest
+import roboticstoolbox as rtb
+import sympy
+
+from teleop_core.errors import ParameterError, ShapeError, TeleopError, UnknownNameError
+from teleop_core.geometry import rotation, transform
+from teleop_core.robots import IkStatus
+from teleop_core.robots.dh import CONVENTIONS, elementary, load_table, parse_table
+
+ROUNDING = 1e-14
+TABLES = ("puma560", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker")
+REACHED = 1e-9
+
+
+def table(rows, convention="modified", **entries):
+    return parse_table(
+        {"name": "chain", "convention": convention, "angles": "degrees", "rows": rows, **entries}
+    )
+
+
+def modified_link(alpha, a, d, theta):
+    """Equation (10) of the lecture."""
+    ca, sa, ct, st = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
+    return np.array(
+        [
+            [ct, -st, 0, a],
+            [st * ca, ct * ca, -sa, -sa * d],
+            [st * sa, ct * sa, ca, ca * d],
+            [0, 0, 0, 1],
+        ]
+    )
+
+
+def test_d1_equation_10_is_the_product_of_its_four_motions_symbolically():
+    alpha, a, d, theta = sympy.symbols("alpha a d theta")
+    ca, sa, ct, st = sympy.cos(alpha), sympy.sin(alpha), sympy.cos(theta), sympy.sin(theta)
+    printed = sympy.Matrix(
+        [
+            [ct, -st, 0, a],
+            [st * ca, ct * ca, -sa, -sa * d],
+            [st * sa, ct * sa, ca, ca * d],
+            [0, 0, 0, 1],
+        ]
+    )
+    turn_x = sympy.Matrix([[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
+    turn_z = sympy.Matrix([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    slide_x, slide_z = sympy.eye(4), sympy.eye(4)
+    slide_x[0, 3], slide_z[2, 3] = a, d
+    assert sympy.simplify(turn_x * slide_x * turn_z * slide_z - printed) == sympy.zeros(4)
+
+
+def test_d1_a_modified_row_is_equation_10():
+    for alpha, a, d, theta in np.random.default_rng(1).uniform(-2.0, 2.0, (100, 4)):
+        chain = parse_table(
+            {
+                "name": "row",
+                "convention": "modified",
+                "rows": [{"alpha": alpha, "a": a, "d": d, "theta": "q"}],
+            }
+        )
+        assert np.abs(
+            chain.link_transforms([theta])[0] - modified_link(alpha, a, d, theta)
+        ).max() < (ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("convention", "link"), [("standard", "RevoluteDH"), ("modified", "RevoluteMDH")]
+)
+def test_roboticstoolbox_builds_the_same_chain(convention, link):
+    rng = np.random.default_rng(2)
+    numbers = rng.uniform(-1.5, 1.5, (6, 3))
+    ours = parse_table(
+        {
+            "name": "chain",
+            "convention": convention,
+            "rows": [{"alpha": k, "a": a, "d": d, "theta": "q"} for k, a, d in numbers],
+        }
+    ).robot()
+    theirs = rtb.DHRobot([getattr(rtb, link)(alpha=k, a=a, d=d) for k, a, d in numbers])
+    for q in rng.uniform(-3.0, 3.0, (50, 6)):
+        assert np.abs(ours.fk(q) - theirs.fkine(q).A).max() < 1e-12
+        assert np.abs(ours.jacobian(q) - theirs.jacob0(q)).max() < 1e-12
+
+
+def test_d13_the_chains_of_the_broken_four_bar_are_its_tables():
+    left = table([{"theta": "q"}, {"a": 1.0, "theta": "q"}])
+    right = table([{"theta": "q"}])
+    theta1, phi2, phi1 = 0.4, 0.9, -0.3
+    links = left.link_transforms([theta1, phi2])
+    assert np.abs(links[0] - modified_link(0, 0, 0, theta1)).max() < ROUNDING
+    assert np.abs(links[1] - modified_link(0, 1.0, 0, phi2)).max() < ROUNDING
+    assert np.abs(right.link_transforms([phi1])[0] - modified_link(0, 0, 0, phi1)).max() < ROUNDING
+    expected = transform(
+        rotation("z", theta1 + phi2), np.array([math.cos(theta1), math.sin(theta1), 0.0])
+    )
+    assert np.abs(left.robot().fk([theta1, phi2]) - expected).max() < ROUNDING
+
+
+def test_d10_a_leg_of_the_3_rps_puts_its_spherical_joint_where_the_lecture_says():
+    leg = table([{"theta": "q"}, {"alpha": -90, "d": "q", "lower": 0, "upper": 2}]).robot()
+    expected = [
+        (0.4, 0, 1.039230),
+        (-0.328990, 0.569827, 0.939693),
+        (-0.421858, -0.730680, 0.886327),
+    ]
+    for i, (length, theta) in enumerate([(1.2, 60.0), (1.0, 70.0), (0.9, 80.0)]):
+        base = elementary("turn", "z", 2.0 * math.pi / 3.0 * i) @ elementary("slide", "x", 1.0)
+        base = base @ elementary("turn", "x", math.pi / 2.0)
+        phi = math.pi / 2.0 - math.radians(theta)
+        assert np.abs((base @ leg.fk([phi, length]))[:3, 3] - expected[i]).max() < 1e-6
+
+
+def test_d11_a_finger_points_where_the_lecture_says():
+    rows = [
+        {"theta": "q"},
+        {"alpha": 90, "a": 1.0, "theta": "q"},
+        {"a": 0.6, "theta": "q"},
+        {"a": 0.4},
+    ]
+    tip = table(rows).robot().fk(np.radians([20.0, 35.0, -50.0]))[:3, 3]
+    assert np.abs(tip - (1.764613, 0.642266, 0.240618)).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_example_tables_load_and_their_rows_multiply_to_the_pose(name):
+    chain = load_table(f"config/robots/{name}.yaml")
+    robot, rng = chain.robot(), np.random.default_rng(3)
+    for q in rng.uniform(robot.lower, robot.upper, (20, robot.n)):
+        pose = np.eye(4)
+        for link in chain.link_transforms(q):
+            pose = pose @ link
+        assert np.abs(robot.fk(q) - pose).max() < ROUNDING
+    assert len(chain.joints) == robot.n
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_the_jacobian_of_a_chain_is_the_difference_quotient(name):
+    robot = load_table(f"config/robots/{name}.yaml").robot()
+    rng, step = np.random.default_rng(4), 1e-6
+    for q in rng.uniform(robot.lower, robot.upper, (20, robot.n)):
+        jacobian, pose = robot.jacobian(q), robot.fk(q)
+        for j in range(robot.n):
+            ahead, behind = (robot.fk(q + side * step * np.eye(robot.n)[j]) for side in (1, -1))
+            rate = (ahead - behind) / (2.0 * step)
+            spin = rate[:3, :3] @ pose[:3, :3].T
+            numeric = [*rate[:3, 3], spin[2, 1], spin[0, 2], spin[1, 0]]
+            assert np.abs(jacobian[:, j] - numeric).max() < 1e-8
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_poses_are_found_from_seeds_nearby_and_answers_stay_inside_limits(name):
+    robot, rng = load_table(f"config/robots/{name}.yaml").robot(), np.random.default_rng(5)
+    q = rng.uniform(robot.lower, robot.upper, (300, robot.n))
+    seeds = np.clip(q + 0.1 * rng.standard_normal(q.shape), robot.lower, robot.upper)
+    result = robot.ik(robot.fk(q), seeds)
+    reached = np.isin(result.status, (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR))
+    # Numeric: a few poses beside a limit may stop there.
+    assert reached.mean() > 0.99
+    assert (result.q >= robot.lower).all()
+    assert (result.q <= robot.upper).all()
+    if all(robot.task_mask):
+        assert result.residual[reached].max() < REACHED
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_poses_are_found_from_home_nearly_always(name):
+    robot, rng = load_table(f"config/robots/{name}.yaml").robot(), np.random.default_rng(6)
+    poses = robot.fk(rng.uniform(robot.lower, robot.upper, (200, robot.n)))
+    status = robot.ik(poses).status
+    assert np.isin(status, (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)).mean() > 0.97
+
+
+def test_the_puma_table_finds_all_eight_branches():
+    robot = load_table("config/robots/puma560.yaml").robot()
+    pose = robot.fk([0.4, -0.6, -0.9, 0.5, 0.7, 0.3])
+    solutions = robot.ik_all(pose)
+    assert len(solutions) == 8
+    assert np.abs(robot.fk(solutions) - pose).max() < REACHED
+
+
+def test_paths_of_a_chain_keep_their_steps_and_pass_the_straight_wrist():
+    robot = load_table("config/robots/puma560.yaml").robot()
+    q = robot.home.copy()
+    q[4] = 0.0
+    straight = robot.fk(q)
+    swing = np.linspace(0.4, -0.4, 1000)
+    poses = np.array(
+        [transform(straight[:3, :3] @ rotation("y", a), straight[:3, 3]) for a in swing]
+    )
+    last, limits = robot.ik(poses[0]).q, np.stack((robot.lower, robot.upper, np.full(6, 0.01)))
+    residual = np.empty(2)
+    for pose in poses:
+        now = np.empty(6)
+        status = robot.kernels.ik(pose, last, limits, robot.geometry_row, now, residual)
+        assert status in {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}
+        assert np.abs(now - last).max() <= 0.01 + 1e-15
+        last = now
+    assert residual.max() < REACHED
+
+
+def test_unreachable_poses_come_back_as_a_status_with_finite_joints():
+    for name in TABLES:
+        robot = load_table(f"config/robots/{name}.yaml").robot()
+        result = robot.ik(transform(np.eye(3), np.array([20.0, 0.0, 0.0])))
+        assert result.status in {IkStatus.UNREACHABLE, IkStatus.LIMITED}
+        assert np.isfinite(result.q).all()
+        assert len(robot.ik_all(transform(np.eye(3), np.array([20.0, 0.0, 0.0])))) == 0
+
+
+def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit():
+    chain = table(
+        [
+            {"theta": "-q + 30", "lower": -90, "upper": 45, "home": 10, "name": "yaw"},
+            {"a": 0.2, "d": "q-0.1", "lower": 0.2, "upper": 0.4},
+        ]
+    )
+    yaw, slide = chain.joints
+    assert (yaw.name, yaw.sign, slide.name, slide.sign) == ("yaw", -1.0, "q2", 1.0)
+    assert np.allclose([yaw.lower, yaw.upper, yaw.home], np.radians([-90, 45, 10]), atol=1e-15)
+    assert slide.home == pytest.approx(0.3)
+    pose = chain.robot().fk([math.radians(30.0), 0.3])
+    assert np.abs(pose - transform(np.eye(3), np.array([0.2, 0.0, 0.2]))).max() < ROUNDING
+
+
+@pytest.mark.parametrize(
+    ("rows", "named"),
+    [
+        ([], "rows"),
+        ("theta", "rows"),
+        ([{"a": 1.0}], "rows"),
+        ([3], "row 1"),
+        ([{"theta": "q", "alpha": math.nan}], "row 1 alpha"),
+        ([{"theta": "q", "a": True}], "row 1 a"),
+        ([{"theta": "q", "a": [1]}], "row 1 a"),
+        ([{"theta": "p"}], "row 1 theta"),
+        ([{"theta": "2 q"}], "row 1 theta"),
+        ([{"alpha": "q"}], "row 1 alpha"),
+        ([{"theta": "q", "d": "q"}], "row 1 d"),
+        ([{"d": "q"}], "row 1 lower"),
+        ([{"theta": "q", "lower": 10, "upper": -10}], "row 1 lower"),
+        ([{"theta": "q", "lower": -10, "upper": 10, "home": 20}], "row 1 home"),
+        ([{"theta": "q"}, {"a": 1.0, "lower": 0.0}], "row 2"),
+        ([{"theta": "q", "twist": 3}], "row 1 entry"),
+    ],
+)
+def test_malformed_rows_are_refused_by_name(rows, named):
+    with pytest.raises(ParameterError) as caught:
+        table(rows)
+    assert caught.value.name == named
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        None,
+        [],
+        {"convention": "modified", "rows": [{"theta": "q"}]},
+        {"name": 3, "convention": "modified", "rows": [{"theta": "q"}]},
+        {"name": "a", "convention": "distant", "rows": [{"theta": "q"}]},
+        {"name": "a", "convention": "modified", "angles": "grad", "rows": [{"theta": "q"}]},
+        {"name": "a", "convention": "modified", "task": ["up"], "rows": [{"theta": "q"}]},
+        {"name": "a", "convention": "modified", "task": [], "rows": [{"theta": "q"}]},
+        {"name": "a", "convention": "modified", "row": [{"theta": "q"}]},
+    ],
+)
+def test_malformed_tables_are_refused(content):
+    with pytest.raises(TeleopError):
+        parse_table(content)
+
+
+def test_unknown_conventions_list_the_known_ones():
+    with pytest.raises(UnknownNameError) as caught:
+        table([{"theta": "q"}], convention="distant")
+    assert set(caught.value.alternatives) == set(CONVENTIONS)
+
+
+def test_files_that_are_not_yaml_or_not_there_are_refused(tmp_path):
+    broken = tmp_path / "broken.yaml"
+    broken.write_text("rows: [", encoding="utf-8")
+    with pytest.raises(ParameterError) as caught:
+        load_table(broken)
+    assert caught.value.value == str(broken)
+    with pytest.raises(FileNotFoundError):
+        load_table(tmp_path / "missing.yaml")
+
+
+def test_joint_vectors_of_another_length_are_refused():
+    chain = table([{"theta": "q"}])
+    with pytest.raises(ShapeError):
+        chain.link_transforms([0.0, 1.0])
+    with pytest.raises(ParameterError):
+        chain.link_transforms([math.nan])
