@@ -1,0 +1,302 @@
+"""Base of all nodes: a lifecycle node around one stage of the graph."""
+
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.task import Future
+
+from teleop_core.bags import topics
+from teleop_core.bags.layouts import layout
+from teleop_core.bags.topics import Kind, Topic
+from teleop_core.errors import TeleopError
+from teleop_core.nodes.declaration import declare, plain, typed
+from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
+from teleop_core.nodes.loop import Loop
+from teleop_core.nodes.rate import Recent, Schedule, TickCounts
+from teleop_core.nodes.streams import Input, Output, message_type, profile
+from teleop_core.parameters import build, parameter, specs, values_of
+from teleop_core.session.graph import Stage
+from teleop_core.signals import TICK_NS
+
+SUCCESS, FAILURE, ERROR = (
+    TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE,
+    TransitionCallbackReturn.ERROR,
+)  # fmt: skip
+_SETPOINTS = (topics.SLAVE_SETPOINT_JS, topics.SLAVE_SETPOINT_CP)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodeParameters:
+    """Parameters that every node has beside those of its stage."""
+
+    autostart: bool = parameter(
+        True, fixed=True, doc="node configures and activates itself; false: a supervisor does"
+    )
+    max_catch_up: int = parameter(
+        100, unit="ticks", lower=0, upper=10_000, fixed=True,
+        doc="missed ticks that one late wake-up makes up for; beyond them time is dropped",
+    )  # fmt: skip
+
+
+class CoreNode(LifecycleNode):  # type: ignore[misc]
+    """Lifecycle node around one stage: fills its signals, steps it, publishes its signals.
+
+    A subclass makes the stage in :meth:`setup` and does one round of work in :meth:`turn`, which
+    runs in a thread of its own while the node is active.
+
+    Args:
+        stage: What the node is in the graph.
+        group: Parameters in place of the stage's own.
+        options: Options of :class:`rclpy.lifecycle.LifecycleNode`.
+
+    Raises:
+        TeleopError: A given parameter is unknown or not allowed.
+    """
+
+    def __init__(self, stage: Stage, group: type | None = None, **options: Any) -> None:
+        super().__init__(stage.name, **options)
+        self._description, self._groups = stage, (NodeParameters, group or stage.parameters)
+        self._specs = {spec.name: spec for entry in self._groups for spec in specs(entry)}
+        self.options, self.parameters = self._built(self._overrides())
+        declare(self, self._specs.values(), values_of(self.options) | values_of(self.parameters))
+        self.add_pre_set_parameters_callback(self._type_empty_lists)
+        self.add_on_set_parameters_callback(self._accept)
+        self.stage: Any = None
+        self.lock = threading.Lock()  # held while the stage works or takes parameters
+        self.ended, self.exit_code = Future(), 0
+        self._loop: Loop | None = None
+        self._inputs: dict[Topic, Input] = {}
+        self._outputs: dict[Topic, Output] = {}
+        self._own_publishers: list[Any] = []
+        self._fresh_counts()
+        self._word = "unconfigured"
+        self._reporter = Reporter(self)
+        self.create_timer(1.0, self.report)
+
+    # -- what subclasses fill in -----------------------------------------------------------------
+
+    def setup(self, parameters: Any) -> None:
+        """Make the stage and open its topics."""
+        raise NotImplementedError
+
+    def turn(self) -> None:
+        """One round of work; blocks for a tenth of a second at most."""
+        raise NotImplementedError
+
+    def start(self) -> None:
+        """Get ready for the first turn; what came while inactive is forgotten already."""
+
+    def stop(self) -> None:
+        """Make the outputs safe after the last turn."""
+
+    def teardown(self) -> None:
+        """Close what :meth:`setup` made beside topics."""
+
+    def concerns(self) -> list[str]:
+        """What is wrong now, in words."""
+        return []
+
+    def values(self) -> dict[str, str]:
+        """Names and texts to report beside the common ones."""
+        return {}
+
+    # -- topics ----------------------------------------------------------------------------------
+
+    def open_streams(self, joint_names: tuple[str, ...] = ()) -> None:
+        """Open the streams that the stage reads and writes, on the fields of its signals."""
+        for topic in self._description.reads:
+            target = self.stage.signals[topic.field]
+            entry = Input(self, topic, joint_names, target, may_repeat=topic in _SETPOINTS)
+            self._inputs[topic] = entry
+        for topic in self._description.writes:
+            if topic.kind is not Kind.REPORT:
+                source = self.stage.signals[topic.field]
+                publisher = self.open_publisher(topic)
+                self._outputs[topic] = Output(publisher, layout(topic, joint_names), source)
+
+    def open_publisher(self, topic: Topic) -> Any:
+        """Publisher that is silent unless the node is active, and closed at cleanup."""
+        kind = message_type(topic.kind.ros_type)
+        publisher = self.create_lifecycle_publisher(kind, topic.name, profile(topic))
+        self._own_publishers.append(publisher)
+        return publisher
+
+    def input(self, topic: Topic) -> Input:
+        """What the node reads from a topic."""
+        return self._inputs[topic]
+
+    def output(self, topic: Topic) -> Output:
+        """What the node writes to a topic."""
+        return self._outputs[topic]
+
+    def _close(self) -> None:
+        for entry in self._inputs.values():
+            entry.subscription.close()
+        for publisher in self._own_publishers:
+            self.destroy_lifecycle_publisher(publisher)
+        self._inputs, self._outputs, self._own_publishers = {}, {}, []
+        self.stage = None
+
+    # -- lifecycle -------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make the stage and open its topics; a refusal leaves nothing open."""
+        self._fresh_counts()
+        result = self._guard("configure", lambda: self.setup(self.parameters), "inactive")
+        if result is not SUCCESS:
+            self._close()
+        return result
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Open the publishers and start to work."""
+        super().on_activate(state)
+        return self._guard("activate", self._begin, "active")
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop to work, then close the publishers."""
+        result = self._guard("deactivate", self._halt, "inactive")
+        super().on_deactivate(state)
+        return result
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close everything: the node can be configured anew."""
+        return self._guard("cleanup", self._clear, "unconfigured")
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop and close everything for good."""
+        return self._guard("shutdown", self._clear, "finalized")
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """After a crash: close everything, so that a supervisor can configure the node anew."""
+        return self._guard("recovery", self._clear, "unconfigured")
+
+    def _begin(self) -> None:
+        for entry in self._inputs.values():
+            entry.forget()
+        self.start()
+        self.schedule.start()
+        self._loop = Loop(self.get_name(), self.turn, self.fail)
+
+    def _halt(self) -> None:
+        if self._loop is not None:
+            self._loop.stop()
+            self._loop = None
+            self.stop()
+
+    def _clear(self) -> None:
+        self._halt()
+        if self.stage is not None:
+            self.teardown()
+        self._close()
+
+    def _guard(
+        self, transition: str, action: Callable[[], None], word: str
+    ) -> TransitionCallbackReturn:
+        try:
+            action()
+        except TeleopError as error:  # a refusal, in one readable line
+            self.get_logger().error(f"{transition} refused: {error}")
+            return FAILURE
+        except Exception:  # rclpy would turn it into ERROR without a word
+            self.get_logger().fatal(f"{transition} crashed:\n{traceback.format_exc()}")
+            return ERROR
+        self._word = word
+        self.report()
+        return SUCCESS
+
+    def fail(self, reason: str, is_expected: bool) -> None:
+        """End the work from within the loop: the outputs fall silent, and the process ends."""
+        log = self.get_logger()
+        log.error(reason) if is_expected else log.fatal(f"crashed:\n{reason}")
+        self._word = "failed"
+        if self.options.autostart:
+            self.end(1)
+        elif self.executor is not None:
+            self.executor.create_task(self.trigger_deactivate)
+
+    def end(self, exit_code: int) -> None:
+        """Let the process end; may be called from any thread."""
+        self.exit_code = self.exit_code or exit_code
+        if not self.ended.done():
+            self.ended.set_result(None)
+
+    # -- parameters ------------------------------------------------------------------------------
+
+    def _overrides(self) -> dict[str, Any]:
+        """What the command line and parameter files say, less what rclpy itself has declared."""
+        given = self._parameter_overrides.items()
+        return {
+            name: plain(self._specs.get(name), entry.value)
+            for name, entry in given
+            if not self.has_parameter(name) and not name.startswith("qos_overrides.")
+        }
+
+    def _built(self, values: dict[str, Any]) -> tuple[NodeParameters, Any]:
+        options, group = self._groups
+        own = {spec.name for spec in specs(options)}
+        prefix = f"{self.get_name()}."
+        return (
+            build(options, {k: v for k, v in values.items() if k in own}, prefix),
+            build(group, {k: v for k, v in values.items() if k not in own}, prefix),
+        )
+
+    def _type_empty_lists(self, changes: list[Parameter]) -> list[Parameter]:
+        return [typed(self._specs.get(change.name), change) for change in changes]
+
+    def _accept(self, changes: list[Parameter]) -> SetParametersResult:
+        """Take all changes or none: the group is built anew, and the stage must take it."""
+        own = [change for change in changes if change.name in self._specs]
+        values = values_of(self.options) | values_of(self.parameters)
+        values |= {c.name: plain(self._specs[c.name], c.value) for c in own}
+        try:
+            _, parameters = self._built(values)
+            self._retune(parameters)
+        except TeleopError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        self.parameters = parameters
+        return SetParametersResult(successful=True)
+
+    def _retune(self, parameters: Any) -> None:
+        if self.stage is None or not hasattr(self.stage, "retune"):
+            return
+        with self.lock:
+            try:
+                self.stage.retune(parameters)
+            except TeleopError:
+                self.stage.retune(self.parameters)
+                raise
+
+    # -- diagnostics -----------------------------------------------------------------------------
+
+    def _fresh_counts(self) -> None:
+        self.schedule = Schedule(time.monotonic_ns, time.sleep, self.options.max_catch_up)
+        self.delay = Recent()  # from the master's sample to what was made of it, [ns]
+
+    @property
+    def counts(self) -> TickCounts:
+        """What became of the ticks since the node was configured."""
+        return self.schedule.counts
+
+    def report(self) -> None:
+        """Publish how the node is."""
+        inputs = list(self._inputs.values())
+        is_active = self._word == "active"
+        concerns = self._reporter.input_concerns(inputs)
+        if is_active:
+            concerns += self.concerns()
+        elif self._word == "failed":
+            concerns.append("failed; see its log")
+        rate = self._reporter.rate(self.counts.ticks)
+        values = tick_values(self._word, rate, self.counts, TICK_NS * 1e-6)
+        values |= input_values(inputs)
+        values |= {f"sent.{t.name}": str(o.sent) for t, o in self._outputs.items()}
+        values |= recent_values("lateness", self.schedule.lateness)
+        values |= recent_values("delay", self.delay) | (self.values() if is_active else {})
+        self._reporter.send(concerns, self._word, values)

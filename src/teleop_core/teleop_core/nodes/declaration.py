@@ -1,0 +1,87 @@
+"""Declaration: parameter groups become typed, bounded ROS parameters, and back."""
+
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from teleop_core.parameters import Spec, Value
+
+_SCALARS = {
+    bool: Parameter.Type.BOOL,
+    int: Parameter.Type.INTEGER,
+    float: Parameter.Type.DOUBLE,
+    str: Parameter.Type.STRING,
+}
+_ARRAYS = {
+    bool: Parameter.Type.BOOL_ARRAY,
+    int: Parameter.Type.INTEGER_ARRAY,
+    float: Parameter.Type.DOUBLE_ARRAY,
+    str: Parameter.Type.STRING_ARRAY,
+}
+_LARGEST_INTEGER = 2**63 - 1
+
+
+def ros_type(spec: Spec) -> Parameter.Type:
+    """Type of the ROS parameter."""
+    return (_ARRAYS if spec.kind is tuple else _SCALARS)[spec.element]
+
+
+def descriptor(spec: Spec) -> ParameterDescriptor:
+    """Description with unit and bounds, as ``ros2 param describe`` shows it."""
+    out = ParameterDescriptor(name=spec.name, read_only=spec.fixed, type=ros_type(spec).value)
+    out.description = f"{spec.doc} [{spec.unit}]" if spec.unit else spec.doc
+    constraints = [f"one of {', '.join(spec.choices)}"] if spec.choices else []
+    if spec.length is not None:
+        constraints.append(f"{spec.length} values")
+    if spec.lower is not None or spec.upper is not None:
+        constraints.append(spec.bounds())
+        _bound(out, spec)
+    out.additional_constraints = "; ".join(constraints)
+    return out
+
+
+def _bound(out: ParameterDescriptor, spec: Spec) -> None:
+    largest = sys.float_info.max if spec.element is float else _LARGEST_INTEGER
+    lower = -largest if spec.lower is None else spec.lower
+    upper = largest if spec.upper is None else spec.upper
+    if spec.element is float:
+        limits = FloatingPointRange(from_value=float(lower), to_value=float(upper))
+        out.floating_point_range = [limits]
+    elif spec.element is int:
+        out.integer_range = [IntegerRange(from_value=int(lower), to_value=int(upper))]
+
+
+def declare(node: Node, specs: Iterable[Spec], values: Mapping[str, Value]) -> None:
+    """Declare parameters with these values; what the command line says is in them already.
+
+    rclpy takes an empty list for bytes and refuses it elsewhere, so lists are declared by their
+    type and set afterwards; only then can they become read-only.
+    """
+    for spec in specs:
+        value, about = values[spec.name], descriptor(spec)
+        if spec.kind is not tuple:
+            node.declare_parameter(spec.name, value, about, ignore_override=True)
+            continue
+        about.read_only = False
+        node.declare_parameter(spec.name, ros_type(spec), about, ignore_override=True)
+        assert isinstance(value, tuple)
+        node.set_parameters([Parameter(spec.name, ros_type(spec), list(value))])
+        node.set_descriptor(spec.name, descriptor(spec))
+
+
+def plain(spec: Spec | None, value: Any) -> Any:
+    """Python value of a ROS one: lists as tuples; an empty YAML list, which has no type, as ()."""
+    if spec is not None and spec.kind is tuple and value is None:
+        return ()
+    return value if value is None or isinstance(value, bool | int | float | str) else tuple(value)
+
+
+def typed(spec: Spec | None, parameter: Parameter) -> Parameter:
+    """The parameter, or if it is an empty list, one of the declared type."""
+    if spec is None or spec.kind is not tuple or plain(spec, parameter.value) != ():
+        return parameter
+    return Parameter(parameter.name, ros_type(spec), [])

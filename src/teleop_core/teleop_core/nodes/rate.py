@@ -1,0 +1,109 @@
+"""Rate: the schedule of a 1 kHz loop, with the clock and the sleep handed in."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.signals import TICK_NS
+
+
+@dataclass
+class TickCounts:
+    """What became of the ticks of a loop so far.
+
+    Attributes:
+        ticks: Ticks executed.
+        late: Wake-ups later than half a period.
+        missed: Ticks that were not begun before the next one was due.
+        caught_up: Missed ticks that were executed all the same, in the next wake-up.
+        dropped: Missed ticks that never will be.
+    """
+
+    ticks: int = 0
+    late: int = 0
+    missed: int = 0
+    caught_up: int = 0
+    dropped: int = 0
+
+
+class Recent:
+    """The last numbers of a stream, for their median and extremes.
+
+    Args:
+        size: How many are kept.
+    """
+
+    def __init__(self, size: int = 1000) -> None:
+        self._numbers = np.zeros(size)
+        self._count = 0
+
+    def put(self, number: float) -> None:
+        """Add a number in place of the oldest one."""
+        self._numbers[self._count % len(self._numbers)] = number
+        self._count += 1
+
+    def summary(self) -> tuple[float, float, float]:
+        """Median, 99th percentile and maximum; zeros without numbers."""
+        kept = self._numbers[: self._count]
+        if not len(kept):
+            return 0.0, 0.0, 0.0
+        median, high = np.percentile(kept, (50.0, 99.0))
+        return float(median), float(high), float(kept.max())
+
+
+class Schedule:
+    """Absolute schedule of ticks: one for every elapsed period, however late the wake-ups are.
+
+    Args:
+        clock: Monotonic time [ns].
+        sleep: Waits for some seconds, perhaps longer, perhaps shorter.
+        max_catch_up: Largest number of missed ticks that one wake-up makes up for; what is
+            missed beyond it is dropped and counted.
+        period_ns: Time from tick to tick [ns].
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], int],
+        sleep: Callable[[float], None],
+        max_catch_up: int = 100,
+        period_ns: int = TICK_NS,
+    ) -> None:
+        self._clock, self._sleep = clock, sleep
+        self._max_catch_up, self._period_ns = max_catch_up, period_ns
+        self.counts = TickCounts()
+        self.lateness = Recent()
+        """Wake-up after the tick it was for, [ns]."""
+        self.start()
+
+    def start(self) -> None:
+        """Begin now: the first tick is due one period from here."""
+        self._next_ns = self._clock() + self._period_ns
+
+    def due(self) -> range:
+        """Sleep until the next tick is due.
+
+        Returns:
+            Nominal times [ns] of the ticks to execute now, at least one, oldest first.
+        """
+        now_ns = self._clock()
+        while now_ns < self._next_ns:
+            self._sleep((self._next_ns - now_ns) * 1e-9)
+            now_ns = self._clock()
+        late_ns = now_ns - self._next_ns
+        missed = late_ns // self._period_ns
+        dropped = max(0, missed - self._max_catch_up)
+        first_ns = self._next_ns + dropped * self._period_ns
+        self._next_ns += (missed + 1) * self._period_ns
+        self._count(late_ns, missed, dropped)
+        return range(first_ns, self._next_ns, self._period_ns)
+
+    def _count(self, late_ns: int, missed: int, dropped: int) -> None:
+        counts = self.counts
+        counts.ticks += missed + 1 - dropped
+        counts.late += late_ns > self._period_ns // 2
+        counts.missed += missed
+        counts.caught_up += missed - dropped
+        counts.dropped += dropped
+        self.lateness.put(late_ns)

@@ -1,0 +1,131 @@
+"""Node ``recorder``: every message of the graph as it came, in an MCAP recording."""
+
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from teleop_core.bags import topics
+from teleop_core.bags.recording import RecordingParameters
+from teleop_core.bags.topics import Quality, Topic
+from teleop_core.bags.writer import BagWriter
+from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.process import run
+from teleop_core.nodes.streams import Subscription
+from teleop_core.parameters import parameter
+from teleop_core.session.configuration import Configuration, parse_layer
+from teleop_core.session.graph import STAGE
+from teleop_core.session.runner import describe
+
+DEPTH = 2000
+"""Messages of one topic that wait while the disk or another process is slow: two seconds."""
+_PAUSE = 5e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecorderParameters(RecordingParameters):
+    """Parameters of the recorder as a node."""
+
+    out: str = parameter("", fixed=True, doc="directory to make; empty: bags/ and the time")
+    configuration: str = parameter(
+        "", fixed=True, doc="parameter file of the session, as text, kept with the recording"
+    )
+    scenario: str = parameter("", fixed=True, doc="name of the session, kept with the recording")
+
+
+class _Channel:
+    """One recorded topic: what came and what the middleware lost on the way."""
+
+    def __init__(self, node: CoreNode, topic: Topic) -> None:
+        depth = 10 if topic.quality is Quality.LATCHED else DEPTH
+        self.topic, self.subscription = topic, Subscription(node, topic, depth)
+        self.received = self.lost = self._number = 0
+
+    def count(self, number: int) -> None:
+        """Note a message by its number in the publisher's sequence; a smaller one starts anew."""
+        self.received += 1
+        if self._number and number > self._number:
+            self.lost += number - self._number - 1
+        self._number = number
+
+
+class RecorderNode(CoreNode):
+    """Takes what has come, some hundred times a second, and hands it to the writer unread."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(STAGE["recorder"], RecorderParameters, **options)
+
+    def setup(self, parameters: RecorderParameters) -> None:
+        """Make the recording's directory."""
+        name = parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S")
+        self._writer = BagWriter(
+            Path(name), topics.ALL, (), parameters=parameters, metadata=_metadata(parameters),
+            start_ns=time.time_ns(),
+        )  # fmt: skip
+        self.stage = self._writer
+        self._channels: list[_Channel] = []
+        every = parameters.every_nth(topics.ALL)
+        self._recorded = [topic for topic in topics.ALL if every[topic.name]]
+
+    def start(self) -> None:
+        """Open the topics; latched ones send what they have."""
+        self._channels = [_Channel(self, topic) for topic in self._recorded]
+
+    def turn(self) -> None:
+        """Record what has come."""
+        time.sleep(_PAUSE)
+        self._drain()
+        self.counts.ticks += 1
+
+    def stop(self) -> None:
+        """Record what came last, and close the topics."""
+        self._drain()
+        for channel in self._channels:
+            channel.subscription.close()
+
+    def teardown(self) -> None:
+        """Finish the recording."""
+        self._writer.close()
+
+    def _drain(self) -> None:
+        came = []
+        for channel in self._channels:
+            while (taken := channel.subscription.take()) is not None:
+                data, about = taken
+                channel.count(about["publication_sequence_number"])
+                came.append((about["received_timestamp"], channel.topic, data,
+                             about["source_timestamp"]))  # fmt: skip
+        came.sort(key=lambda message: message[0])
+        for received_ns, topic, data, sent_ns in came:
+            self._writer.write(topic, received_ns, data, sent_ns)
+
+    def concerns(self) -> list[str]:
+        """Topics of which messages were lost before they came here."""
+        return [f"lost {c.lost} of {c.topic.name}" for c in self._channels if c.lost]
+
+    def values(self) -> dict[str, str]:
+        """What came, what was lost, and where it is recorded."""
+        values = {"out": str(self._writer.path)}
+        for channel in self._channels:
+            values[f"received.{channel.topic.name}"] = str(channel.received)
+            values[f"lost.{channel.topic.name}"] = str(channel.lost)
+        return values
+
+
+def _metadata(parameters: RecorderParameters) -> dict[str, str]:
+    """Names and texts stored with the recording."""
+    content = yaml.safe_load(parameters.configuration) or {}
+    layer = parse_layer(content, "recorder.configuration")
+    return describe(Configuration.from_layers([layer], parameters.scenario))
+
+
+def main() -> int:
+    """Entry point of ``ros2 run teleop_core recorder``."""
+    return run(RecorderNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

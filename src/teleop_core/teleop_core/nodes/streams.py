@@ -1,0 +1,216 @@
+"""Streams: raw messages in and out of the signals of a stage, without executor and conversion.
+
+A message that has exactly the bytes our own nodes send is decoded at fixed places; any other
+message of the type (another frame, other names, another order) is deserialised and read by name.
+Both give the same values.
+"""
+
+import time
+from collections import Counter
+from importlib import import_module
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+
+from teleop_core.bags.messages import Layout, Refusal, Values, check, layout, read_values
+from teleop_core.bags.topics import Quality, Topic
+from teleop_core.geometry import Array
+
+SILENCE_NS = 2_000_000_000
+"""After this long without a sound message a sender may start anew with any stamp [ns]."""
+_DEPTHS = {Quality.STREAM: 1, Quality.LATCHED: 1, Quality.REPORT: 10}
+
+
+def message_type(ros_type: str) -> Any:
+    """Class of a message, from a name like ``sensor_msgs/msg/JointState``.
+
+    Raises:
+        ImportError: Its package is not installed.
+        AttributeError: The package has no such message.
+    """
+    package, _, name = ros_type.split("/")
+    return getattr(import_module(f"{package}.msg"), name)
+
+
+def profile(topic: Topic, depth: int | None = None) -> QoSProfile:
+    """How a topic is transported; ``depth`` in place of the topic's own for deep queues."""
+    is_stream, is_latched = topic.quality is Quality.STREAM, topic.quality is Quality.LATCHED
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth or _DEPTHS[topic.quality],
+        reliability=ReliabilityPolicy.BEST_EFFORT if is_stream else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+class Unattended(CallbackGroup):
+    """Group that no executor ever serves: its subscriptions are taken from by hand."""
+
+    def can_execute(self, entity: Any) -> bool:
+        """Never."""
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        """Never."""
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        """Nothing to end."""
+
+
+class Subscription:
+    """Raw subscription whose messages are taken by hand.
+
+    Args:
+        node: Node that owns it.
+        topic: What it listens to.
+        depth: Length of the queue; None for the topic's own.
+    """
+
+    def __init__(self, node: Node, topic: Topic, depth: int | None = None) -> None:
+        self.topic, self._node = topic, node
+        self.type = message_type(topic.kind.ros_type)
+        self._own = node.create_subscription(
+            self.type, topic.name, _ignore, profile(topic, depth), raw=True,
+            callback_group=Unattended(),
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )  # fmt: skip
+        self.handle = self._own.handle
+        self._take = self.handle.take_message
+
+    def take(self) -> tuple[bytes, dict[str, Any]] | None:
+        """Oldest waiting message and what the middleware knows about it; None if there is none."""
+        return self._take(self.type, True)  # type: ignore[no-any-return]
+
+    def publishers(self) -> int:
+        """How many publishers this topic has now."""
+        return self._own.get_publisher_count()  # type: ignore[no-any-return]
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._node.destroy_subscription(self._own)
+
+
+def _ignore(data: bytes) -> None:
+    """Stand in for the callback that is never called."""
+
+
+class Waiter:
+    """Waits until a subscription has a message, without an executor (1 µs in place of 200)."""
+
+    def __init__(self, context: Context, subscription: Subscription) -> None:
+        self._handle = subscription.handle
+        self._set = rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, context.handle)
+
+    def wait(self, timeout: float) -> None:
+        """Return when there is a message or after ``timeout`` [s]."""
+        self._set.clear_entities()
+        self._set.add_subscription(self._handle)
+        self._set.wait(int(timeout * 1e9))
+
+
+class Input:
+    """Newest sound message of one topic, kept in the signals of a stage.
+
+    Args:
+        node: Node that owns it.
+        topic: What it listens to.
+        joint_names: Order of the joints in the signals.
+        target: Where the values are written, shape (width,).
+        may_repeat: Whether a stamp may come again, and 0 at any time: as that of the command in
+            force, 0 for none, which setpoints carry.
+
+    Attributes:
+        stamp_ns: Stamp of the newest sound message; None before the first.
+        arrival_ns: Monotonic time at which it was taken [ns].
+        received: Number of messages taken, sound or not.
+        refused: Number of unsound messages, by reason.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topic: Topic,
+        joint_names: tuple[str, ...],
+        target: Array,
+        may_repeat: bool = False,
+    ) -> None:
+        self.topic, self.subscription = topic, Subscription(node, topic)
+        self._joint_names, self._target, self._may_repeat = joint_names, target, may_repeat
+        self._layout = layout(topic, joint_names)
+        self.received, self.refused = 0, Counter[Refusal]()
+        self.stamp_ns: int | None = None
+        self.arrival_ns = 0
+
+    def take(self) -> bool:
+        """Write the waiting message into the signals; whether there was a sound one."""
+        taken = self.subscription.take()
+        if taken is None:
+            return False
+        self.received += 1
+        found = self._layout.decode_one(taken[0]) or self._read(taken[0])
+        if isinstance(found, Refusal):
+            self.refused[found] += 1
+            return False
+        return self._accept(*found)
+
+    def _accept(self, stamp_ns: int, values: Values) -> bool:
+        now_ns, last_ns = time.monotonic_ns(), self.stamp_ns
+        if now_ns - self.arrival_ns > SILENCE_NS or (self._may_repeat and stamp_ns == 0):
+            last_ns = None
+        elif self._may_repeat and last_ns is not None:
+            last_ns -= 1
+        reason = check(self.topic.kind, stamp_ns, values, last_ns)
+        if reason is not None:
+            self.refused[reason] += 1
+            return False
+        self._target[:] = values
+        self.stamp_ns, self.arrival_ns = stamp_ns, now_ns
+        return True
+
+    def _read(self, data: bytes) -> tuple[int, Values] | Refusal:
+        """Stamp and values of a message with other bytes than ours."""
+        message = deserialize_message(data, self.subscription.type)
+        return read_values(self.topic.kind, message, self._joint_names)
+
+    def age(self) -> float:
+        """Time since the last sound message was taken [s]; infinite before the first."""
+        if self.stamp_ns is None:
+            return float("inf")
+        return (time.monotonic_ns() - self.arrival_ns) * 1e-9
+
+    def forget(self) -> None:
+        """Throw away what waits and start anew: the first message may have any stamp."""
+        while self.subscription.take() is not None:
+            pass
+        self.stamp_ns = None
+        self.arrival_ns = 0
+
+
+class Output:
+    """Publisher of one topic from the signals of a stage.
+
+    Args:
+        publisher: Where the bytes go.
+        form: Layout of the messages.
+        source: Where the values stand, shape (width,).
+
+    Attributes:
+        sent: Number of messages.
+    """
+
+    def __init__(self, publisher: Publisher, form: Layout, source: Array) -> None:
+        self._publish, self._encode, self._source = publisher.publish, form.encode_one, source
+        self.sent = 0
+
+    def send(self, stamp_ns: int) -> None:
+        """Publish the present values under a stamp [ns]."""
+        self._publish(self._encode(stamp_ns, self._source))
+        self.sent += 1
