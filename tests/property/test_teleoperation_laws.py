@@ -1,0 +1,350 @@
+"""Laws of teleoperation over random sequences of what operators and supervisors do."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from teleop_core.mapping.motion_scaling import (
+    R_SLAVE_MASTER,
+    MotionScaling,
+    MotionScalingParameters,
+)
+from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
+from teleop_core.session.graph import Graph
+from teleop_core.signals import STATE, TICK_NS, make_signals
+
+# A command of 0.5 m is rounded to 1e-16 m at every sample.
+ROUNDING = 1e-14
+# Angle of a product of four unit quaternions.
+ANGLE_ROUNDING = 1e-14
+# Box centres are reported to a nanometre.
+NANOMETRE = 1.0e-9
+TIMEOUT_NS = 100_000_000
+HOME = load_robot("rcrt1").fk(load_robot("rcrt1").home)
+
+
+def turn_between(a, b):
+    """Angle of the rotation between two quaternions [rad], without losing small ones."""
+    w = a @ b
+    x = a[0] * b[1:] - b[0] * a[1:] - np.cross(a[1:], b[1:])
+    return 2.0 * math.atan2(float(np.linalg.norm(x)), abs(float(w)))
+
+
+@dataclass
+class Sample:
+    """What one sample did to the command, and what the hand had done before it."""
+
+    moved: np.ndarray
+    turned: float
+    hand_step: np.ndarray
+    hand_turn: float
+    gain: float
+
+
+class Desk:
+    """Motion scaling between a hand and a slave that stands where it was told to."""
+
+    def __init__(self):
+        self.scaling = MotionScaling(MotionScalingParameters())
+        self.row = self.scaling.signals
+        self.hand, self.attitude = np.zeros(3), Rotation.identity()
+        self.buttons = np.zeros(3)
+        self.row["slave_setpoint_cp"][:3] = HOME[:3, 3]
+        quaternion = Rotation.from_matrix(HOME[:3, :3]).as_quat(scalar_first=True)
+        self.row["slave_setpoint_cp"][3:] = quaternion
+        self.row["slave_servo_cp"] = self.row["slave_setpoint_cp"]
+        self.row["stamp_ns"] = self.row["setpoint_stamp_ns"] = TICK_NS
+        self.sample(np.zeros(3), np.zeros(3))
+
+    def sample(self, step, turn, gap_ns=TICK_NS):
+        row, before = self.row, self.row["slave_servo_cp"].copy()
+        stylus_before = row["master_measured_cp"].copy()
+        self.hand, self.attitude = self.hand + step, Rotation.from_rotvec(turn) * self.attitude
+        row["stamp_ns"] += gap_ns
+        row["master_measured_cp"][:3] = self.hand
+        row["master_measured_cp"][3:] = self.attitude.as_quat(scalar_first=True)
+        row["master_buttons"] = self.buttons
+        self.scaling.step()
+        after = row["slave_servo_cp"].copy()
+        row["slave_setpoint_cp"], row["setpoint_stamp_ns"] = after, row["stamp_ns"]
+        return Sample(
+            after[:3] - before[:3],
+            turn_between(before[3:], after[3:]),
+            row["master_measured_cp"][:3] - stylus_before[:3],
+            turn_between(stylus_before[3:], row["master_measured_cp"][3:]),
+            row["teleop_state"][STATE["gain"]],
+        )
+
+    def box(self):
+        start = STATE["fixture_center_x"]
+        return self.row["teleop_state"][start : start + 6].copy()
+
+    def act(self, action, value):
+        """Do something between two samples; returns the stamp step to the next sample [ns]."""
+        if action in {"clutch", "fixture", "mode"}:
+            index = ("clutch", "fixture", "mode").index(action)
+            self.buttons[index] = 1.0 - self.buttons[index]
+        elif action == "reset":
+            self.scaling.reset()
+        elif action == "retune":
+            fine = 0.01 + 0.09 * value
+            self.scaling.retune(
+                MotionScalingParameters(
+                    coarse_gain=0.1 + 3.0 * value, fine_gain=fine, tool_roll=3.0 * value,
+                    mode="fine" if value > 0.5 else "coarse",
+                )
+            )  # fmt: skip
+        return round(5e8 * value) + 1 if action == "gap" else TICK_NS
+
+
+ACTIONS = ("nothing", "clutch", "fixture", "mode", "reset", "retune", "gap")
+metres, radians = st.floats(-0.02, 0.02), st.floats(-0.5, 0.5)
+triple = st.tuples(metres, metres, metres).map(np.array)
+turns = st.tuples(radians, radians, radians).map(np.array)
+events = st.lists(
+    st.tuples(st.sampled_from(ACTIONS), st.floats(0.0, 1.0), triple, turns), max_size=40
+)
+
+
+@given(events)
+def test_no_event_moves_the_command_further_than_gain_times_the_hand(happened):
+    desk = Desk()
+    for action, value, step, turn in happened:
+        done = desk.sample(step, turn, desk.act(action, value))
+        allowed = done.gain * np.linalg.norm(done.hand_step)
+        assert np.linalg.norm(done.moved) <= allowed + ROUNDING, action
+        assert done.turned <= done.hand_turn + ANGLE_ROUNDING, action
+
+
+@given(events)
+def test_no_event_moves_the_command_while_the_hand_rests(happened):
+    desk = Desk()
+    for action, value, step, turn in happened:
+        desk.sample(step, turn)
+        done = desk.sample(np.zeros(3), np.zeros(3), desk.act(action, value))
+        assert np.abs(done.moved).max() <= ROUNDING, action
+        assert done.turned <= ANGLE_ROUNDING, action
+
+
+@given(events)
+def test_clutching_resetting_and_pausing_hold_the_command_whatever_the_hand_does(happened):
+    desk = Desk()
+    for action, value, step, turn in happened:
+        was_clutched = desk.buttons[0] > 0.0
+        gap_ns = desk.act(action, value)
+        done = desk.sample(step, turn, gap_ns)
+        is_held = was_clutched or desk.buttons[0] > 0.0
+        if is_held or action == "reset" or gap_ns > TIMEOUT_NS:
+            assert not done.moved.any(), action
+            assert done.turned == 0.0, action
+
+
+@given(events)
+def test_scaling_is_linear_between_the_events(happened):
+    desk = Desk()
+    for action, value, step, turn in happened:
+        was_clutched = desk.buttons[0] > 0.0
+        done = desk.sample(step, turn, desk.act(action, value))
+        if action in {"nothing", "fixture", "mode"} and not was_clutched:
+            expected = done.gain * (R_SLAVE_MASTER @ done.hand_step)
+            assert np.allclose(done.moved, expected, rtol=0.0, atol=ROUNDING), action
+            assert math.isclose(done.turned, done.hand_turn, abs_tol=ANGLE_ROUNDING), action
+
+
+@given(events)
+def test_attitude_follows_the_stylus_in_its_own_frame_after_any_event(happened):
+    desk = Desk()
+    for action, value, step, turn in happened:
+        desk.sample(step, turn, desk.act(action, value))
+    desk.buttons[0] = 0.0
+    desk.sample(np.zeros(3), np.zeros(3))
+    command = desk.row["slave_servo_cp"][3:].copy()
+    stylus = desk.attitude
+    desk.sample(np.zeros(3), np.array([0.3, -0.2, 0.1]))
+    before = Rotation.from_quat(command, scalar_first=True)
+    after = Rotation.from_quat(desk.row["slave_servo_cp"][3:], scalar_first=True)
+    p = desk.scaling.parameters["stylus_tool"].copy()
+    stylus_tool = Rotation.from_quat(p, scalar_first=True)
+    in_stylus = stylus.inv() * desk.attitude
+    expected = stylus_tool.inv() * in_stylus * stylus_tool
+    assert (expected.inv() * (before.inv() * after)).magnitude() < 1e-13
+
+
+@given(events, st.lists(st.tuples(triple, turns), min_size=1, max_size=10))
+def test_box_stays_at_the_slave_while_clutched(happened, clutched):
+    desk = Desk()
+    desk.act("fixture", 0.0)
+    for action, value, step, turn in happened:
+        if action in {"clutch", "mode", "nothing"}:
+            desk.sample(step, turn, desk.act(action, value))
+    before = None
+    desk.buttons[0] = 1.0
+    for step, turn in clutched:
+        desk.sample(step, turn)
+        assert before is None or np.abs(desk.box() - before).max() <= NANOMETRE
+        before = desk.box()
+    desk.buttons[0] = 0.0
+    desk.sample(np.full(3, 0.01), np.zeros(3))
+    assert np.abs(desk.box() - before).max() <= NANOMETRE
+
+
+@given(events)
+def test_box_stays_where_it_is_until_gain_box_or_slave_change(happened):
+    desk = Desk()
+    for action, value, step, turn in happened:
+        before, was_on = desk.box(), desk.row["teleop_state"][STATE["is_fixture_on"]]
+        desk.sample(step, turn, desk.act(action, value))
+        is_on = desk.row["teleop_state"][STATE["is_fixture_on"]]
+        if was_on and is_on and action in {"nothing", "clutch", "gap"}:
+            # Two roundings to a nanometre.
+            assert np.abs(desk.box() - before).max() <= 2.0 * NANOMETRE, action
+
+
+@given(events)
+def test_the_same_hand_never_moves_the_slave_further_in_fine_mode(happened):
+    coarse, fine = Desk(), Desk()
+    fine.scaling.retune(MotionScalingParameters(mode="fine"))
+    fine.sample(np.zeros(3), np.zeros(3))
+    for action, value, step, turn in happened:
+        if action in {"mode", "retune"}:
+            continue
+        moved = [desk.sample(step, turn, desk.act(action, value)).moved for desk in (coarse, fine)]
+        assert np.linalg.norm(moved[1]) <= np.linalg.norm(moved[0]) + ROUNDING
+
+
+@given(triple, st.lists(st.floats(0.01, 1.0), min_size=1, max_size=20))
+def test_gain_does_not_depend_on_how_often_the_hand_is_sampled(end, spacing):
+    shares = np.cumsum(spacing) / np.sum(spacing)
+    once, often = Desk(), Desk()
+    once.sample(end, np.zeros(3))
+    for share in np.diff(shares, prepend=0.0):
+        often.sample(share * end, np.zeros(3), round(9e7 * share) + 1)
+    apart = once.row["slave_servo_cp"][:3] - often.row["slave_servo_cp"][:3]
+    assert np.abs(apart).max() <= len(spacing) * ROUNDING
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=10)
+def test_closing_the_loop_of_the_hand_closes_that_of_the_slave(seed):
+    rng = np.random.default_rng(seed)
+    steps = rng.uniform(-0.01, 0.01, (50, 3))
+    desk = Desk()
+    for step in (*steps, -steps.sum(axis=0)):
+        desk.sample(step, np.zeros(3))
+    # 51 sums of numbers up to 0.5 m.
+    assert np.abs(desk.row["slave_servo_cp"][:3] - HOME[:3, 3]).max() < 51 * ROUNDING
+
+
+# From here on: the whole graph, with its simulated hand, inverse kinematics and slave.
+seconds = st.floats(0.0, 2.9).map(lambda t: round(t, 3))
+
+
+def graph_of(seed, clutch=(), fixture=(), mode=(), **settings_):
+    text = [f"{key}={value}" for key, value in settings_.items()]
+    texts = [
+        f"seed={seed}", "path.approach_time=0.5", "path.center=[0.01, 0.0, 0.03]",
+        "path.period=4.0", f"buttons.clutch={sorted(clutch)}", f"buttons.fixture={list(fixture)}",
+        f"buttons.mode={list(mode)}",
+    ]  # fmt: skip
+    return Graph(configure(settings=[*texts, *text]).groups)
+
+
+def assert_command_moves_with_the_hand(block, first):
+    """No tick from ``first`` on moves the command further than gain times the hand."""
+    command, hand = block["slave_servo_cp"][first:], block["master_measured_cp"][first:]
+    gain = block["teleop_state"][first:][1:, STATE["gain"]]
+    moved = np.linalg.norm(np.diff(command[:, :3], axis=0), axis=1)
+    allowed = gain * np.linalg.norm(np.diff(hand[:, :3], axis=0), axis=1)
+    assert (moved <= allowed + ROUNDING).all()
+    turned, allowed_turn = (
+        (Rotation.from_quat(q[1:], scalar_first=True)
+         * Rotation.from_quat(q[:-1], scalar_first=True).inv()).magnitude()
+        for q in (command[:, 3:], hand[:, 3:])
+    )  # fmt: skip
+    assert (turned <= allowed_turn + 10 * ANGLE_ROUNDING).all()
+
+
+@given(
+    st.integers(0, 1000),
+    st.lists(seconds, max_size=4, unique=True).filter(lambda t: len(t) % 2 == 0),
+    st.lists(seconds, max_size=3), st.lists(seconds, max_size=3),
+)  # fmt: skip
+@settings(max_examples=25)
+def test_buttons_in_a_running_session_never_move_the_slave(seed, clutch, fixture, mode):
+    block = graph_of(seed, clutch, fixture, mode).run(3000)
+    assert_command_moves_with_the_hand(block, 0)
+    is_clutched = block["teleop_state"][:, STATE["is_clutched"]] > 0.0
+    held = is_clutched[1:] & is_clutched[:-1]
+    assert not np.diff(block["slave_servo_cp"], axis=0)[held].any()
+    assert np.isfinite(block["slave_measured_js"]).all()
+    assert (block["command_status"] == 0).all()
+
+
+@given(st.integers(0, 1000), st.integers(600, 2500))
+@settings(max_examples=10)
+def test_restarting_the_scaling_in_motion_holds_the_slave_where_it_is(seed, at):
+    graph = graph_of(seed)
+    before = graph.run(at)[-1]
+    graph.scaling.reset()
+    after = graph.run(500)
+    assert np.array_equal(after["slave_servo_cp"][0], before["slave_setpoint_cp"])
+    assert_command_moves_with_the_hand(after, 0)
+    # The filter passes a tenth of the way that the slave still had to go, back at once.
+    lag = np.linalg.norm(before["slave_servo_cp"][:3] - before["slave_setpoint_cp"][:3])
+    first_step = after["slave_setpoint_cp"][0, :3] - before["slave_setpoint_cp"][:3]
+    assert np.linalg.norm(first_step) <= 0.2 * lag + 1e-6
+
+
+@given(st.integers(0, 1000), st.integers(600, 2500), st.sampled_from(["scaling", "ik", "both"]))
+@settings(max_examples=10)
+def test_restarting_at_rest_moves_nothing_at_all(seed, at, what):
+    rest = {"path.kind": "hold", "path.center": [0.0, 0.0, 0.0], "path.rotation": 0.0}
+    graph = graph_of(seed, **rest, gimbal_noise=0.0, tremor_amplitude=0.0)
+    before = graph.run(at)[-1]
+    if what in {"scaling", "both"}:
+        graph.scaling.reset()
+    if what in {"ik", "both"}:
+        graph.ik.work[1][:] = graph.signals["slave_setpoint_js"]
+    after = graph.run(200)
+    assert np.abs(after["slave_servo_cp"] - before["slave_servo_cp"]).max() <= 1e-12
+    assert np.abs(after["slave_setpoint_js"] - before["slave_setpoint_js"]).max() <= 1e-9
+
+
+@given(st.integers(0, 1000))
+@settings(max_examples=5)
+def test_parameters_changed_in_a_running_session_never_move_the_slave(seed):
+    rng, graph = np.random.default_rng(seed), graph_of(seed)
+    before = graph.run(800)
+    for _ in range(6):
+        coarse, roll = rng.uniform(0.1, 3.0), rng.uniform(-3.0, 3.0)
+        mode = ("coarse", "fine")[rng.integers(2)]
+        graph.scaling.retune(MotionScalingParameters(coarse_gain=coarse, mode=mode, tool_roll=roll))
+        block = graph.run(200)
+        assert_command_moves_with_the_hand(np.concatenate((before[-1:], block)), 0)
+        before = block
+
+
+def test_quaternions_stay_unit_over_a_long_session_of_turning_and_clutching():
+    count = 60_000
+    rng, graph = np.random.default_rng(8), graph_of(0)
+    graph.run(1)
+    turns = Rotation.from_rotvec(0.002 * rng.standard_normal((count, 3)))
+    # Products of 100 turns each keep the path smooth and its making fast.
+    samples, attitude = make_signals(6, count), Rotation.identity()
+    path = samples["master_measured_cp"]
+    for start in range(0, count, 100):
+        part = turns[start : start + 100]
+        path[start : start + 100, 3:] = (part * attitude).as_quat(scalar_first=True)
+        attitude = part[-1] * attitude
+    path[:, :3] = 1e-3 * rng.standard_normal((count, 3))
+    samples["master_buttons"][:, 0] = (np.arange(count) // 37) % 2
+    samples["stamp_ns"] = graph.now_ns + TICK_NS * np.arange(1, count + 1)
+    block = graph.replay(samples)
+    for topic in ("slave_servo_cp", "slave_setpoint_cp", "slave_measured_cp"):
+        norms = np.linalg.norm(block[topic][:, 3:], axis=1)
+        assert np.abs(norms - 1.0).max() < 1e-15, topic
