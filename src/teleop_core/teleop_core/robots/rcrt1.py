@@ -17,6 +17,7 @@ from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots import rcrt1_dynamics
+from teleop_core.robots.branches import bounded, is_allowed, move_cost, wrapped
 from teleop_core.robots.robot import (
     IkStatus,
     Kernels,
@@ -111,21 +112,6 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 
 @kernel
-def _bounded(wanted: float, seed: float, lower: float, upper: float, step: float) -> float:
-    """Nearest value to ``wanted`` within a step of the seed and inside the limits."""
-    near = min(max(wanted, seed - step), seed + step)
-    return min(max(near, lower), upper)
-
-
-@kernel
-def _wrapped(angle: float) -> float:
-    """Same angle in (-pi, pi]; every joint limit of the arm lies inside."""
-    if angle > math.pi:
-        return angle - 2.0 * math.pi
-    return angle + 2.0 * math.pi if angle <= -math.pi else angle
-
-
-@kernel
 def _arm_branch(T: Array, geometry: Array, is_front: bool, seed: float, arm: Array) -> bool:
     """Write q1, q2, d3 (3,) of one arm branch; whether the wrist centre can be reached at all.
 
@@ -140,7 +126,7 @@ def _arm_branch(T: Array, geometry: Array, is_front: bool, seed: float, arm: Arr
         radius = -radius
     arm[0] = seed
     if abs(radius) > 1e-12 or d2 > 0.0:
-        arm[0] = _wrapped(math.atan2(y, x) - math.atan2(d2, radius))
+        arm[0] = wrapped(math.atan2(y, x) - math.atan2(d2, radius))
     arm[1] = math.atan2(radius, z)
     arm[2] = math.sqrt(radius * radius + z * z)
     return is_reachable
@@ -148,7 +134,7 @@ def _arm_branch(T: Array, geometry: Array, is_front: bool, seed: float, arm: Arr
 
 @kernel
 def _wrist_frame(T: Array, q1: float, q2: float, M: Array) -> None:
-    """Write M (3, 3) = (Rz(q1) Ry(q2))ᵀ R, the rotation that is left to the wrist."""
+    """Write (Rz(q1) Ry(q2))ᵀ R, the rotation left to the wrist, into the 3x3 corner of M."""
     c1, s1, c2, s2 = math.cos(q1), math.sin(q1), math.cos(q2), math.sin(q2)
     for j in range(3):
         h = c1 * T[0, j] + s1 * T[1, j]
@@ -158,82 +144,89 @@ def _wrist_frame(T: Array, q1: float, q2: float, M: Array) -> None:
 
 
 @kernel
-def _joint5(M: Array, q4: float) -> float:
+def _joint5(M: Array, c4: float, s4: float) -> float:
     """Joint 5 that brings the tool axis next to its wanted direction, given joint 4."""
-    return math.atan2(math.cos(q4) * M[0, 2] + math.sin(q4) * M[1, 2], M[2, 2])
+    return math.atan2(c4 * M[0, 2] + s4 * M[1, 2], M[2, 2])
 
 
 @kernel
-def _joint6(M: Array, q4: float, q5: float) -> float:
+def _joint6(M: Array, c4: float, s4: float, c5: float, s5: float) -> float:
     """Joint 6 that turns the tool next to its wanted attitude, given joints 4 and 5."""
-    c4, s4, c5, s5 = math.cos(q4), math.sin(q4), math.cos(q5), math.sin(q5)
-    sine = cosine = 0.0
-    for j in range(2):
-        h = c4 * M[0, j] + s4 * M[1, j]
-        x, y = c5 * h - s5 * M[2, j], -s4 * M[0, j] + c4 * M[1, j]
-        sine += y if j == 0 else -x
-        cosine += x if j == 0 else y
-    return math.atan2(sine, cosine)
+    x0 = c5 * (c4 * M[0, 0] + s4 * M[1, 0]) - s5 * M[2, 0]
+    x1 = c5 * (c4 * M[0, 1] + s4 * M[1, 1]) - s5 * M[2, 1]
+    y0, y1 = -s4 * M[0, 0] + c4 * M[1, 0], -s4 * M[0, 1] + c4 * M[1, 1]
+    return math.atan2(y0 - x1, x0 + y1)
 
 
 @kernel
-def _wrist_branch(M: Array, is_flipped: bool, seed: float, wrist: Array) -> None:
-    """Write q4, q5, q6 (3,) of one wrist branch; with axes 4 and 6 in line q4 keeps the seed."""
-    q4 = seed
-    if math.hypot(M[0, 2], M[1, 2]) > _COLLINEAR:
-        q4 = math.atan2(M[1, 2], M[0, 2])
-        if is_flipped:
-            q4 = _wrapped(q4 + math.pi)
-    wrist[0] = q4
-    wrist[1] = _joint5(M, q4)
-    wrist[2] = _joint6(M, q4, wrist[1])
+def _wrist(M: Array, seed: float, q: Array) -> None:
+    """Write joints 4 to 6 of the branch with sin(q5) >= 0; joint 4 is the seed if it is zero."""
+    s5 = math.sqrt(M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2])
+    if s5 > _COLLINEAR:
+        q[3], c4, s4 = math.atan2(M[1, 2], M[0, 2]), M[0, 2] / s5, M[1, 2] / s5
+    else:
+        q[3], c4, s4 = seed, math.cos(seed), math.sin(seed)
+    q[4] = _joint5(M, c4, s4)
+    q[5] = _joint6(M, c4, s4, M[2, 2], s5)
 
 
 @kernel
-def _share_roll(M: Array, limits: Array, wrist: Array) -> None:
+def _share_roll(M: Array, limits: Array, q: Array) -> None:
     """With axes 4 and 6 in line, let joint 4 do the part of the roll that joint 6 cannot."""
-    if math.hypot(M[0, 2], M[1, 2]) > _COLLINEAR:
+    if M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2] > _COLLINEAR * _COLLINEAR:
         return
     low, high = limits[0, 5], limits[1, 5]
-    rest = wrist[2] - min(max(wrist[2], low), high)
-    is_legal = limits[0, 3] <= wrist[0] + rest <= limits[1, 3]
+    rest = q[5] - min(max(q[5], low), high)
+    is_legal = limits[0, 3] <= q[3] + rest <= limits[1, 3]
     if rest != 0.0 and not is_legal:  # then from the other end of joint 6
         rest -= math.copysign(2.0 * math.pi - (high - low), rest)
-    wrist[0] += rest
-    wrist[2] = _wrapped(wrist[2] - rest)
+    q[3] += rest
+    q[5] = wrapped(q[5] - rest)
 
 
 @kernel
-def _cost(q: Array, seed: Array, limits: Array) -> float:
-    """Largest joint move from the seed; branches outside the limits come after all others.
+def _flip(q: Array) -> None:
+    """Turn joints 4 to 6 to the other wrist branch, which reaches the same pose."""
+    q[3], q[4], q[5] = wrapped(q[3] + math.pi), -q[4], wrapped(q[5] + math.pi)
 
-    In a path (finite steps) limits do not count, so that the branch never changes.
+
+@kernel
+def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
+    """Write the best of the four branches; whether the wrist centre can be reached at all.
+
+    The wrist of the second arm branch is solved only if that arm can still win.
     """
-    worst, outside = 0.0, 0.0
-    for i in range(6):
-        worst = max(worst, abs(q[i] - seed[i]))
-        outside = max(outside, limits[0, i] - q[i], q[i] - limits[1, i])
-    is_path = math.isfinite(limits[2, 0])
-    return worst if is_path or outside <= 1e-12 else 100.0 + worst
-
-
-@kernel
-def _choose(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
-    """Write the best of the four branches; whether the wrist centre can be reached at all."""
-    best, is_reachable = math.inf, True
-    M, trial = np.empty((3, 3)), np.empty(6)
+    best, is_reachable, trial = math.inf, True, np.empty(6)
     for arm in range(2):
         is_reachable = _arm_branch(T, geometry, arm == 0, seed[0], trial)
+        arm_cost = move_cost(trial, seed, limits, 0, 3)
+        if arm_cost >= best:
+            continue
         _wrist_frame(T, trial[0], trial[1], M)
-        for wrist in range(2):
-            _wrist_branch(M, wrist == 1, seed[3], trial[3:])
-            _share_roll(M, limits, trial[3:])
-            cost = _cost(trial, seed, limits)
+        _wrist(M, seed[3], trial)
+        for _ in range(2):
+            _share_roll(M, limits, trial)
+            cost = max(arm_cost, move_cost(trial, seed, limits, 3, 6))
             if cost < best:
                 best = cost
                 for i in range(6):
                     q[i] = trial[i]
+            _flip(trial)
     return is_reachable
+
+
+@kernel
+def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
+    """Keep a branch inside limits and steps; each wrist joint makes the best of those before."""
+    for i in range(6):
+        if i == 3:
+            _wrist_frame(T, q[0], q[1], M)
+        elif i == 4:
+            q[4] = _joint5(M, math.cos(q[3]), math.sin(q[3]))
+        elif i == 5:
+            c5, s5 = math.cos(q[4]), math.sin(q[4])
+            q[5] = _joint6(M, math.cos(q[3]), math.sin(q[3]), c5, s5)
+        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
 
 
 @kernel
@@ -250,17 +243,11 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """
     if not is_askable(T, seed):
         return -1
-    is_reachable = _choose(T, seed, limits, geometry, q)
+    reached = np.empty((4, 4))  # until the end its corner holds the rotation left to the wrist
+    is_reachable = _choose(T, seed, limits, geometry, reached, q)
     is_reachable = is_reachable and limits[0, 2] - 1e-9 <= q[2] <= limits[1, 2] + 1e-9
-    M = np.empty((3, 3))
-    for i in range(3):
-        q[i] = _bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
-    _wrist_frame(T, q[0], q[1], M)
-    q[3] = _bounded(q[3], seed[3], limits[0, 3], limits[1, 3], limits[2, 3])
-    q[4] = _bounded(_joint5(M, q[3]), seed[4], limits[0, 4], limits[1, 4], limits[2, 4])
-    q6 = _joint6(M, q[3], q[4])
-    q[5] = _bounded(q6, seed[5], limits[0, 5], limits[1, 5], limits[2, 5])
-    reached = np.empty((4, 4))
+    if not is_allowed(q, seed, limits):
+        _settle(T, seed, limits, reached, q)
     fk(q, geometry, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if is_reachable else _UNREACHABLE
@@ -281,7 +268,9 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
             if not _arm_branch(T, geometry, arm == 0, 0.0, q):
                 return 0
             _wrist_frame(T, q[0], q[1], M)
-            _wrist_branch(M, wrist == 1, 0.0, q[3:])
+            _wrist(M, 0.0, q)
+            if wrist == 1:
+                _flip(q)
     return 4
 
 
