@@ -17,6 +17,7 @@ _MODULES = {
     "stewart": "stewart",
     "rps3": "rps3",
     "scara_stewart": "scara_stewart",
+    "three_finger_hand": "three_finger_hand",
     "puma560": "puma560",
     "scara": "scara",
     "planar_3r": "planar_3r",

@@ -1,0 +1,162 @@
+"""Three-fingered hand: three R-R-R fingers that hold a triangle, contacts as ball joints.
+
+The hand has six freedoms (nine joints less three distances between contacts). As a robot, q is
+all nine joints, theta, psi, phi of each finger; ``fk`` is the object's frame at the three contact
+points; ``ik`` keeps every finger on the contact point of the wanted object pose, so it only
+returns joints that hold the object unless a finger cannot follow. :class:`Hand` answers for
+contact points, single fingers, and the three joints that follow from six actuated ones.
+
+Source:
+    Ghosal 2020, lectures 6 and 11, after Salisbury 1982; six freedoms, not three as spoken.
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.compiled import kernel
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import Array
+from teleop_core.robots.hand_fingers import finger_branch, finger_joints, finger_point
+from teleop_core.robots.hand_grasp import (
+    FINGERS,
+    GEOMETRY,
+    SIDE,
+    Grasp,
+    GraspResult,
+    Hand,
+    checked_geometry,
+    contact_jacobian,
+    contacts,
+    local_contact,
+)
+from teleop_core.robots.robot import (
+    REACHED,
+    IkStatus,
+    Kernels,
+    Robot,
+    is_askable,
+    pose_residual,
+)
+from teleop_core.robots.rps3_loop import frame
+
+__all__ = ["GEOMETRY", "Grasp", "GraspResult", "Hand", "make"]
+
+_LIMITS = np.radians([80.0, 110.0, 150.0])  # assumed, either way
+_NEAR = 0.02  # sine of phi, and reach over full reach, that count as near singular
+_FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
+_NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
+
+
+@kernel
+def fk(q: Array, geometry: Array, T: Array) -> None:
+    """Write ``T_base_object`` (4, 4) of nine joints."""
+    points = np.empty((3, 3))
+    contacts(q, geometry, points)
+    frame(points, T)
+
+
+@kernel
+def jacobian(q: Array, geometry: Array, J: Array) -> None:
+    """Write the Jacobian (6, 9) of the object's frame, for joints that hold the object."""
+    T, slopes = np.empty((4, 4)), np.empty((9, 9))
+    fk(q, geometry, T)
+    contact_jacobian(q, geometry, slopes)
+    side, radius = geometry[SIDE], geometry[SIDE] / math.sqrt(3.0)
+    for j in range(9):
+        along_y = along_z = across_z = 0.0
+        for r in range(3):
+            J[r, j] = (slopes[r, j] + slopes[3 + r, j] + slopes[6 + r, j]) / 3.0
+            along_y += T[r, 1] * (slopes[r, j] - J[r, j])
+            along_z += T[r, 2] * (slopes[r, j] - J[r, j])
+            across_z += T[r, 2] * (slopes[3 + r, j] - slopes[6 + r, j])
+        for r in range(3):
+            J[3 + r, j] = T[r, 0] * across_z / side
+            J[3 + r, j] += (T[r, 2] * along_y - T[r, 1] * along_z) / radius
+
+
+@kernel
+def _is_near_singular(q: Array, g: Array) -> bool:
+    """Whether a finger is straight, folded, or touches its own axis."""
+    for i in range(FINGERS):
+        psi, phi, l1, l2, l3 = q[3 * i + 1], q[3 * i + 2], g[3 * i], g[3 * i + 1], g[3 * i + 2]
+        reach = l1 + l2 * math.cos(psi) + l3 * math.cos(psi + phi)
+        if abs(math.sin(phi)) < _NEAR or abs(reach) < _NEAR * (l1 + l2 + l3):
+            return True
+    return False
+
+
+@kernel
+def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
+    """Write nine joints for ``T_base_object``; see :class:`teleop_core.robots.robot.Kernels`."""
+    if not is_askable(T, seed):
+        return -1
+    is_reachable, is_held = True, True
+    p, local, bounds, reached = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((4, 4))
+    for i in range(FINGERS):
+        first, last = 3 * i, 3 * i + 3
+        local_contact(i, T, geometry, local)
+        bounds[:] = limits[:, first:last]
+        links, joints = geometry[first:last], q[first:last]
+        if not finger_joints(local, links, seed[first:last], bounds, joints):
+            is_reachable = False
+        finger_point(joints, links, p)
+        for r in range(3):
+            is_held = is_held and abs(p[r] - local[r]) <= REACHED
+    fk(q, geometry, reached)
+    pose_residual(reached, T, residual)
+    if not is_held:
+        return _LIMITED if is_reachable else _UNREACHABLE
+    return _NEAR_SINGULAR if _is_near_singular(q, geometry) else _FOLLOWED
+
+
+@kernel
+def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
+    """Write up to 64 joint vectors (k, 9), four branches for each finger; their number."""
+    local, counts = np.empty(3), np.zeros(3, np.int64)
+    fingers = np.empty((FINGERS, 4, 3))
+    for i in range(FINGERS):
+        local_contact(i, T, geometry, local)
+        for branch in range(4):
+            joints = fingers[i, counts[i]]
+            if finger_branch(local, geometry[3 * i : 3 * i + 3], branch, 0.0, joints):
+                counts[i] += 1
+    count = 0
+    for a in range(counts[0]):
+        for b in range(counts[1]):
+            for c in range(counts[2]):
+                solutions[count, :3], solutions[count, 3:6] = fingers[0, a], fingers[1, b]
+                solutions[count, 6:] = fingers[2, c]
+                count += 1
+    return count
+
+
+def make(**geometry: float | str) -> Robot:
+    """Hand with links l11 ... l33, fingers d beside and h above the thumb, object side [m].
+
+    ``gamma`` turns the thumb about y [rad]. At home it holds the object upright before the palm,
+    fingers bent down and the thumb bent up.
+    """
+    row = checked_geometry(geometry)
+    home, T, side = np.empty(9), np.empty((4, 4)), row["side"]
+    reach = row["l11"] + 2.0 / 3.0 * (row["l12"] + row["l13"])
+    corners = np.array(
+        [[0.0, -0.5, 0.5 / 3**0.5], [0.0, 0.5, 0.5 / 3**0.5], [0.0, 0.0, -1 / 3**0.5]]
+    )
+    frame(side * corners + [reach, 0.0, 0.5 * row["h"]], T)
+    hand = Hand(row)
+    for i, point in enumerate(hand.contacts_of(T)):
+        bent = 1 if i < FINGERS - 1 else 0
+        solutions = hand.finger_solutions(i + 1, point)
+        if len(solutions) < 2 or (np.abs(solutions[bent]) > _LIMITS).any():
+            raise ParameterError("side", side, "an object that the fingers reach before the palm")
+        home[3 * i : 3 * i + 3] = solutions[bent]
+    return Robot(
+        name="three_finger_hand",
+        joint_names=tuple(f"{joint}{i}" for i in (1, 2, 3) for joint in ("theta", "psi", "phi")),
+        lower=-np.tile(_LIMITS, FINGERS),
+        upper=np.tile(_LIMITS, FINGERS),
+        home=home,
+        geometry=row,
+        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+    )

@@ -1,0 +1,244 @@
+"""Three-fingered hand: fingers both ways, contact points and object pose both ways, grasps."""
+
+import math
+
+import numpy as np
+import pytest
+import roboticstoolbox as rtb
+
+from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.geometry import rotation, transform
+from teleop_core.robots import IkStatus, list_robots, load_robot
+from teleop_core.robots.hand_fingers import finger_point
+from teleop_core.robots.three_finger_hand import Grasp, Hand
+
+SOLVED = 1e-9
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot("three_finger_hand")
+
+
+@pytest.fixture(scope="module")
+def hand(robot):
+    return Hand(robot.geometry)
+
+
+def moves(robot, rng, count, shift=0.006, turn=0.25):
+    """Object poses around home."""
+    T = robot.fk(robot.home)
+    for _ in range(count):
+        R = T[:3, :3].copy()
+        for axis in "xyz":
+            R = R @ rotation(axis, rng.uniform(-turn, turn))
+        yield transform(R, T[:3, 3] + rng.uniform(-shift, shift, 3))
+
+
+def test_mobility_of_the_lecture_is_six_and_not_the_spoken_three():
+    assert 6 * (11 - 12 - 1) + 9 + 9 == 6
+
+
+def test_three_distances_between_contacts_leave_six_freedoms(robot, hand):
+    slopes = np.array(
+        [
+            (hand.slip(robot.home + change) - hand.slip(robot.home - change)) / 2e-6
+            for change in 1e-6 * np.eye(9)
+        ]
+    )
+    assert 9 - np.linalg.matrix_rank(slopes, tol=1e-6) == 6
+
+
+def test_finger_of_the_specification():
+    point = np.empty(3)
+    finger_point(np.radians([20.0, 35.0, -50.0]), np.array([1.0, 0.6, 0.4]), point)
+    assert np.allclose(point, [1.764613, 0.642266, 0.240618], atol=6e-7)
+
+
+def test_finger_is_the_chain_of_its_denavit_hartenberg_table():
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        links, q, point = rng.uniform(0.2, 1.0, 3), rng.uniform(-3.0, 3.0, 3), np.empty(3)
+        chain = rtb.DHRobot(
+            [
+                rtb.RevoluteMDH(),
+                rtb.RevoluteMDH(alpha=math.pi / 2, a=links[0]),
+                rtb.RevoluteMDH(a=links[1]),
+            ]
+        )
+        finger_point(q, links, point)
+        assert np.allclose(point, (chain.fkine(q).A @ [links[2], 0.0, 0.0, 1.0])[:3], atol=1e-14)
+
+
+def test_fingers_stand_where_the_lecture_puts_them(robot, hand):
+    q = np.array([0.2, 0.3, -0.4] * 3)
+    points, local, g = hand.contact_points(q), np.empty(3), robot.geometry
+    finger_point(q[:3], np.array([g["l11"], g["l12"], g["l13"]]), local)
+    assert np.allclose(points[0], local + np.array([0.0, -g["d"], g["h"]]), atol=1e-15)
+    assert np.allclose(points[1], local + np.array([0.0, g["d"], g["h"]]), atol=1e-15)
+    assert np.allclose(points[2], rotation("y", g["gamma"]) @ local, atol=1e-15)
+
+
+@pytest.mark.parametrize("finger", [1, 2, 3])
+def test_every_finger_solution_touches_the_point_and_the_original_is_among_them(finger):
+    hand, rng = Hand({"l31": 0.02, "l12": 0.06}), np.random.default_rng(2)
+    counts = set()
+    for q in rng.uniform(-3.0, 3.0, (500, 9)):
+        point = hand.contact_points(q)[finger - 1]
+        solutions = hand.finger_solutions(finger, point)
+        counts.add(len(solutions))
+        own = q[3 * finger - 3 : 3 * finger]
+        for joints in solutions:
+            whole = np.zeros(9)
+            whole[3 * finger - 3 : 3 * finger] = joints
+            assert np.allclose(hand.contact_points(whole)[finger - 1], point, atol=1e-12)
+        # Near straight a rounding of the point bends the finger by its square root.
+        assert np.abs(np.exp(1j * solutions) - np.exp(1j * own)).max(axis=1).min() < 1e-6
+    assert counts <= {2, 4}
+    assert 4 in counts
+
+
+def test_a_point_out_of_reach_has_no_finger_solution(hand):
+    assert hand.finger_solutions(1, [1.0, 0.0, 0.0]).shape == (0, 3)
+
+
+def test_object_pose_and_contact_points_are_inverse_to_each_other(robot, hand):
+    rng = np.random.default_rng(3)
+    for T in moves(robot, rng, 50, shift=0.5, turn=3.0):
+        points = hand.contacts_of(T)
+        sides = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+        assert np.allclose(sides, robot.geometry["side"], atol=1e-15)
+        assert np.allclose(hand.object_pose(points), T, atol=1e-12)
+
+
+def test_all_joint_vectors_of_a_pose_hold_the_object_there(robot, hand):
+    rng, most = np.random.default_rng(4), 0
+    for T in moves(robot, rng, 30):
+        solutions = robot.ik_all(T)
+        most = max(most, len(solutions))
+        for q in solutions:
+            assert np.allclose(robot.fk(q), T, atol=SOLVED)
+            assert np.abs(hand.slip(q)).max() < SOLVED
+    assert most >= 8
+
+
+def test_all_sixty_four_branches_appear_for_long_outer_links():
+    long = {f"l{i}{k}": v for i in (1, 2, 3) for k, v in ((1, 0.01), (2, 0.09), (3, 0.08))}
+    robot = load_robot("three_finger_hand", **long, side=0.06)
+    assert len(robot.ik_all(robot.fk(robot.home))) == 64
+
+
+def test_inverse_follows_the_object_next_to_the_seed(robot, hand):
+    rng = np.random.default_rng(5)
+    for T in moves(robot, rng, 300):
+        result = robot.ik(T)
+        assert result.status == IkStatus.FOLLOWED
+        assert np.allclose(robot.fk(result.q), T, atol=SOLVED)
+        assert np.abs(hand.slip(result.q)).max() < SOLVED
+        inside = [
+            q for q in robot.ik_all(T) if (q >= robot.lower).all() and (q <= robot.upper).all()
+        ]
+        nearest = min(np.abs(q - robot.home).max() for q in inside)
+        assert math.isclose(np.abs(result.q - robot.home).max(), nearest, abs_tol=SOLVED)
+
+
+def test_jacobian_is_the_finite_difference(robot):
+    rng, step = np.random.default_rng(6), 1e-6
+    for T in moves(robot, rng, 10):
+        q = robot.ik(T).q
+        J = robot.jacobian(q)
+        for joint in range(9):
+            change = step * np.eye(9)[joint]
+            slope = (robot.fk(q + change) - robot.fk(q - change)) / (2.0 * step)
+            spin = slope[:3, :3] @ T[:3, :3].T
+            assert np.allclose(J[:3, joint], slope[:3, 3], atol=1e-9)
+            assert np.allclose(J[3:, joint], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-8)
+
+
+def test_six_actuated_joints_fix_the_other_three(robot, hand):
+    rng = np.random.default_rng(7)
+    for T in moves(robot, rng, 50):
+        q = robot.ik(T).q.reshape(3, 3)
+        result = hand.hold(q[:, :2], q[:, 2] + rng.uniform(-0.05, 0.05, 3))
+        assert result.status == Grasp.HELD
+        assert np.allclose(result.q, q.ravel(), atol=1e-7)
+        assert np.allclose(hand.object_pose(hand.contact_points(result.q)), T, atol=1e-8)
+
+
+def test_fingers_spread_too_far_cannot_hold_and_say_so(robot, hand):
+    actuated = np.array([[-1.3, 0.5], [1.3, 0.5], [0.0, -1.5]])
+    result = hand.hold(actuated, np.zeros(3))
+    assert result.status == Grasp.CANNOT_HOLD
+    assert np.isfinite(result.q).all()
+    assert result.residual > 1e-3
+
+
+def test_an_object_out_of_reach_is_unreachable_with_finite_joints(robot):
+    T = robot.fk(robot.home)
+    T[0, 3] += 0.2
+    result = robot.ik(T)
+    assert result.status == IkStatus.UNREACHABLE
+    assert (result.q >= robot.lower).all()
+    assert (result.q <= robot.upper).all()
+    assert result.residual[0] > 0.1
+    assert robot.ik_all(T).shape == (0, 9)
+
+
+@pytest.mark.parametrize("out", [0.02, 0.04, 0.1])
+def test_a_path_to_straight_fingers_and_back_returns_to_the_same_grasp(robot, out):
+    home, step = robot.fk(robot.home), 0.02
+    limits = robot.limits()
+    limits[2] = step
+    q, worst, statuses = robot.home.copy(), 0.0, set()
+    # The end is held, so that joints which lagged behind at the straight finger catch up.
+    for s in [*np.sin(np.linspace(0.0, math.pi, 3000)), *np.zeros(300)]:
+        T = home.copy()
+        T[0, 3] += out * s
+        found, residual = np.empty(9), np.empty(2)
+        statuses.add(robot.kernels.ik(T, q, limits, robot.geometry_row, found, residual))
+        assert np.isfinite(residual).all()
+        worst, q = max(worst, np.abs(found - q).max()), found
+    assert worst <= step + 1e-15
+    assert np.allclose(q, robot.home, atol=1e-6)
+    assert (IkStatus.UNREACHABLE in statuses) == (out > 0.03)
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-6, -1e-6, 0.003])
+def test_a_path_over_a_finger_axis_keeps_its_steps_and_goes_on(beside):
+    # Contact 1 passes over the axis of joint 1 of finger 1 and comes back.
+    robot = load_robot("three_finger_hand")
+    base = np.array([0.0, -robot.geometry["d"], robot.geometry["h"]])
+    home = robot.fk(robot.home)
+    corner = Hand(robot.geometry).contacts_of(home)[0]
+    limits, step = robot.limits(), 0.02
+    limits[2] = step
+    over = base + np.array([-0.01, beside, -0.04]) - corner
+    q = robot.home.copy()
+    for s in [*np.sin(np.linspace(0.0, math.pi, 3000)), *np.zeros(300)]:
+        T = home.copy()
+        T[:3, 3] += s * over
+        found, residual = np.empty(9), np.empty(2)
+        robot.kernels.ik(T, q, limits, robot.geometry_row, found, residual)
+        assert np.abs(found - q).max() <= step + 1e-15
+        assert (found >= robot.lower).all()
+        assert (found <= robot.upper).all()
+        q = found
+    assert np.allclose(robot.fk(q), home, atol=1e-6)
+
+
+def test_bad_hands_and_questions_are_refused(robot, hand):
+    assert "three_finger_hand" in list_robots()
+    for symbol, value in (("l12", 0.0), ("side", -1.0), ("side", 1.0), ("d", math.inf)):
+        with pytest.raises(ParameterError) as refusal:
+            load_robot("three_finger_hand", **{symbol: value})
+        assert refusal.value.name == symbol
+    with pytest.raises(UnknownNameError):
+        load_robot("three_finger_hand", l14=1.0)
+    with pytest.raises(ParameterError):
+        hand.finger_solutions(4, np.zeros(3))
+    with pytest.raises(ShapeError):
+        hand.contact_points(np.zeros(8))
+    with pytest.raises(ParameterError):
+        hand.object_pose(np.zeros((3, 3)))
+    with pytest.raises(ParameterError):
+        hand.contacts_of(np.zeros((4, 4)))
