@@ -102,11 +102,12 @@ class Path:
         if p.kind == "bag":
             return self._shape(times), np.zeros((len(times), 3))
         moved = np.maximum(times - p.approach_time, 0.0)
-        # The motion grows over its first second, so that it starts at rest.
+        # Motion grows over its first second, so that it starts at rest; points do by themselves.
         grown = minimum_jerk(moved)[:, None]
         approach = minimum_jerk(times / p.approach_time)[:, None]
         turn = p.rotation * self._random_unit(moved, slice(3, 6)) * grown
-        position = approach * np.array(p.center) + grown * self._shape(moved)
+        shape = self._shape(moved)
+        position = approach * np.array(p.center) + (shape if p.kind == "points" else grown * shape)
         return position, approach * np.array(p.tilt) + turn
 
     def _random_unit(self, times: Array, axes: slice) -> Array:
