@@ -23,6 +23,8 @@ class HapticMasterNode(CoreNode):
         """Make the device and open its topics."""
         recorded = recorded_path(Configuration({"haptic_master": parameters}, ""))
         self.stage = HapticMaster(parameters, recorded=recorded)
+        self.stage.step()  # loads the kernels, which takes longer than many ticks
+        self.stage.reset()
         self.open_streams()
         self._servo_cf = self.input(topics.MASTER_SERVO_CF)
         self._samples = [self.output(topic) for topic in STAGE["haptic_master"].writes]

@@ -43,11 +43,16 @@ class _Channel:
         depth = 10 if topic.quality is Quality.LATCHED else DEPTH
         self.topic, self.subscription = topic, Subscription(node, topic, depth)
         self.received = self.lost = self._number = 0
+        self.publishers = 0 if topic is topics.DIAGNOSTICS else 1
 
     def count(self, number: int) -> None:
-        """Note a message by its number in the publisher's sequence; a smaller one starts anew."""
+        """Note a message by its number in its publisher's sequence; a smaller one starts anew.
+
+        The middleware does not say which publisher a message comes from, so that losses are
+        counted while there is one.
+        """
         self.received += 1
-        if self._number and number > self._number:
+        if self._number and number > self._number and self.publishers == 1:
             self.lost += number - self._number - 1
         self._number = number
 
@@ -104,7 +109,11 @@ class RecorderNode(CoreNode):
 
     def concerns(self) -> list[str]:
         """Topics of which messages were lost before they came here."""
-        return [f"lost {c.lost} of {c.topic.name}" for c in self._channels if c.lost]
+        for channel in self._channels:
+            is_shared = channel.topic is topics.DIAGNOSTICS
+            channel.publishers = 0 if is_shared else channel.subscription.publishers()
+        lost = sum(channel.lost for channel in self._channels)
+        return [f"the middleware lost {lost} messages on the way here"] if lost else []
 
     def values(self) -> dict[str, str]:
         """What came, what was lost, and where it is recorded."""

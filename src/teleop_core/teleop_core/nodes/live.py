@@ -1,0 +1,178 @@
+"""Live session: the graph as one process per node, started, watched, recorded and stopped."""
+
+import signal
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import yaml
+from rich.console import Console
+
+from teleop_core.errors import RecordingError, SessionError
+from teleop_core.nodes.children import Child, end_all, environment
+from teleop_core.nodes.observer import WARNING, Observer
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.graph import STAGES
+
+START_TIMEOUT = 180.0
+"""A node must be at work within this time [s]; the first start ever compiles the kernels."""
+SILENCE = 10.0
+"""A node that has not reported for this long hangs [s]."""
+RECORDER = "recorder"
+_OTHERS = tuple(stage.name for stage in STAGES if stage.name != RECORDER)
+
+
+def live(configuration: Configuration, out: Path, console: Console) -> None:
+    """Run and record a session as ROS 2 nodes, for the configured duration or until Ctrl-C.
+
+    Args:
+        configuration: What runs, and for how long.
+        out: Directory of the recording, made here.
+        console: Where the progress is shown.
+
+    Raises:
+        RecordingError: The directory exists.
+        SessionError: A node did not start, died or hangs; the recording is closed nevertheless.
+    """
+    out = Path(out).absolute()
+    if out.exists():
+        raise RecordingError(out, "exists already; choose another --out")
+    env = environment()
+    with (
+        tempfile.TemporaryDirectory(prefix="teleop_live_") as folder,
+        Observer(int(env["ROS_DOMAIN_ID"])) as observer,
+    ):
+        session = _Session(configuration, out, console, observer, Path(folder), env)
+        with _terminable():
+            session.run()
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """Let SIGTERM end the session as Ctrl-C does; outside the main thread nothing changes."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+class _Session:
+    """Processes of one session and what they report."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        out: Path,
+        console: Console,
+        observer: Observer,
+        folder: Path,
+        env: dict[str, str],
+    ) -> None:
+        self._duration = float(configuration.groups["teleop"].duration)
+        self._console, self._observer, self._folder, self._env = console, observer, folder, env
+        self._parameters = folder / "parameters.yaml"
+        self._parameters.write_text(_parameter_file(configuration, out))
+        self._children: dict[str, Child] = {}
+
+    def run(self) -> None:
+        """Start, watch and stop all nodes; the recorder comes first and goes last."""
+        is_begun = False
+        try:
+            self._start((RECORDER,))
+            self._start(_OTHERS)
+            is_begun = True
+            self._watch()
+        except KeyboardInterrupt:
+            if not is_begun:
+                raise SessionError("stopped before all nodes were ready") from None
+            self._console.print("stopped")
+        finally:
+            self._stop()
+
+    def _start(self, names: tuple[str, ...]) -> None:
+        for name in names:
+            child = Child(name, self._parameters, self._folder, self._env)
+            self._children[name] = child
+        deadline = time.monotonic() + START_TIMEOUT
+        waiting = list(names)
+        while waiting:
+            self._observer.listen(0.1)
+            self._check()
+            for name in [name for name in waiting if self._observer.is_active(name)]:
+                waiting.remove(name)
+                ready = len(self._children) - len(waiting)
+                self._say(f"{name} is ready ({ready} of {len(STAGES)})")
+            if waiting and time.monotonic() > deadline:
+                child = self._children[waiting[0]]
+                reason = f"{child.name} was not ready within {START_TIMEOUT:g} s"
+                raise SessionError(reason + child.last_words())
+
+    def _watch(self) -> None:
+        begin = time.monotonic()
+        shown = 0
+        while (elapsed := time.monotonic() - begin) < self._duration:
+            self._observer.listen(min(0.1, self._duration - elapsed))
+            self._check()
+            if int(elapsed) > shown:
+                shown = int(elapsed)
+                self._say(f"{shown:3d}/{self._duration:g} s  {self._line()}")
+
+    def _check(self) -> None:
+        for name, child in self._children.items():
+            child.check()
+            status = self._observer.statuses.get(name)
+            silence = time.monotonic() - status.arrival if status else 0.0
+            if silence > SILENCE:
+                reason = f"{name} hangs: it has not reported for {silence:.0f} s"
+                raise SessionError(reason + child.last_words())
+
+    def _line(self) -> str:
+        """How the session is, in one line."""
+        statuses = self._observer.statuses
+        slave = statuses["slave_sim"]
+        refused = sum(status.number("refused") for status in statuses.values())
+        parts = [
+            f"slave {slave.number('rate_hz'):.0f} Hz",
+            f"late {slave.number('late'):.0f}",
+            f"missed {slave.number('missed'):.0f}",
+            f"dropped {slave.number('dropped_time_ms'):g} ms",
+            f"master to slave {slave.number('delay_ms.median'):.1f} ms"
+            f" (p99 {slave.number('delay_ms.p99'):.1f})",
+            f"refused {refused:.0f}",
+        ]
+        warnings = [f"{n}: {s.message}" for n, s in statuses.items() if s.level >= WARNING]
+        return ", ".join(parts) + "".join(f"; {warning}" for warning in warnings)
+
+    def _say(self, text: str) -> None:
+        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+    def _stop(self) -> None:
+        is_main = threading.current_thread() is threading.main_thread()
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN) if is_main else None
+        try:
+            recorder = self._children.pop(RECORDER, None)
+            end_all(self._children.values())
+            code = recorder.end() if recorder else 0
+            if recorder and code:
+                raise SessionError(f"recorder ended with exit code {code}{recorder.last_words()}")
+        finally:
+            if before is not None:
+                signal.signal(signal.SIGINT, before)
+
+
+def _parameter_file(configuration: Configuration, out: Path) -> str:
+    """Parameters of all nodes, as ROS 2 reads them."""
+    text = configuration.text()
+    content: dict[str, Any] = yaml.safe_load(text)
+    recorder = content[RECORDER]["ros__parameters"]
+    recorder["out"], recorder["configuration"] = str(out), text
+    recorder["scenario"] = configuration.scenario
+    return yaml.safe_dump(content, allow_unicode=True)

@@ -1,0 +1,66 @@
+"""Observer: what all nodes of a graph say in ``diagnostics``."""
+
+import time
+from dataclasses import dataclass, field
+
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+
+from teleop_core.bags.topics import DIAGNOSTICS
+from teleop_core.nodes.streams import Subscription, Waiter
+
+WARNING = 1
+
+
+@dataclass(frozen=True)
+class Status:
+    """Last report of one node: level 0 is fine, 1 a warning."""
+
+    level: int
+    message: str
+    values: dict[str, str] = field(default_factory=dict)
+    arrival: float = 0.0
+
+    def number(self, name: str) -> float:
+        """Value as a number, 0 if it is not reported."""
+        return float(self.values.get(name, "0"))
+
+
+class Observer:
+    """Listener with a middleware context of its own, to be used with ``with``.
+
+    Args:
+        domain_id: DDS domain.
+    """
+
+    def __init__(self, domain_id: int) -> None:
+        self.statuses: dict[str, Status] = {}
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain_id)
+        self._node = Node("teleop_live", context=self._context, use_global_arguments=False)
+        self._reports = Subscription(self._node, DIAGNOSTICS, 100)
+        self._waiter = Waiter(self._context, self._reports)
+
+    def __enter__(self) -> "Observer":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._reports.close()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def listen(self, timeout: float) -> None:
+        """Take all reports that come within ``timeout`` [s] of the first one or of now."""
+        self._waiter.wait(timeout)
+        while (taken := self._reports.take()) is not None:
+            message = deserialize_message(taken[0], self._reports.type)
+            for status in message.status:
+                values = {pair.key: pair.value for pair in status.values}
+                level = int.from_bytes(status.level, "little")
+                self.statuses[status.name] = Status(level, status.message, values, time.monotonic())
+
+    def is_active(self, name: str) -> bool:
+        """Whether a node has reported that it is at work."""
+        status = self.statuses.get(name)
+        return status is not None and status.values.get("state") == "active"

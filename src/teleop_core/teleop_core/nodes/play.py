@@ -1,0 +1,120 @@
+"""Play: publish a recording on live topics, for machines without ``ros2 bag``."""
+
+import math
+import os
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.topics import BY_NAME, Quality
+from teleop_core.errors import ParameterError, RecordingError
+from teleop_core.nodes.streams import message_type, profile
+
+DISCOVERY_TIME = 1.0
+"""Time for subscribers to be found before the first message [s]."""
+
+
+def play(
+    bag: Bag, topics: Iterable[str] | None, rate: float, console: Console, loop: bool = False
+) -> int:
+    """Publish a recording with its own bytes and spacing, until its end or Ctrl-C.
+
+    Args:
+        bag: The recording.
+        topics: Topics to publish; None for all.
+        rate: Times real time, > 0.
+        console: Where the progress is shown, if it is a terminal.
+        loop: Whether to begin again at the end. Nodes take the older stamps then as those of a
+            new sender, which they accept after two seconds of silence.
+
+    Returns:
+        Number of messages published.
+
+    Raises:
+        ParameterError: The rate is not a positive number.
+        RecordingError: A topic is missing, or its message type is not installed.
+    """
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise ParameterError("--rate", rate, "a number above 0")
+    names = list(bag.topics) if topics is None else [name.removeprefix("/") for name in topics]
+    bag.require(names if topics is not None else ())
+    sent = 0
+    with _publishers(bag, names) as publishers, _progress(bag, console) as show:
+        time.sleep(DISCOVERY_TIME)
+        try:
+            while True:
+                for name, log_ns, data in _paced(bag, names, rate):
+                    publishers[name].publish(data)
+                    sent += 1
+                    show(log_ns)
+                if not loop:
+                    break
+        except KeyboardInterrupt:
+            console.print(f"stopped after {sent} messages", highlight=False)
+    return sent
+
+
+def _paced(bag: Bag, names: list[str], rate: float) -> Iterator[tuple[str, int, bytes]]:
+    """Messages in the order of their log times, each when its time has come."""
+    begin = time.monotonic()
+    for name, _, log_ns, data in bag.raw(names):
+        ahead = begin + (log_ns - bag.start_ns) * 1e-9 / rate - time.monotonic()
+        if ahead > 1e-4:
+            time.sleep(ahead)
+        yield name, log_ns, data
+
+
+@contextmanager
+def _publishers(bag: Bag, names: list[str]) -> Iterator[dict[str, Any]]:
+    os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    types = {name: _type_in(bag, name) for name in names}
+    context = Context()
+    context.init(args=[])
+    node = Node("teleop_play", context=context, use_global_arguments=False)
+    try:
+        publishers = {}
+        for name, kind in types.items():
+            topic = BY_NAME.get(name)
+            publishers[name] = node.create_publisher(kind, name, profile(topic) if topic else 10)
+        yield publishers
+        for name, publisher in publishers.items():
+            if name not in BY_NAME or BY_NAME[name].quality is not Quality.STREAM:
+                publisher.wait_for_all_acked(Duration(seconds=1))
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def _type_in(bag: Bag, name: str) -> Any:
+    ros_type = bag.topics[name].type
+    try:
+        return message_type(ros_type)
+    except (ImportError, AttributeError, ValueError) as error:
+        reason = f"{name} is a {ros_type}, which is not installed; choose others with --topics"
+        raise RecordingError(bag.path, reason) from error
+
+
+@contextmanager
+def _progress(bag: Bag, console: Console) -> Iterator[Any]:
+    columns = (TextColumn("playing"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=bag.end_ns - bag.start_ns)
+        next_ns = 0
+
+        def show(log_ns: int) -> None:
+            nonlocal next_ns
+            if not 0 <= next_ns - log_ns <= 100_000_000:  # ten times a second, and after a rewind
+                bar.update(task, completed=log_ns - bag.start_ns)
+                next_ns = log_ns + 100_000_000
+
+        yield show
