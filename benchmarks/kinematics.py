@@ -1,0 +1,304 @@
+"""Inverse kinematics beside its peers: same arm, same targets, one run, one thread.
+
+Run with ``python benchmarks/kinematics.py``. Solved means within 1e-6 m and 1e-6 rad of the
+target, legal means inside the joint limits too. The ratio is a peer's median over ours, the step
+is the largest joint move between neighbouring poses of a path. Peers that are not installed are
+named and skipped.
+"""
+
+import argparse
+import importlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[variable] = "1"
+
+import numpy as np  # noqa: E402
+
+from teleop_core.robots import load_robot  # noqa: E402
+from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary, load_table  # noqa: E402
+
+TABLES = Path(__file__).parent.parent / "config" / "robots"
+ARMS = ("puma560", "rcrt1")
+TOLERANCE = 1e-6
+Solver = Callable[[Any, Any], Any]
+
+
+def motions(table: DhTable) -> Iterator[tuple[str, str, float, float]]:
+    """Elementary motions of a chain: kind, axis, constant, sign of the joint (0: no joint)."""
+    for row in table.rows:
+        for kind, axis, symbol in CONVENTIONS[table.convention]:
+            is_joint = row.joint is not None and row.joint.symbol == symbol
+            sign = row.joint.sign if row.joint and is_joint else 0.0
+            yield kind, axis, row.constants.get(symbol, 0.0), sign
+
+
+def joint_frames(table: DhTable) -> tuple[list[tuple[Any, str]], Any]:
+    """Fixed transform before each joint with the joint's kind, and the one after the last."""
+    frames, fixed = [], np.eye(4)
+    for kind, axis, amount, sign in motions(table):
+        fixed = fixed @ elementary(kind, axis, amount)
+        if sign:
+            frames.append((fixed, kind))
+            fixed = np.eye(4)
+    return frames, fixed
+
+
+def eaik(table: DhTable, robot: Any) -> Solver:
+    """EAIK with the branch nearest to the seed, by the largest joint move, inside the limits."""
+    module = importlib.import_module("eaik.IK_HP")
+    frames, tool = joint_frames(table)
+    if any(kind == "slide" for _, kind in frames):
+        raise NotImplementedError("it has no sliding joints")
+    here, axes, points = np.eye(4), [], [np.zeros(3)]
+    for fixed, _ in frames:
+        here = here @ fixed
+        axes.append(here[:3, 2])
+        points.append(here[:3, 3])
+    points.append((here @ tool)[:3, 3])
+    zero = (here @ tool)[:3, :3]
+    solver = module.HPRobot(np.array(axes), np.diff(np.array(points), axis=0))
+    turn = 2.0 * np.pi
+
+    def solve(pose: Any, seed: Any) -> Any:
+        target = pose.copy()
+        target[:3, :3] = pose[:3, :3] @ zero.T
+        branches = np.asarray(solver.IK(target).Q)
+        branches = branches - turn * np.round((branches - seed) / turn)
+        outside = ((branches < robot.lower) | (branches > robot.upper)).any(axis=1)
+        return branches[np.argmin(np.abs(branches - seed).max(axis=1) + 100.0 * outside)]
+
+    return solve
+
+
+def roboticstoolbox(table: DhTable, robot: Any) -> Solver:
+    """Roboticstoolbox's compiled Levenberg-Marquardt, with its restarts."""
+    rtb = importlib.import_module("roboticstoolbox")
+    chain = rtb.ETS()
+    for kind, axis, amount, sign in motions(table):
+        make = getattr(rtb.ET, f"R{axis}" if kind == "turn" else f"t{axis}")
+        chain = chain * make(amount) if amount else chain
+        chain = chain * make(flip=sign < 0.0) if sign else chain
+    chain.qlim = np.stack((robot.lower, robot.upper))
+    return lambda pose, seed: chain.ik_LM(pose, q0=seed, tol=1e-14)[0]
+
+
+def pinocchio(table: DhTable, robot: Any) -> Solver:
+    """Closed-loop inverse kinematics in a Python loop on pinocchio, as in its examples."""
+    pin = importlib.import_module("pinocchio")
+    model, parent = pin.Model(), 0
+    frames, tool = joint_frames(table)
+    for number, (fixed, kind) in enumerate(frames):
+        joint = pin.JointModelRZ() if kind == "turn" else pin.JointModelPZ()
+        parent = model.addJoint(parent, joint, pin.SE3(fixed), f"joint{number}")
+    data, end = model.createData(), pin.SE3(tool)
+
+    def solve(pose: Any, seed: Any) -> Any:
+        q, wanted = np.array(seed), pin.SE3(pose)
+        for _ in range(200):
+            pin.computeJointJacobians(model, data, q)
+            error = pin.log6((data.oMi[parent] * end).actInv(wanted))
+            if np.linalg.norm(error.vector) < 1e-9:
+                break
+            jacobian = end.inverse().action @ pin.getJointJacobian(
+                model, data, parent, pin.ReferenceFrame.LOCAL
+            )
+            square = jacobian @ jacobian.T + 1e-12 * np.eye(6)
+            q = q + jacobian.T @ np.linalg.solve(square, error.vector)
+        return q
+
+    return solve
+
+
+def ikpy(table: DhTable, robot: Any) -> Solver:
+    """Ikpy's least squares, position and whole orientation."""
+    chain_module = importlib.import_module("ikpy.chain")
+    link_module = importlib.import_module("ikpy.link")
+    frames, tool = joint_frames(table)
+    links = [link_module.OriginLink()]
+    bounds = [*zip(robot.lower, robot.upper, strict=True), (None, None)]
+    for i, (fixed, kind) in enumerate([*frames, (tool, "none")]):
+        matrix, pitch = fixed, -np.arcsin(np.clip(fixed[2, 0], -1.0, 1.0))
+        roll = np.arctan2(matrix[2, 1], matrix[2, 2])
+        yaw = np.arctan2(matrix[1, 0], matrix[0, 0])
+        links.append(
+            link_module.URDFLink(
+                f"joint{i}", matrix[:3, 3], [roll, pitch, yaw], bounds=bounds[i],
+                rotation=[0, 0, 1] if kind == "turn" else None,
+                translation=[0, 0, 1] if kind == "slide" else None,
+                joint_type={"turn": "revolute", "slide": "prismatic", "none": "fixed"}[kind],
+            )
+        )  # fmt: skip
+    chain = chain_module.Chain(links, active_links_mask=[False, *[True] * len(frames), False])
+
+    def solve(pose: Any, seed: Any) -> Any:
+        start = np.array([0.0, *np.clip(seed, robot.lower, robot.upper), 0.0])
+        return chain.inverse_kinematics_frame(pose, initial_position=start, orientation_mode="all")[
+            1:-1
+        ]
+
+    return solve
+
+
+# Peer, and how many poses it gets: slow ones fewer.
+PEERS: dict[str, tuple[Callable[[DhTable, Any], Solver], int]] = {
+    "EAIK + nearest": (eaik, 1000),
+    "roboticstoolbox ik_LM": (roboticstoolbox, 500),
+    "pinocchio CLIK": (pinocchio, 300),
+    "ikpy": (ikpy, 20),
+}
+
+
+def workloads(robot: Any, count: int) -> dict[str, tuple[Any, bool]]:
+    """Joint vectors of the targets, and whether they are a path with a warm start."""
+    rng, way = np.random.default_rng(1), np.linspace(0.0, 1.0, count)[:, None]
+    start = robot.home.copy()
+    start[4] = 0.7
+    phases = rng.uniform(0.0, 2.0 * np.pi, robot.n)
+    swing = 0.05 * (robot.upper - robot.lower)
+    smooth = start - swing + swing * np.sin(2.0 * np.pi * way + phases)
+    singular = start - 0.2 * swing * way
+    singular[:, 4] = 0.4 - 0.8 * way[:, 0]  # axes 4 and 6 come into line in the middle
+    return {
+        "random": (rng.uniform(robot.lower, robot.upper, (count, robot.n)), False),
+        "smooth path": (smooth, True),
+        "through singularity": (singular, True),
+    }
+
+
+def run(solve: Solver, robot: Any, joints: Any, *, is_path: bool) -> tuple[list[float], Any]:
+    """Microseconds of each call, and the answers (NaN where a solver raised)."""
+    poses, seed = robot.fk(joints), joints[0].copy() if is_path else robot.home.copy()
+    times, answers = [], []
+    solve(poses[0], seed)
+    for pose in poses:
+        begin = time.perf_counter()
+        try:
+            answer = np.asarray(solve(pose, seed), dtype=float)
+        except Exception as error:  # a peer's own failure is a failed pose
+            answer = np.full(robot.n, np.nan) if error else seed
+        times.append(1e6 * (time.perf_counter() - begin))
+        answers.append(answer)
+        if is_path and np.isfinite(answer).all():
+            seed = answer
+    return times, np.array(answers)
+
+
+def judge(robot: Any, joints: Any, answers: Any) -> tuple[float, float]:
+    """Shares of poses solved, and solved inside the limits [%]."""
+    solved = legal = 0
+    for q, wanted in zip(answers, robot.fk(joints), strict=True):
+        if not np.isfinite(q).all():
+            continue
+        reached = robot.fk(q)
+        turn = reached[:3, :3].T @ wanted[:3, :3]
+        angle = np.linalg.norm(turn - np.eye(3)) / np.sqrt(2.0)
+        distance = np.linalg.norm(reached[:3, 3] - wanted[:3, 3])
+        is_solved = distance <= TOLERANCE and angle <= TOLERANCE
+        solved += is_solved
+        legal += is_solved and bool(((q >= robot.lower - 1e-9) & (q <= robot.upper + 1e-9)).all())
+    return 100.0 * solved / len(joints), 100.0 * legal / len(joints)
+
+
+def solvers(name: str, robot: Any) -> Iterator[tuple[str, Solver, int]]:
+    """Ours, then every peer that is installed and can model the arm."""
+    yield "teleop_core", lambda pose, seed: robot.ik(pose, seed).q, 1000
+    table = load_table(TABLES / f"{name}.yaml")
+    for peer, (make, count) in PEERS.items():
+        try:
+            yield peer, make(table, robot), count
+        except ImportError as error:
+            print(f"  {peer}: skipped, not installed ({error})")
+        except NotImplementedError as error:
+            print(f"  {peer}: skipped, {error}")
+
+
+def compare(name: str, share: float) -> None:
+    """Print one arm's table."""
+    robot = load_robot(name)
+    print(f"\n{name}, single calls from Python")
+    chosen = list(solvers(name, robot))
+    print(f"  {'workload':21}{'solver':23}{'solved %':>9}{'legal %':>9}{'median µs':>11}"
+          f"{'p99 µs':>9}{'ratio':>8}{'step':>8}")  # fmt: skip
+    for workload, (joints, is_path) in workloads(robot, max(20, round(1000 * share))).items():
+        ours = 0.0
+        for solver, solve, count in chosen:
+            some = joints[: max(20, round(count * share))]
+            times, answers = run(solve, robot, some, is_path=is_path)
+            median = float(np.median(times))
+            ours = ours or median
+            step = np.nanmax(np.abs(np.diff(answers, axis=0))) if is_path else np.nan
+            solved, legal = judge(robot, some, answers)
+            print(f"  {workload:21}{solver:23}{solved:9.1f}{legal:9.1f}{median:11.1f}"
+                  f"{np.percentile(times, 99):9.1f}{median / ours:8.1f}{step:8.4f}")  # fmt: skip
+
+
+def batches(name: str, count: int) -> None:
+    """Print how many poses and solutions a second one core makes in a batch."""
+    robot, rng = load_robot(name), np.random.default_rng(2)
+    q = rng.uniform(robot.lower, robot.upper, (count, robot.n))
+    poses, seeds = robot.fk(q), q + rng.normal(0.0, 0.05, q.shape)
+    robot.ik(poses[:2], seeds[:2])
+    rates = {"fk": 0.0, "ik near": 0.0, "ik far": 0.0}
+    for _ in range(5):
+        for key, call in (
+            ("fk", lambda: robot.fk(q)),
+            ("ik near", lambda: robot.ik(poses, seeds)),
+            ("ik far", lambda: robot.ik(poses)),
+        ):
+            begin = time.perf_counter()
+            call()
+            rates[key] = max(rates[key], 1e-6 * count / (time.perf_counter() - begin))
+    print(f"  {name:10}" + "".join(f"{key:>10} {rate:6.2f} M/s" for key, rate in rates.items()))
+
+
+_START = """
+import time; a = time.perf_counter()
+import teleop_core; b = time.perf_counter()
+from teleop_core.robots import load_robot
+robot = load_robot({name!r}); T = __import__("numpy").eye(4); c = time.perf_counter()
+robot.ik(T); d = time.perf_counter()
+print(b - a, c - b, d - c)
+"""
+
+
+def start_up(name: str) -> None:
+    """Print seconds of import and first solve, on an empty kernel cache and a filled one."""
+    with tempfile.TemporaryDirectory() as cache:
+        for state in ("cold", "warm"):
+            done = subprocess.run(
+                [sys.executable, "-c", _START.format(name=name)],
+                env={**os.environ, "NUMBA_CACHE_DIR": cache}, capture_output=True, text=True,
+                check=True,
+            )  # fmt: skip
+            imported, loaded, solved = map(float, done.stdout.split())
+            print(f"  {name:10}{state:6}import teleop_core {imported:6.3f} s   "
+                  f"load_robot {loaded:6.3f} s   first ik {solved:6.3f} s")  # fmt: skip
+
+
+def main() -> None:
+    """Print every table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--share", type=float, default=1.0, help="share of the poses to run")
+    share = parser.parse_args().share
+    warnings.simplefilter("ignore")  # peers' deprecations
+    for name in ARMS:
+        compare(name, share)
+    print("\nbatches on one core")
+    for name in ARMS:
+        batches(name, round(100_000 * share))
+    print("\nstart-up, each in a new process")
+    for name in ARMS:
+        start_up(name)
+
+
+if __name__ == "__main__":
+    main()
