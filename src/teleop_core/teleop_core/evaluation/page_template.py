@@ -44,6 +44,8 @@ SCRIPT = """\
   window.addEventListener("unhandledrejection", (event) => tell(String(event.reason)));
   function tell(text) {
     errors.push(text);
+    const line = document.getElementById("errors");
+    line.textContent = "Not everything could be drawn: " + errors.join("; ");
     document.body.dataset.errors = errors.join("; ");
   }
   const page = JSON.parse(document.getElementById("page-data").textContent);
@@ -73,8 +75,9 @@ SCRIPT = """\
     if (layout.scene)
       for (const key of ["xaxis", "yaxis", "zaxis"])
         layout.scene[key] = Object.assign({}, axis3, layout.scene[key]);
-    Plotly.newPlot(place, figure.traces, layout,
-      { responsive: true, displaylogo: false, displayModeBar: "hover" })
+    const options = { responsive: true, displaylogo: false, displayModeBar: "hover" };
+    Promise.resolve()
+      .then(() => Plotly.newPlot(place, figure.traces, layout, options))
       .then(() => {
         if (place.querySelector(".no-webgl")) tell("no WebGL for " + figure.id);
         else document.body.dataset.drawn = String(Number(document.body.dataset.drawn) + 1);
@@ -100,6 +103,7 @@ PAGE = """\
 </head>
 <body data-drawn="0">
 <main>
+<p id="errors" class="error"></p>
 {body}
 </main>
 <script id="page-data" type="application/json">{data}</script>

@@ -47,7 +47,8 @@ class StampTally:
         own = window.own(topic)
         if own.stop > own.start:
             stamps = window.series[topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
-            steps = np.diff(stamps)
+            # A slave without any command yet holds its pose under the stamp 0.
+            steps = np.diff(stamps)[stamps[:-1] > 0]
             self._repeats += int((steps == 0).sum())
             self._steps.add(steps[steps > 0])
 

@@ -1,0 +1,158 @@
+"""Report page: opened in a real browser, it draws every plot and asks nobody for anything."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.reports import report
+from teleop_core.bags.topics import (
+    ALL,
+    MASTER_MEASURED_CF,
+    MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+    SLAVE_SERVO_JP,
+    SLAVE_SETPOINT_CP,
+    SLAVE_SETPOINT_JS,
+    TELEOP_STATE,
+)
+from teleop_core.bags.writer import BagWriter
+from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.evaluation.figures import figures
+from teleop_core.evaluation.metrics import study
+from teleop_core.signals import STATE_FIELDS, TICK_NS
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
+    "--no-first-run", "--disable-background-networking", "--disable-component-update",
+    "--disable-sync", "--disable-extensions", "--enable-logging=stderr", "--v=0",
+    "--host-resolver-rules=MAP * ~NOTFOUND", "--virtual-time-budget=120000",
+)  # fmt: skip
+# Who started a request that no page started, in Chromium's log of the network.
+BROWSER_ITSELF = "not an origin"
+# What Chromium says about the speed of software rendering; nothing is wrong then.
+ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback")
+LARGEST_PAGE = 8_000_000
+JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
+START_NS = 1_700_000_000 * 1_000_000_000
+BOX = {"gain": 1.0, "is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_size_x": 0.03,
+       "fixture_size_y": 0.03, "fixture_size_z": 0.03}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def browser():
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        reason = f"no browser to open the page with; install one of {', '.join(BROWSERS)}"
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
+    return found
+
+
+def record(path, seed, count=6000):
+    """A live-looking recording: a tip on a curve through a box, with delays and a noisy hand."""
+    rng = np.random.default_rng(seed)
+    stamps = START_NS + np.arange(count) * TICK_NS
+    t = np.arange(count) * 1e-3
+    curve = 0.0155 * np.stack((np.sin(2.1 * t), np.sin(1.3 * t), np.cos(1.7 * t)), axis=1)
+    poses = np.zeros((count, 7))
+    poses[:, 3], poses[:, :3] = 1.0, curve + np.array([0.4, 0.0, 0.0])
+    measured = poses.copy()
+    measured[:, :3] += rng.normal(scale=5e-5, size=(count, 3))
+    force = np.zeros((count, 6))
+    force[:, :3] = -1000.0 * np.sign(curve) * np.maximum(np.abs(curve) - 0.015, 0.0)
+    rows = {
+        MASTER_MEASURED_CP: poses, SLAVE_SERVO_CP: poses, SLAVE_SERVO_JP: np.zeros((count, 6)),
+        SLAVE_SETPOINT_JS: np.zeros((count, 6)), SLAVE_SETPOINT_CP: poses,
+        SLAVE_MEASURED_CP: measured, MASTER_MEASURED_CF: force,
+    }  # fmt: skip
+    texts = {name: repr(BOX.get(name, 0.0)) for name in STATE_FIELDS}
+    metadata = {"scenario": '<curve> & "box" \'</script>', "robot": "rcrt1", "seed": str(seed)}
+    with BagWriter(path, ALL, JOINTS, metadata=metadata, start_ns=START_NS) as writer:
+        at = START_NS + 500 * TICK_NS
+        writer.write(TELEOP_STATE, at, report(at, "teleop", 0, "FOLLOWING", texts))
+        late = np.sort(rng.integers(100_000, 900_000, (len(rows), count)), axis=0)
+        for link, (topic, values) in enumerate(rows.items()):
+            logs = np.maximum.accumulate(stamps + late[link])
+            writer.write_block({topic: (stamps, values, logs)})
+    return path
+
+
+def opened(browser, page, folder):
+    """The page's body attributes after its scripts have run, console lines and requested URLs."""
+    log = folder / "net.json"
+    command = [browser, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}",
+               "--dump-dom", page.as_uri()]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
+    body = re.search(r"<body([^>]*)>", done.stdout)
+    assert body, "the browser showed no page:\n" + done.stderr[-2000:]
+    attributes = dict(re.findall(r'data-([a-z]+)="([^"]*)"', body.group(1)))
+    said = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    return attributes, said, requested(log)
+
+
+def requested(log):
+    """URLs for which a page asked the network, from Chromium's log of it."""
+    text = log.read_text(errors="replace").rstrip()
+    events = json.loads(text if text.endswith("]}") else text.rstrip(",") + "]}")["events"]
+    started = [event["params"] for event in events if "initiator" in event.get("params", {})]
+    return {
+        entry["url"]
+        for entry in started
+        if entry["initiator"] != BROWSER_ITSELF and not entry["url"].startswith(("file:", "data:"))
+    }
+
+
+@pytest.mark.browser
+@pytest.mark.slow
+def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path):
+    page = tmp_path / "page.html"
+    page.write_text('<body data-drawn="0"><img src="http://example.com/x.png"></body>')
+    assert opened(browser, page, tmp_path)[2] == {"http://example.com/x.png"}
+
+
+@pytest.mark.browser
+@pytest.mark.slow
+def test_page_of_three_recordings_draws_everything_without_asking_the_network(browser, tmp_path):
+    bags = [record(tmp_path / f"live_{seed}", seed) for seed in (1, 2, 3)]
+    expected = sum(len(figures(study(Bag(path)))) for path in bags)
+    assert expected == 21
+    page = tmp_path / "report.html"
+    evaluate_bags(bags, None, page, _Silent())
+    assert page.stat().st_size < LARGEST_PAGE
+    attributes, said, urls = opened(browser, page, tmp_path)
+    assert attributes.get("errors", "") == ""
+    assert attributes.get("finished") == "yes"
+    assert int(attributes["drawn"]) == expected
+    assert not [line for line in said if not any(advice in line for advice in ADVICE)]
+    assert not urls
+
+
+@pytest.mark.browser
+@pytest.mark.slow
+def test_page_tells_when_a_plot_cannot_be_drawn(browser, tmp_path):
+    page = tmp_path / "report.html"
+    evaluate_bags([record(tmp_path / "live", 1)], None, page, _Silent())
+    text = page.read_text()
+    data = re.search(r'id="page-data" type="application/json">(.*?)</script>', text, re.DOTALL)
+    broken = json.loads(data.group(1))
+    broken["figures"][2]["id"] = "nowhere"
+    page.write_text(text.replace(data.group(1), json.dumps(broken)))
+    attributes, _, _ = opened(browser, page, tmp_path)
+    assert "nowhere" in attributes["errors"]
+    assert int(attributes["drawn"]) == 6
+
+
+class _Silent:
+    """A console without a screen."""
+
+    width = 80
+
+    def print(self, *things, **options):
+        pass

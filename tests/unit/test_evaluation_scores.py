@@ -1,0 +1,470 @@
+"""Evaluation: scores of recordings made for the purpose, against what was put into them."""
+
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+from rich.console import Console
+from scipy.spatial.transform import Rotation
+
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.reports import report
+from teleop_core.bags.topics import (
+    ALL,
+    DIAGNOSTICS,
+    MASTER_MEASURED_CF,
+    MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+    SLAVE_SERVO_JP,
+    SLAVE_SETPOINT_CP,
+    SLAVE_SETPOINT_JS,
+    TELEOP_STATE,
+)
+from teleop_core.bags.writer import BagWriter
+from teleop_core.errors import EvaluationError, RecordingError
+from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.evaluation.metrics import evaluate, study
+from teleop_core.evaluation.page import report_page
+from teleop_core.evaluation.score import KEYS
+from teleop_core.evaluation.streams import STAGES
+from teleop_core.evaluation.table import score_tables
+from teleop_core.evaluation.windows import WINDOW_NS, DisorderError, windows
+from teleop_core.signals import STATE_FIELDS, TICK_NS
+
+JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
+START_NS = 1_700_000_000 * 1_000_000_000
+# Positions of some hundred millimetres in doubles, scaled to millimetres.
+EXACT_MM = 1e-9
+EXACT_DEG = 1e-7
+BOX = {"is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_center_z": -0.18,
+       "fixture_size_x": 0.03, "fixture_size_y": 0.03, "fixture_size_z": 0.03}  # fmt: skip
+
+
+def pose_rows(count, position=(0.4, 0.0, -0.18), angles=(0.0, 66.6, 0.0)):
+    """Poses (count, 7) at rest; angles are roll, pitch, yaw in degrees."""
+    x, y, z, w = Rotation.from_euler("ZYX", angles, degrees=True).as_quat()
+    return np.tile([*position, w, x, y, z], (count, 1))
+
+
+def state(stamp_ns, **values):
+    """Message of teleop/state with everything else zero, but gain 1."""
+    texts = {name: repr(float(values.get(name, name == "gain"))) for name in STATE_FIELDS}
+    return report(stamp_ns, "teleop", 0, "FOLLOWING", texts)
+
+
+class Recipe:
+    """A recording of a slave at rest; entries of ``rows`` are (stamps, values, log times)."""
+
+    def __init__(self, count=3000):
+        stamps = START_NS + np.arange(count) * TICK_NS
+        poses = pose_rows(count)
+        self.rows = {
+            topic: (stamps, poses.copy(), stamps)
+            for topic in (SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP)
+        }
+        self.stamps = stamps
+        self.singles = [(TELEOP_STATE, START_NS, state(START_NS))]
+        self.metadata = {"scenario": "at_rest", "robot": "rcrt1", "seed": "7"}
+
+    def values(self, topic):
+        return self.rows[topic][1]
+
+    def drop(self, topic, lost):
+        kept = np.setdiff1d(np.arange(len(self.rows[topic][0])), lost)
+        self.rows[topic] = tuple(column[kept] for column in self.rows[topic])
+
+    def delay(self, topic, delay_ns):
+        stamps, values, logs = self.rows[topic]
+        self.rows[topic] = (stamps, values, logs + delay_ns)
+
+    def write(self, path):
+        with BagWriter(path, ALL, JOINTS, metadata=self.metadata, start_ns=START_NS) as writer:
+            for topic, log_ns, data in self.singles:
+                writer.write(topic, log_ns, data)
+            longest = max(len(stamps) for stamps, *_ in self.rows.values())
+            for i in range(0, longest, 1000):
+                writer.write_block(
+                    {
+                        topic: tuple(column[i : i + 1000] for column in columns)
+                        for topic, columns in self.rows.items()
+                    }
+                )
+        return Bag(path)
+
+
+@pytest.fixture
+def recipe():
+    return Recipe()
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "bag"
+
+
+# -- errors ----------------------------------------------------------------------------------------
+
+
+def test_constant_offset_gives_its_length_as_rms_and_maximum_and_no_deviation(recipe, path):
+    recipe.values(SLAVE_MEASURED_CP)[:, :3] += [3e-4, 0.0, 4e-4]
+    error = evaluate(recipe.write(path)).position_error_mm
+    assert np.allclose((error.rms, error.sd, error.max), (0.5, 0.0, 0.5), atol=EXACT_MM)
+
+
+def test_errors_against_reference_and_command_are_told_apart(recipe, path):
+    recipe.values(SLAVE_SERVO_CP)[:, 0] += 2e-3
+    recipe.values(SLAVE_MEASURED_CP)[:, 1] += 1e-3
+    score = evaluate(recipe.write(path))
+    assert np.isclose(score.position_error_mm.max, 1.0, atol=EXACT_MM)
+    assert np.isclose(score.command_error_mm.max, np.sqrt(5.0), atol=EXACT_MM)
+
+
+def test_command_error_takes_the_command_that_was_known_at_the_sampling_time(recipe, path):
+    stamps, values, logs = recipe.rows[SLAVE_SERVO_CP]
+    values[1500:, 0] += 5e-3
+    recipe.rows[SLAVE_SERVO_CP] = (stamps + 200, values, logs + 200)  # 0.2 us after the sampling
+    score = evaluate(recipe.write(path))
+    expected = np.sqrt(25.0 * 1499 / 2999)
+    assert np.isclose(score.command_error_mm.rms, expected, atol=EXACT_MM)
+
+
+@pytest.mark.parametrize(
+    ("angles", "expected"),
+    [((0.3, 66.6, 0.0), "roll"), ((0.0, 66.9, 0.0), "pitch"), ((0.0, 66.6, 0.3), "yaw")],
+)
+def test_turn_about_one_fixed_axis_is_an_error_of_its_angle_alone(recipe, path, angles, expected):
+    recipe.values(SLAVE_MEASURED_CP)[:] = pose_rows(3000, angles=angles)
+    error = evaluate(recipe.write(path)).orientation_error_deg
+    for name in ("roll", "pitch", "yaw"):
+        spread, largest = getattr(error, name), 0.3 if name == expected else 0.0
+        assert np.allclose(
+            (spread.rms, spread.sd, spread.max), (largest, 0, largest), atol=EXACT_DEG
+        )
+    assert error.degenerate_share == 0.0
+
+
+def test_turn_beyond_180_degrees_is_the_short_way_round(recipe, path):
+    recipe.values(SLAVE_SETPOINT_CP)[:] = pose_rows(3000, angles=(179.9, 10.0, 0.0))
+    recipe.values(SLAVE_MEASURED_CP)[:] = pose_rows(3000, angles=(-179.9, 10.0, 0.0))
+    error = evaluate(recipe.write(path)).orientation_error_deg
+    assert np.isclose(error.roll.max, 0.2, atol=EXACT_DEG)
+    assert np.isclose(error.angle.max, 0.2, atol=EXACT_DEG)
+
+
+def test_orientation_straight_down_has_no_roll_and_no_yaw_but_an_angle(recipe, path):
+    recipe.values(SLAVE_SETPOINT_CP)[:] = pose_rows(3000, angles=(0.0, 90.0, 0.0))
+    recipe.values(SLAVE_MEASURED_CP)[:] = pose_rows(3000, angles=(0.0, 90.0, 0.5))
+    error = evaluate(recipe.write(path)).orientation_error_deg
+    assert error.degenerate_share == 1.0
+    assert error.roll.rms is error.yaw.rms is None
+    assert np.isclose(error.angle.rms, 0.5, atol=EXACT_DEG)
+
+
+def test_lost_messages_do_not_pair_a_pose_with_the_reference_of_another_tick(recipe, path):
+    motion = np.linspace(0.0, 0.3, 3000)[:, None] * [1.0, 0.0, 0.0]  # 0.1 mm each tick
+    for topic in recipe.rows:
+        recipe.values(topic)[:, :3] += motion
+    recipe.delay(SLAVE_MEASURED_CP, 40_000)
+    recipe.drop(SLAVE_SETPOINT_CP, [500, 1200, 1201, 1202])
+    recipe.drop(SLAVE_MEASURED_CP, [900, 2100])
+    score = evaluate(recipe.write(path))
+    assert score.position_error_mm.max < EXACT_MM
+    assert (score.samples.scored, score.samples.unpaired) == (2994, 4)
+
+
+def test_poses_that_are_no_numbers_are_counted_and_left_out(recipe, path):
+    recipe.values(SLAVE_MEASURED_CP)[10, 0] = np.nan
+    recipe.values(SLAVE_SETPOINT_CP)[20, 2] = np.inf
+    recipe.values(SLAVE_SETPOINT_CP)[30, 3:] = 0.0
+    score = evaluate(recipe.write(path))
+    assert score.samples.invalid == 3
+    assert score.position_error_mm.max == 0.0
+    json.dumps(score.to_json(), allow_nan=False)
+
+
+# -- fixture, force --------------------------------------------------------------------------------
+
+
+def test_penetration_counts_only_while_the_box_is_on(recipe, path):
+    on, off = START_NS + 1000 * TICK_NS, START_NS + 2000 * TICK_NS
+    recipe.singles += [(TELEOP_STATE, on, state(on, **BOX)), (TELEOP_STATE, off, state(off))]
+    tip = recipe.values(SLAVE_MEASURED_CP)
+    tip[500:600, 0] += 0.1  # before it came on
+    tip[1200:1300, 0] += 0.015 + 0.7e-3
+    tip[1300:1400, :2] += 0.015 + np.array([0.3e-3, 0.4e-3])  # beyond an edge
+    tip[2500:, 1] += 0.1
+    box = evaluate(recipe.write(path)).fixture
+    assert np.isclose(box.on_s, 1.0)
+    assert np.isclose(box.outside_share, 0.2)
+    assert np.isclose(box.penetration_max_mm, 0.7, atol=EXACT_MM)
+    assert np.isclose(box.penetration_rms_mm, np.sqrt((0.49 + 0.25) / 10), atol=EXACT_MM)
+
+
+def test_hand_is_as_far_out_as_its_command_divided_by_the_gain(recipe, path):
+    fine = BOX | {"gain": 0.1} | {f"fixture_size_{axis}": 0.003 for axis in "xyz"}
+    recipe.singles = [(TELEOP_STATE, START_NS, state(START_NS, **fine))]
+    recipe.values(SLAVE_SERVO_CP)[100:200, 2] -= 0.0015 + 0.05e-3
+    score = evaluate(recipe.write(path))
+    assert np.isclose(score.fixture.hand_penetration_max_mm, 0.5, atol=1e-8)
+    assert score.session.gain == 0.1
+
+
+def test_force_is_scored_by_its_magnitude(recipe, path):
+    force = np.zeros((3000, 6))
+    force[:, 0], force[:, 1] = 3.0, -4.0
+    recipe.rows[MASTER_MEASURED_CF] = (recipe.stamps, force, recipe.stamps)
+    assert np.isclose(evaluate(recipe.write(path)).force_n.rms, 5.0)
+
+
+def test_without_state_and_force_their_scores_are_not_applicable(recipe, path):
+    recipe.singles = []
+    score = evaluate(recipe.write(path))
+    assert score.session.gain is None
+    assert score.fixture.penetration_max_mm is None
+    assert score.force_n.max is None
+
+
+# -- latency, ticks, gaps --------------------------------------------------------------------------
+
+
+def chain(recipe, delays_us):
+    """Give the recording all four links of the chain; each comes so much after the one before."""
+    count, at = len(recipe.stamps), 0
+    widths = {SLAVE_SERVO_JP: 6, SLAVE_SETPOINT_JS: 6}
+    links = (MASTER_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS)
+    for topic, delay_us in zip(links, delays_us, strict=True):
+        at += delay_us * 1000
+        rows = np.zeros((count, 6)) if topic in widths else pose_rows(count)
+        recipe.rows[topic] = (recipe.stamps, rows, recipe.stamps + at)
+
+
+def test_known_delays_come_out_per_stage_and_in_total(recipe, path):
+    chain(recipe, (100, 250, 50, 900))
+    latency = evaluate(recipe.write(path)).latency_ms
+    for stage, delay in zip(STAGES, (0.1, 0.25, 0.05, 0.9, 1.3), strict=True):
+        found = latency[stage]
+        assert np.allclose((found.median, found.p99, found.max), delay), stage
+
+
+def test_command_that_is_held_counts_once(recipe, path):
+    chain(recipe, (0, 0, 0, 1000))
+    stamps, values, logs = recipe.rows[SLAVE_SETPOINT_JS]
+    held = stamps.copy()
+    held[1000:1500] = stamps[1000]
+    held[:10] = 0  # no command yet
+    recipe.rows[SLAVE_SETPOINT_JS] = (held, values, logs)
+    score = evaluate(recipe.write(path))
+    assert score.latency_ms["total"].max == 1.0
+    assert score.topics["slave/setpoint_js"].gaps == 0
+
+
+def test_stage_that_was_not_recorded_has_no_delay(recipe, path):
+    latency = evaluate(recipe.write(path)).latency_ms
+    assert latency["slave_sim"].median is None
+    assert latency["haptic_master"].max is None
+
+
+def test_dropped_samples_are_gaps_of_their_topic_alone(recipe, path):
+    recipe.drop(SLAVE_MEASURED_CP, [100, 101, 102, 999, 1000, 2500])
+    score = evaluate(recipe.write(path))
+    assert (score.topics["slave/measured_cp"].count, score.topics["slave/measured_cp"].gaps) == (
+        2994,
+        6,
+    )
+    assert score.topics["slave/servo_cp"].gaps == 0
+    assert score.topics["teleop/state"].gaps is None
+    assert (score.ticks.executed, score.ticks.late, score.ticks.missed) == (2994, None, 6)
+
+
+def test_topic_recorded_at_a_tenth_of_the_rate_has_no_gaps(recipe, path):
+    stamps, values, logs = recipe.rows[SLAVE_SERVO_CP]
+    recipe.rows[SLAVE_SERVO_CP] = (stamps[::10], values[::10], logs[::10])
+    assert evaluate(recipe.write(path)).topics["slave/servo_cp"].gaps == 0
+
+
+def test_ticks_are_those_that_the_slave_reported_last(recipe, path):
+    for second in (1, 2):
+        at = START_NS + second * 1000 * TICK_NS
+        values = {"ticks": str(1000 * second), "late": str(3 * second), "missed": str(second),
+                  "rate_hz": "999.9", "refused.slave/servo_jp.jump": "0"}  # fmt: skip
+        recipe.singles.append((DIAGNOSTICS, at, report(at, "slave_sim", 0, "ACTIVE", values)))
+    score = evaluate(recipe.write(path))
+    assert (score.ticks.executed, score.ticks.late, score.ticks.missed) == (2000, 6, 2)
+    assert "rate_hz" not in score.nodes["slave_sim"]
+    assert score.nodes["slave_sim"]["refused.slave/servo_jp.jump"] == 0
+
+
+# -- whole recordings ------------------------------------------------------------------------------
+
+
+def test_long_recording_scores_the_same_window_by_window_as_at_once(path, monkeypatch):
+    recipe = Recipe(13_000)
+    rng = np.random.default_rng(1)
+    recipe.values(SLAVE_MEASURED_CP)[:, :3] += rng.normal(scale=1e-4, size=(13_000, 3))
+    chain(recipe, (100, 250, 50, 900))
+    bag = recipe.write(path)
+    parts = list(windows(bag, recipe.rows))
+    assert len(parts) > 13_000 * TICK_NS // (2 * WINDOW_NS)
+    assert (
+        sum(p.own(SLAVE_MEASURED_CP).stop - p.own(SLAVE_MEASURED_CP).start for p in parts) == 13_000
+    )
+    streamed = evaluate(bag).to_json()
+    monkeypatch.setattr("teleop_core.evaluation.windows.WINDOW_NS", 10**15)
+    once = evaluate(bag).to_json()
+    assert np.isclose(streamed["position_error_mm"]["sd"], once["position_error_mm"]["sd"])
+    for part in ("latency_ms", "topics", "ticks", "samples"):
+        assert streamed[part] == once[part]
+
+
+def test_recording_out_of_order_is_scored_all_the_same(path):
+    recipe = Recipe(9000)
+    recipe.values(SLAVE_MEASURED_CP)[:, 0] += np.linspace(0, 1e-3, 9000)
+    straight = evaluate(recipe.write(path))
+    shuffled = path.with_name("shuffled")
+    with BagWriter(shuffled, ALL, JOINTS, start_ns=START_NS) as writer:
+        for topic in (SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP):  # one after the other
+            writer.write_block({topic: recipe.rows[topic]})
+    with pytest.raises(DisorderError):
+        list(windows(Bag(shuffled), recipe.rows))
+    other = evaluate(Bag(shuffled))
+    assert np.isclose(other.position_error_mm.rms, straight.position_error_mm.rms)
+    assert other.samples == straight.samples
+
+
+def test_json_has_exactly_the_documented_keys(recipe, path):
+    chain(recipe, (1, 1, 1, 1))
+    at = START_NS + 5 * TICK_NS
+    recipe.singles.append((DIAGNOSTICS, at, report(at, "slave_sim", 0, "", {"ticks": "5"})))
+    found = set(leaves(evaluate(recipe.write(path)).to_json()))
+    patterns = [re.compile(pattern(key.path)) for key in KEYS]
+    for leaf in found:
+        assert any(p.fullmatch(leaf) for p in patterns), f"{leaf} is not documented"
+    for key, p in zip(KEYS, patterns, strict=True):
+        assert any(p.fullmatch(leaf) for leaf in found), f"{key.path} does not occur"
+
+
+def leaves(tree, before=""):
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from leaves(value, f"{before}{name}.")
+        else:
+            assert value is None or isinstance(value, str | int | float)
+            yield before + name
+
+
+def pattern(key):
+    parts = []
+    for part in key.split("."):
+        parts.append("[^.]+" if part.startswith("<") else f"(?:{part})")
+    return r"\.".join(parts)
+
+
+def test_session_is_told_by_the_metadata(recipe, path):
+    session = evaluate(recipe.write(path)).session
+    assert (session.name, session.scenario, session.robot, session.seed) == (
+        "bag",
+        "at_rest",
+        "rcrt1",
+        7,
+    )
+    assert np.isclose(session.duration_s, 2.999)
+
+
+# -- the command -----------------------------------------------------------------------------------
+
+
+def console(width=80):
+    return Console(width=width, record=True, file=io.StringIO(), color_system=None)
+
+
+def test_command_writes_table_scores_and_page(recipe, path, tmp_path):
+    recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.5e-3
+    recipe.write(path)
+    shown = console()
+    target, page = tmp_path / "scores.json", tmp_path / "page.html"
+    page.write_text("old")
+    (score,) = evaluate_bags([path], target, page, shown)
+    text = shown.export_text()
+    assert "0.500✗ ≤0.338" in text
+    assert "0.500✓ ≤0.702" in text
+    assert json.loads(target.read_text())[0] == score.to_json()
+    assert page.read_text().startswith("<!DOCTYPE html>")
+
+
+def test_three_recordings_fit_side_by_side_on_a_narrow_terminal(recipe, path):
+    score = evaluate(recipe.write(path))
+    assert [len(table.columns) for table in score_tables([score] * 4, 80)] == [4, 2]
+    shown = console(80)
+    shown.print(score_tables([score] * 3, 80)[0])
+    assert "…" not in shown.export_text()
+
+
+def test_texts_of_a_recording_cannot_become_markup(recipe, tmp_path):
+    recipe.metadata |= {"scenario": "</script><b>[red]x", "robot": '"><img src=x onerror=alert(1)>'}
+    bag = recipe.write(tmp_path / "<i>bag")
+    page = report_page([study(bag)])
+    assert "<b>[red]" not in page
+    assert "<img" not in page.split("page-data")[0]
+    assert "<i>bag" not in page
+    shown = console()
+    shown.print(score_tables([evaluate(bag)], 80)[0])
+    assert "[red]x" in shown.export_text()
+
+
+@pytest.mark.parametrize("topic", [SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP])
+def test_missing_topic_is_named_with_what_there_is(recipe, path, topic):
+    del recipe.rows[topic]
+    recipe.write(path)
+    with pytest.raises(RecordingError) as caught:
+        evaluate_bags([path], None, None, console())
+    missing, present = str(caught.value).split("; it has ")
+    assert f"lacks {topic.name}" in missing
+    assert set(present.split(", ")) >= {other.name for other in recipe.rows}
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_empty_and_foreign_recordings_are_refused(path, tmp_path):
+    with pytest.raises(RecordingError, match="does not exist"):
+        evaluate_bags([path], None, None, console())
+    with BagWriter(path, ALL, JOINTS):
+        pass
+    with pytest.raises(RecordingError, match="no messages"):
+        evaluate_bags([path], None, None, console())
+    foreign = tmp_path / "foreign"
+    with BagWriter(foreign, [DIAGNOSTICS], ()) as writer:
+        writer.write(DIAGNOSTICS, 1, report(1, "lidar", 0, "", {}))
+    with pytest.raises(RecordingError, match=r"lacks slave/measured_cp.*it has diagnostics"):
+        evaluate_bags([foreign], None, None, console())
+
+
+def test_poses_that_never_meet_their_reference_are_refused(recipe, path):
+    recipe.delay(SLAVE_SETPOINT_CP, 10_000 * TICK_NS)
+    with pytest.raises(EvaluationError, match="must be recorded together"):
+        evaluate(recipe.write(path))
+
+
+@pytest.mark.parametrize(("text", "told"), [("wide", "must be a number"), (None, "lacks gain")])
+def test_state_of_another_make_is_refused_in_one_line(recipe, path, text, told):
+    values = dict.fromkeys(STATE_FIELDS, "0.0") | {"gain": text}
+    values = {name: value for name, value in values.items() if value is not None}
+    recipe.singles = [(TELEOP_STATE, START_NS, report(START_NS, "teleop", 0, "", values))]
+    with pytest.raises(EvaluationError, match=told):
+        evaluate(recipe.write(path))
+
+
+def test_nothing_is_written_when_one_recording_cannot_be_scored(recipe, path, tmp_path):
+    recipe.write(path)
+    target = tmp_path / "scores.json"
+    with pytest.raises(RecordingError):
+        evaluate_bags([path, tmp_path / "none"], target, None, console())
+    assert not target.exists()
+
+
+def test_output_into_a_missing_directory_is_refused_before_scoring(tmp_path):
+    with pytest.raises(EvaluationError, match="does not exist; make it first"):
+        evaluate_bags([tmp_path / "none"], tmp_path / "a" / "b.json", None, console())
+    with pytest.raises(EvaluationError, match="is a directory"):
+        evaluate_bags([tmp_path / "none"], None, tmp_path, console())
