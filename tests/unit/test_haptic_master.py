@@ -1,0 +1,322 @@
+"""Haptic master: the published device, a hand that gives way, tremor, buttons, same bits again."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import periodogram
+from scipy.spatial.transform import Rotation
+
+from teleop_core.errors import ParameterError
+from teleop_core.master.haptic_master import (
+    REST_POSITION,
+    REST_TILT,
+    ButtonParameters,
+    DeviceParameters,
+    HandParameters,
+    HapticMaster,
+    HapticMasterParameters,
+)
+from teleop_core.master.paths import PathParameters
+from teleop_core.signals import make_signals
+
+RESOLUTION, NOISE, PEAK = 0.055e-3, 2e-3, 3.3
+REST = Rotation.from_euler("x", REST_TILT)
+STILL = PathParameters(kind="hold", rotation=0.0)
+QUIET = {"position_resolution": 0.0, "gimbal_noise": 0.0}
+TOPICS = ("master_measured_cp", "master_measured_cv", "master_measured_cf", "master_buttons")
+
+
+def parameters(*, seed=1, device=None, hand=None, path=STILL, buttons=None):
+    return HapticMasterParameters(
+        seed=seed, device=DeviceParameters(**(device or {})), hand=HandParameters(**(hand or {})),
+        path=path, buttons=ButtonParameters(**(buttons or {})),
+    )  # fmt: skip
+
+
+def run(master, ticks, force=(0.0, 0.0, 0.0)):
+    """Signals of the next ticks (ticks,) under a constant commanded force [N]."""
+    out = make_signals(1, ticks)
+    for i in range(ticks):
+        master.signals["master_servo_cf"][:3] = force
+        master.step()
+        out[i] = master.signals
+    return out
+
+
+def places(signals):
+    return signals["master_measured_cp"][:, :3]
+
+
+def wobble(signals):
+    """Rotation vectors of the stylus readings against its rest, (N, 3)."""
+    readings = Rotation.from_quat(signals["master_measured_cp"][:, 3:], scalar_first=True)
+    return (REST.inv() * readings).as_rotvec()
+
+
+@pytest.mark.parametrize("force", [(3.0, 0, 0), (5.0, 0, 0), (3, -3, 3), (0, 0, -1e6), (0, 0, 0)])
+def test_applied_force_is_the_commanded_one_up_to_the_peak_and_in_its_direction(force):
+    applied = run(HapticMaster(parameters()), 1, force)["master_measured_cf"][0]
+    size = np.linalg.norm(force)
+    expected = np.array(force) * min(1.0, PEAK / size if size else 1.0)
+    assert np.allclose(applied[:3], expected, rtol=1e-15, atol=0)
+    assert not applied[3:].any()
+
+
+def test_hand_feels_no_more_than_the_peak_force():
+    at_peak = places(run(HapticMaster(parameters()), 500, (PEAK, 0, 0)))
+    beyond = places(run(HapticMaster(parameters()), 500, (100.0, 0, 0)))
+    assert np.allclose(at_peak, beyond, rtol=0, atol=1e-12)
+
+
+def test_place_readings_are_multiples_of_the_resolution():
+    path = PathParameters(kind="random", approach_time=0.5)
+    counts = places(run(HapticMaster(parameters(path=path)), 3000)) / RESOLUTION
+    # A reading of 0.1 m is 2000 steps, known to 1e-12 of a step.
+    assert np.abs(counts - np.round(counts)).max() < 1e-10
+    assert len(np.unique(np.round(counts))) > 100
+
+
+def test_reading_is_within_half_a_step_of_the_tip():
+    path = PathParameters(kind="random", approach_time=0.5)
+    master = HapticMaster(parameters(path=path))
+    for _ in range(1000):
+        reading = places(run(master, 1))[0]
+        assert np.abs(reading - master.state["position"]).max() <= 0.5 * RESOLUTION + 1e-15
+
+
+def test_gimbal_noise_fills_its_bounds_and_never_leaves_them():
+    turns = wobble(run(HapticMaster(parameters()), 5000))
+    # Turns about three axes of 2e-3 rad mix by their product, 4e-6 rad.
+    assert np.abs(turns).max() < NOISE + 4e-6
+    assert (np.abs(turns).max(axis=0) > 0.99 * NOISE).all()
+    # Two standard deviations are the bound, the rest is clipped: 0.48 of the bound.
+    assert np.allclose(turns.std(axis=0), 0.48 * NOISE, rtol=0.05, atol=0)
+    assert np.abs(turns.mean(axis=0)).max() < 4 * 0.48 * NOISE / math.sqrt(5000)
+
+
+def test_gimbal_noise_is_white():
+    turns = wobble(run(HapticMaster(parameters()), 5000))[:, 0]
+    lagged = np.corrcoef(turns[1:], turns[:-1])[0, 1]
+    assert abs(lagged) < 4.0 / math.sqrt(5000)
+
+
+def hand_gain(hertz, hand, mass):
+    """Amplitude of the tip over that of the wanted place, for hand and device without friction."""
+    s = 2j * math.pi * hertz
+    pull = hand.stiffness + hand.damping * s
+    return abs(pull / (mass * s**2 + pull))
+
+
+@pytest.mark.parametrize("middle", [9.0, 10.0, 11.0])
+def test_tremor_has_its_peak_in_the_band_with_the_wanted_amplitude(middle):
+    hand = {"tremor_amplitude": 0.5e-3, "tremor_frequency": middle}
+    device = {**QUIET, "friction": 0.0}
+    signals = run(HapticMaster(parameters(device=device, hand=hand)), 20_000)
+    motion = places(signals)[1000:] - REST_POSITION
+    for axis in range(3):
+        frequency, power = periodogram(motion[:, axis], 1000.0)
+        assert abs(frequency[power.argmax()] - middle) <= 2.0
+        band = (frequency > middle - 2.5) & (frequency < middle + 2.5)
+        assert power[band].sum() > 0.95 * power.sum()
+    amplitude = math.sqrt(2.0) * motion.std()
+    expected = 0.5e-3 * hand_gain(middle, HandParameters(), 0.195)
+    # The line wanders by ±2 Hz, over which the hand's gain changes by a third.
+    assert math.isclose(amplitude, expected, rel_tol=0.1)
+
+
+def test_axes_tremble_independently():
+    hand = {"tremor_amplitude": 0.5e-3}
+    motion = places(run(HapticMaster(parameters(device=QUIET, hand=hand)), 20_000))[1000:]
+    between = np.corrcoef(motion.T)[np.triu_indices(3, 1)]
+    # Lines that wander over ±2 Hz forget their phase in about 0.2 s: 100 independent pieces.
+    assert np.abs(between).max() < 0.4
+
+
+def test_without_tremor_and_noise_a_still_hand_is_perfectly_still():
+    device = {"gimbal_noise": 0.0}
+    signals = run(HapticMaster(parameters(device=device, hand={"tremor_amplitude": 0.0})), 500)
+    assert not np.diff(signals["master_measured_cp"], axis=0).any()
+    assert not signals["master_measured_cv"].any()
+
+
+@pytest.mark.parametrize("stiffness", [100.0, 300.0, 1000.0])
+@pytest.mark.parametrize("force", [(1.0, 0, 0), (0, -2.0, 0), (0, 0, 3.0)])
+def test_hand_gives_way_by_force_over_stiffness(stiffness, force):
+    hand, device = {"tremor_amplitude": 0.0, "stiffness": stiffness}, {**QUIET, "start": (0, 0, 0)}
+    device["start"] = (0.0, 0.0, 0.0)
+    signals = run(HapticMaster(parameters(device=device, hand=hand)), 5000, force)
+    moved = places(signals)[-1] - REST_POSITION
+    # Smooth friction lets the hand creep there: 64 N·s/m against 100 N/m is done after 5 s.
+    assert np.allclose(moved, np.array(force) / stiffness, rtol=0, atol=2e-5)
+
+
+def test_hand_returns_when_the_force_ends():
+    master = HapticMaster(parameters(device=QUIET, hand={"tremor_amplitude": 0.0}))
+    run(master, 2000, (2.0, 0, 0))
+    moved = places(run(master, 3000))[-1] - REST_POSITION
+    assert np.abs(moved).max() < 1e-5
+
+
+def test_wanted_path_is_followed():
+    path = PathParameters(kind="circle", center=(0, 0, 0.03), approach_time=1.0, period=8.0)
+    master = HapticMaster(parameters(path=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
+    wanted = HapticMaster(parameters(path=path)).draw(10_000)[0]
+    off = np.linalg.norm(places(run(master, 10_000)) - wanted, axis=1)
+    # Backdrive friction of 0.26 N against the hand's 300 N/m.
+    assert off.max() < 1.1 * 0.26 / 300.0 * math.sqrt(3.0)
+
+
+def test_tip_stops_at_the_ends_of_the_workspace():
+    far = PathParameters(kind="hold", center=(0.2, -0.2, 0.2), approach_time=0.5, rotation=0.0)
+    last = run(HapticMaster(parameters(path=far, device=QUIET)), 2000)[-1:]
+    middle = np.subtract(REST_POSITION, (0.0, 0.0, -0.03))
+    expected = middle + 0.5 * np.array((0.16, -0.12, 0.07))
+    assert np.allclose(places(last)[0], expected, rtol=0, atol=1e-15)
+    assert np.abs(last["master_measured_cv"][0, :3]).max() < 1e-9
+
+
+def test_tip_leaves_its_stop_again():
+    points = (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
+    path = PathParameters(kind="points", points=points, approach_time=0.1, period=1.5)
+    signals = run(HapticMaster(parameters(path=path, device=QUIET)), 4000)
+    assert math.isclose(places(signals)[:, 0].max(), 0.08, abs_tol=1e-12)
+    assert abs(places(signals)[-1, 0]) < 1e-3
+
+
+def test_master_starts_at_rest_in_the_inkwell():
+    master = HapticMaster(parameters(path=PathParameters(), device={"gimbal_noise": 0.0}))
+    start = master.signals["master_measured_cp"].copy()
+    assert np.allclose(start[3:], REST.as_quat(scalar_first=True), rtol=0, atol=1e-15)
+    first = run(master, 20)
+    # One step of the reading at most; the tremor starts from nothing too.
+    assert np.abs(places(first) - REST_POSITION).max() <= RESOLUTION
+    assert np.abs(wobble(first)).max() < 1e-6
+
+
+def test_first_reading_is_the_start_itself_and_reports_no_motion():
+    master = HapticMaster(parameters(device={"gimbal_noise": 0.0}))
+    start = master.signals["master_measured_cp"].copy()
+    assert np.abs(start[:3] - REST_POSITION).max() <= 0.5 * RESOLUTION
+    first = run(master, 1)
+    assert np.array_equal(places(first)[0], start[:3])
+    assert not first["master_measured_cv"].any()
+
+
+def test_twist_is_the_filtered_rate_of_the_readings():
+    path = PathParameters(kind="circle", center=(0, 0, 0.03), approach_time=1.0, period=4.0)
+    master = HapticMaster(parameters(path=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
+    signals = run(master, 4000)
+    rate = np.gradient(places(signals), 1e-3, axis=0)[2000:3990]
+    # 5 ms late and half a tick early: 4.5 ms of the rate's own change.
+    late = np.roll(signals["master_measured_cv"][:, :3], -5, axis=0)[2000:3990]
+    assert np.abs(rate - late).max() < 1e-4
+    assert np.abs(rate).max() > 0.02
+
+
+def test_turning_rate_is_that_of_the_stylus_in_base_axes():
+    path = PathParameters(kind="hold", tilt=(0.0, 0.0, 1.0), approach_time=2.0, rotation=0.0)
+    signals = run(HapticMaster(parameters(path=path, device=QUIET)), 1500)
+    about_stylus_z = REST.apply((0.0, 0.0, 1.0))
+    measured = signals["master_measured_cv"][1000, 3:]
+    # Peak of the smooth step in its middle: 1.875 times the mean of 0.5 rad/s.
+    assert np.allclose(measured, 0.9375 * about_stylus_z, rtol=0, atol=1e-3)
+
+
+def test_buttons_are_pressed_at_their_times():
+    buttons = {"clutch": (0.1, 0.3), "fixture": (0.2,), "mode": (0.05, 0.4)}
+    pressed = run(HapticMaster(parameters(buttons=buttons)), 600)["master_buttons"]
+    at = [np.flatnonzero(column) + 1 for column in pressed.T]  # tick k has the time k ms
+    assert np.array_equal(at[0], np.arange(100, 300))
+    for column, starts in ((1, (200,)), (2, (50, 400))):
+        edges = at[column][np.diff(at[column], prepend=-10) > 1]
+        assert np.array_equal(edges, starts)
+        # 0.1 s; a tick more or less by rounding of its end.
+        assert abs(len(at[column]) - 100 * len(starts)) <= len(starts)
+
+
+@pytest.mark.parametrize("clutch", [(1.0,), (2.0, 1.0), (1.0, 2.0, 3.0)])
+def test_clutch_times_that_are_no_rising_pairs_are_refused(clutch):
+    with pytest.raises(ParameterError) as error:
+        ButtonParameters(clutch=clutch)
+    assert error.value.name == "buttons.clutch"
+
+
+@pytest.mark.parametrize("button", ["fixture", "mode"])
+@pytest.mark.parametrize("presses", [(1.0, 1.05), (2.0, 1.95), (1.0, 1.1)])
+def test_presses_that_would_run_into_one_are_refused(button, presses):
+    with pytest.raises(ParameterError) as error:
+        ButtonParameters(**{button: presses})
+    assert error.value.name == f"buttons.{button}"
+
+
+def test_presses_need_no_order():
+    pressed = run(HapticMaster(parameters(buttons={"mode": (0.3, 0.05)})), 400)["master_buttons"]
+    assert np.count_nonzero(np.diff(pressed[:, 2]) > 0) == 2
+
+
+RANDOM = PathParameters(kind="random", approach_time=0.5)
+
+
+def test_same_seed_gives_the_same_bits_and_another_seed_others():
+    first, again, other = (
+        run(HapticMaster(parameters(seed=seed, path=RANDOM)), 1500) for seed in (5, 5, 6)
+    )
+    for topic in TOPICS:
+        assert np.array_equal(first[topic], again[topic])
+    assert np.abs(places(first)[-1] - places(other)[-1]).max() > 1e-3
+
+
+def test_reset_repeats_the_session_to_the_bit():
+    master = HapticMaster(parameters(path=RANDOM))
+    first = run(master, 1200)
+    master.reset()
+    again = run(master, 1200)
+    for topic in TOPICS:
+        assert np.array_equal(first[topic], again[topic])
+
+
+@pytest.mark.parametrize("sizes", [(1,) * 50, (7, 993, 1000), (3000,), (1999, 1)])
+def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(sizes):
+    buttons = {"clutch": (0.5, 1.0), "mode": (0.02,)}
+    whole = HapticMaster(parameters(path=RANDOM, buttons=buttons)).draw(sum(sizes))
+    master = HapticMaster(parameters(path=RANDOM, buttons=buttons))
+    for piece, total in zip(zip(*map(master.draw, sizes), strict=True), whole, strict=True):
+        assert np.array_equal(np.concatenate(piece), total)
+
+
+def test_new_hand_is_felt_from_the_next_tick_and_does_not_jump():
+    master = HapticMaster(parameters(path=RANDOM, device=QUIET))
+    before = places(run(master, 1000))
+    stiff = HandParameters(stiffness=2000.0, damping=30.0)
+    master.retune(HapticMasterParameters(hand=stiff, device=DeviceParameters(**QUIET)))
+    after = places(run(master, 200))
+    assert np.abs(after[0] - before[-1]).max() < 2e-4
+    off = after - HapticMaster(parameters(path=RANDOM)).draw(1200)[0][1000:]
+    # Friction of 0.26 N and the tremor's tenth of a millimetre against 2000 N/m.
+    assert np.abs(off[-50:]).max() < 0.5e-3
+
+
+EXTREMES = [
+    {"mass": 0.01, "damping": 200.0},
+    {"mass": 0.01, "damping": 200.0, "stiffness": 5000.0},
+    {"mass": 0.01, "damping": 0.1, "stiffness": 5000.0},
+    {"mass": 5.0, "damping": 0.1, "stiffness": 1.0},
+    {"mass": 0.01, "damping": 0.1, "stiffness": 1.0},
+]
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.26, 5.0])
+@pytest.mark.parametrize("hand", EXTREMES)
+def test_hand_at_the_edge_of_its_parameters_stays_where_it_wants_to_be(hand, friction):
+    device = {**QUIET, "apparent_mass": 1e-3, "friction": friction}
+    calm = {"stiffness": 300.0, **hand, "tremor_amplitude": 0.0}
+    master = HapticMaster(parameters(device=device, hand=calm))
+    push, width = 0.5, 0.16
+    tap = places(run(master, 30, (push, 0.0, 0.0)))
+    moved = np.abs(np.concatenate((tap, places(run(master, 1000)))) - REST_POSITION)
+    # A spring swings at most twice as far as it gives way; the device has its stops.
+    assert moved.max() <= min(2.1 * push / calm["stiffness"], 0.5 * width)
+    # With damping c the tap of 30 ms goes no further than its momentum over c.
+    assert moved.max() <= 1.01 * push * 0.030 / calm["damping"] or calm["damping"] < 200.0
+    assert not moved[:, 1:].any()
