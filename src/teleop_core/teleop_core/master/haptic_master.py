@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ REST_TILT = math.radians(-23.4)
 REST_POSITION = (0.0, -0.065511, -0.088114)
 BLOCK = 1000
 """Ticks for which the wanted path and the noise are drawn at once."""
+PRESS_TIME = 0.1
+"""How long the operator presses the fixture or the mode button [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +55,9 @@ class ButtonParameters:
     def __post_init__(self) -> None:
         if len(self.clutch) % 2 or list(self.clutch) != sorted(self.clutch):
             raise ParameterError("buttons.clutch", self.clutch, "rising pairs of press, release")
+        for name, presses in (("fixture", self.fixture), ("mode", self.mode)):
+            if any(b - a < PRESS_TIME + 0.01 for a, b in pairwise(sorted(presses))):
+                raise ParameterError(f"buttons.{name}", presses, "at least 0.11 s apart")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,11 +167,14 @@ class HapticMaster:
         self.handle = make_handle(self._fixed.device, rest)
         for name in _STATE.names or ():
             self.state[name] = 0.0
-        for name in ("position", "wanted", "reading"):
+        for name in ("position", "wanted"):
             self.state[name] = REST_POSITION
-        self.state["attitude"] = self._rest
-        pose = self.signals["master_measured_cp"]
-        pose[:3], pose[3:] = REST_POSITION, self._rest
+        place, pose = self.state["position"], self.signals["master_measured_cp"]
+        if self.handle is None:
+            read_phantom(self.parameters, place, self._rest, np.zeros(3), pose)
+        else:
+            read_handle(self.handle, place, self._rest, pose)
+        self.state["reading"], self.state["attitude"] = pose[:3], pose[3:]
 
     def retune(self, parameters: HapticMasterParameters) -> None:
         """Take new device and hand parameters from the next tick on; the path stays."""
@@ -199,7 +208,7 @@ class HapticMaster:
         pressed[:, 0] = np.searchsorted(buttons.clutch, times, side="right") % 2
         for column, presses in ((1, buttons.fixture), (2, buttons.mode)):
             for start in presses:
-                pressed[(times >= start) & (times < start + 0.1), column] = 1.0
+                pressed[(times >= start) & (times < start + PRESS_TIME), column] = 1.0
         return pressed
 
     def step(self) -> None:
