@@ -26,12 +26,6 @@ def tilted(rng, most=0.6):
     return transform(R, np.array([0.0, 0.0, rng.uniform(0.9, 1.3)]))
 
 
-def test_mobility_and_passive_joints_of_the_lecture():
-    freedom = 6 * (8 - 9 - 1) + 6 * 1 + 3 * 3
-    assert freedom == 3
-    assert 9 - freedom == 6
-
-
 def test_loop_equations_have_rank_three_over_angles_and_lengths():
     gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     constraints(np.array([1.2, 1.0, 0.9]), np.radians([60.0, 70.0, 80.0]), B, A, gap, G, H)

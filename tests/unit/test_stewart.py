@@ -1,6 +1,5 @@
 """Stewart platform: legs, direct kinematics, Jacobian and rank of any layout."""
 
-import itertools
 import math
 
 import numpy as np
@@ -32,19 +31,6 @@ def poses(rng, count, height=0.2, tilt=25.0):
     for _ in range(count):
         shift = rng.uniform(-0.15, 0.15, 3) * height
         yield transform(turn(*rng.uniform(-tilt, tilt, 3)), shift + np.array([0.0, 0.0, height]))
-
-
-def test_mobility_counts_of_the_lecture_leave_thirty_passive_freedoms_and_five_loops():
-    bodies, joints, freedoms = 14, 18, 6 * 3 + 6 * 2 + 6 * 1
-    assert 6 * (bodies - joints - 1) + freedoms == 6
-    assert freedoms - 6 == 30
-    assert joints - bodies + 1 == 5
-    listed = [(i, i + gap) for gap in (1, 2, 3) for i in range(6 - gap)]
-    assert len(listed) == 12
-    incidence = np.zeros((12, 6))
-    for row, (i, k) in enumerate(listed):
-        incidence[row, i], incidence[row, k] = 1.0, -1.0
-    assert np.linalg.matrix_rank(incidence) == np.linalg.matrix_rank(incidence[:5]) == 5
 
 
 def test_legs_are_the_distances_of_the_joints():
@@ -202,12 +188,6 @@ def test_any_layout_loads_as_a_robot_and_the_singular_one_refuses_by_nan():
     assert result.status == IkStatus.NEAR_SINGULAR
     assert np.isnan(robot.fk(result.q)[:3]).all()
     assert np.isnan(robot.jacobian(result.q)).all()
-
-
-def test_the_twelve_listed_loops_are_pairs_of_legs_up_to_three_apart():
-    pairs = [pair for pair in itertools.combinations(range(6), 2) if pair[1] - pair[0] <= 3]
-    assert len(pairs) == 12
-    assert len(list(itertools.combinations(range(6), 2))) - len(pairs) == 3
 
 
 def test_bad_layouts_and_questions_are_refused():

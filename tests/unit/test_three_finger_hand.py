@@ -35,10 +35,6 @@ def moves(robot, rng, count, shift=0.006, turn=0.25):
         yield transform(R, T[:3, 3] + rng.uniform(-shift, shift, 3))
 
 
-def test_mobility_of_the_lecture_is_six_and_not_the_spoken_three():
-    assert 6 * (11 - 12 - 1) + 9 + 9 == 6
-
-
 def test_three_distances_between_contacts_leave_six_freedoms(robot, hand):
     slopes = np.array(
         [

@@ -17,7 +17,7 @@ import numpy as np
 from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.branches import bounded, wrapped
+from teleop_core.robots.branches import bounded, turned, wrapped
 from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar
 from teleop_core.robots.robot import (
     REACHED,
@@ -38,6 +38,7 @@ _SAMPLES = 90  # of the coupler curve, in the search for its nearest point
 # Sine between coupler and rocker under which the crank hardly determines the coupler.
 _NEAR = 0.02
 _ROUNDING = 1e-12
+_CLOSE = 1e-15  # m, where going further down makes no difference
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
@@ -99,6 +100,8 @@ def _refined(theta1: float, lower: float, upper: float, T: Array, g: Array) -> f
     q, J, reached = np.empty(1), np.empty((6, 1)), np.empty((4, 4))
     best = _distance(theta1, T[0, 3], T[1, 3], g)
     for _ in range(60):
+        if best <= _CLOSE:
+            break
         q[0] = theta1
         fk(q, g, reached)
         jacobian(q, g, J)
@@ -129,21 +132,12 @@ def _candidate(k: int, T: Array, g: Array) -> float:
 
 
 @kernel
-def _in_turn(angle: float, seed: float, lower: float, upper: float) -> float:
-    """Same angle, in the turn next to the seed that is inside the limits."""
-    near: float = seed + wrapped(angle - seed)
-    if near > upper + _ROUNDING:
-        return near - 2.0 * math.pi
-    return near + 2.0 * math.pi if near < lower - _ROUNDING else near
-
-
-@kernel
 def _nearest(T: Array, seed: float, limits: Array, g: Array) -> float:
     """Crank angle of the nearest point of the whole curve; of equal ones next to the seed."""
     lower, upper = limits[0, 0], limits[1, 0]
     best, cost = seed, math.inf
     for k in range(2):
-        angle = _in_turn(_candidate(k, T, g), seed, lower, upper)
+        angle = turned(_candidate(k, T, g), seed, lower, upper, False)
         inside = lower - _ROUNDING <= angle <= upper + _ROUNDING
         is_exact = inside and _distance(angle, T[0, 3], T[1, 3], g) <= REACHED
         if is_exact and abs(angle - seed) < cost:

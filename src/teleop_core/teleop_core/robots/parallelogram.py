@@ -15,7 +15,7 @@ import numpy as np
 from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.branches import bounded, wrapped
+from teleop_core.robots.branches import bounded, turned
 from teleop_core.robots.robot import (
     REACHED,
     IkStatus,
@@ -61,11 +61,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     x, y = T[0, 3] - geometry[2], T[1, 3]
     angle = seed[0]
     if math.hypot(x, y) > REACHED:
-        angle = seed[0] + wrapped(math.atan2(y, x) - seed[0])
-    if angle > limits[1, 0]:
-        angle -= 2.0 * math.pi
-    if angle < limits[0, 0]:
-        angle += 2.0 * math.pi
+        is_path = math.isfinite(limits[2, 0])
+        angle = turned(math.atan2(y, x), seed[0], limits[0, 0], limits[1, 0], is_path)
     q[0] = bounded(angle, seed[0], limits[0, 0], limits[1, 0], limits[2, 0])
     reached = np.empty((4, 4))
     fk(q, geometry, reached)

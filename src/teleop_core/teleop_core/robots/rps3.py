@@ -132,10 +132,9 @@ def _legs(T: Array, geometry: Array, q: Array) -> None:
 
 
 @kernel
-def _is_near_singular(q: Array, geometry: Array) -> bool:
+def _is_near_singular(q: Array, theta: Array, geometry: Array) -> bool:
     """Whether the legs hardly fix the platform: unit rows of the loop equations span little."""
-    theta, gap, G, H = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    _lean(q, geometry, theta)
+    gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     constraints(q, theta, geometry[0], geometry[1], gap, G, H)
     volume = 1.0
     for r in range(3):
@@ -153,14 +152,16 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         return -1
     _legs(T, geometry, q)
     is_there = slowed(q, seed, limits, q)
-    reached = np.empty((4, 4))
-    fk(q, geometry, reached)
+    theta, S, reached = np.empty(3), np.empty((3, 3)), np.empty((4, 4))
+    _lean(q, geometry, theta)
+    points(q, theta, geometry[0], S)
+    frame(S, reached)
     pose_residual(reached, T, residual)
     tilt = math.sqrt((reached[0, 2] - T[0, 2]) ** 2 + (reached[1, 2] - T[1, 2]) ** 2)
     is_up = reached[2, 2] * T[2, 2] >= 0.0
     if abs(reached[2, 3] - T[2, 3]) > REACHED or tilt > REACHED or not is_up:
         return _UNREACHABLE if is_there else _LIMITED
-    return _NEAR_SINGULAR if _is_near_singular(q, geometry) else _FOLLOWED
+    return _NEAR_SINGULAR if _is_near_singular(q, theta, geometry) else _FOLLOWED
 
 
 @kernel

@@ -180,8 +180,9 @@ def _is_left(T: Array, seed: Array, limits: Array, g: Array) -> bool:
     for elbow in range(2):
         _arm(T, g, elbow == 0, seed[0], q)
         q[0] = turned(q[0], seed[0], limits[0, 0], limits[1, 0], False)
-        wanted_platform(T, g[_CARRIED] * (q[0] + q[1]), g[_W], platform)
-        leg_lengths(platform, g[_LEGS:_CARRIED], q[3:], J)
+        if elbow == 0 or g[_CARRIED] > 0.0:  # else both elbows have the same legs
+            wanted_platform(T, g[_CARRIED] * (q[0] + q[1]), g[_W], platform)
+            leg_lengths(platform, g[_LEGS:_CARRIED], q[3:], J)
         costs[elbow] = move_cost(q, seed, limits, 0, 9)
     return bool(costs[0] <= costs[1])
 

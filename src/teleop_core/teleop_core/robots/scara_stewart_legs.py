@@ -22,6 +22,9 @@ from teleop_core.robots.stewart_legs import direct, leg_system
 
 # Sine of sigma_b + sigma_m under which the layout counts as similar hexagons.
 _SIMILAR = 1e-9
+# Of 60° (i - 1).
+_COSINES = (1.0, 0.5, -0.5, -1.0, -0.5, 0.5)
+_SINES = (0.0, math.sqrt(0.75), math.sqrt(0.75), 0.0, -math.sqrt(0.75), -math.sqrt(0.75))
 # Sine of the largest tilt of the platform, 75°: its ball joints' assumed limit.
 TILT = math.sin(math.radians(75.0))
 
@@ -35,19 +38,19 @@ def is_similar(sigma_b: float, sigma_m: float) -> bool:
 @kernel
 def layout(r_b: float, r_m: float, sigma_b: float, sigma_m: float, joints: Array) -> None:
     """Write base joints and platform joints of the legs (2, 6, 3) [m]."""
+    cb, sb, cm, sm = math.cos(sigma_b), math.sin(sigma_b), math.cos(sigma_m), math.sin(sigma_m)
     for i in range(6):
+        c, s = _COSINES[i], _SINES[i]
         sign = 1.0 if i % 2 == 0 else -1.0
-        b, m = math.pi / 3.0 * i - sign * sigma_b, math.pi / 3.0 * i + sign * sigma_m
-        joints[0, i, 0], joints[0, i, 1], joints[0, i, 2] = (
-            r_b * math.cos(b),
-            r_b * math.sin(b),
-            0.0,
+        joints[0, i, 0], joints[0, i, 1] = (
+            r_b * (c * cb + sign * s * sb),
+            r_b * (s * cb - sign * c * sb),
         )
-        joints[1, i, 0], joints[1, i, 1], joints[1, i, 2] = (
-            r_m * math.cos(m),
-            r_m * math.sin(m),
-            0.0,
+        joints[1, i, 0], joints[1, i, 1] = (
+            r_m * (c * cm - sign * s * sm),
+            r_m * (s * cm + sign * c * sm),
         )
+        joints[0, i, 2] = joints[1, i, 2] = 0.0
 
 
 @kernel
@@ -103,9 +106,8 @@ def _sums(legs: Array, constant: float, sums: Array) -> None:
         sums[half, 0] = sums[half, 1] = 0.0
         for i in range(half, 6, 2):
             value = (legs[i] * legs[i] - constant) / 3.0
-            angle = math.pi / 3.0 * i
             sums[half, 0] += value
-            sums[half, 1] += value * complex(math.cos(angle), math.sin(angle))
+            sums[half, 1] += value * complex(_COSINES[i], _SINES[i])
 
 
 @kernel
