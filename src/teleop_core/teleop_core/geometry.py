@@ -123,31 +123,22 @@ def rotation_angle_between(a: Array, b: Array) -> float:
 
 @kernel
 def is_rigid(transform: Array) -> bool:
-    """Whether a (4, 4) matrix is finite, with a right-handed rotation within 1e-6."""
-    for i in range(3):
-        for j in range(4):
-            if not math.isfinite(transform[i, j]):
-                return False
-    for i in range(3):
-        for j in range(i, 3):
-            dot = 0.0
-            for k in range(3):
-                dot += transform[k, i] * transform[k, j]
-            if abs(dot - (1.0 if i == j else 0.0)) > 1e-6:
-                return False
-    cross = transform[0, 0] * transform[1, 1] - transform[1, 0] * transform[0, 1]
-    last = transform[3, 0] == 0.0 and transform[3, 1] == 0.0 and transform[3, 2] == 0.0
-    return (
-        last and transform[3, 3] == 1.0 and cross * transform[2, 2] > -0.5 and _is_right(transform)
-    )
+    """Whether a (4, 4) matrix is finite, with a right-handed rotation within 1e-6.
 
-
-@kernel
-def _is_right(t: Array) -> bool:
-    x = t[1, 0] * t[2, 1] - t[2, 0] * t[1, 1]
-    y = t[2, 0] * t[0, 1] - t[0, 0] * t[2, 1]
-    z = t[0, 0] * t[1, 1] - t[1, 0] * t[0, 1]
-    return x * t[0, 2] + y * t[1, 2] + z * t[2, 2] > 0.0
+    Two unit columns at right angles and their cross product as the third say it all; a NaN or
+    infinity anywhere makes a comparison fail.
+    """
+    t = transform
+    first = t[0, 0] * t[0, 0] + t[1, 0] * t[1, 0] + t[2, 0] * t[2, 0] - 1.0
+    second = t[0, 1] * t[0, 1] + t[1, 1] * t[1, 1] + t[2, 1] * t[2, 1] - 1.0
+    cosine = t[0, 0] * t[0, 1] + t[1, 0] * t[1, 1] + t[2, 0] * t[2, 1]
+    x = t[1, 0] * t[2, 1] - t[2, 0] * t[1, 1] - t[0, 2]
+    y = t[2, 0] * t[0, 1] - t[0, 0] * t[2, 1] - t[1, 2]
+    z = t[0, 0] * t[1, 1] - t[1, 0] * t[0, 1] - t[2, 2]
+    off = first * first + second * second + cosine * cosine + x * x + y * y + z * z
+    is_last = t[3, 0] == 0.0 and t[3, 1] == 0.0 and t[3, 2] == 0.0 and t[3, 3] == 1.0
+    is_place = math.isfinite(t[0, 3]) and math.isfinite(t[1, 3]) and math.isfinite(t[2, 3])
+    return off <= 2e-12 and is_last and is_place
 
 
 def rotation(axis: str, angle: float) -> Array:
