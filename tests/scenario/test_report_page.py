@@ -99,9 +99,10 @@ def opened(browser, page, folder):
 
 def requested(log):
     """URLs for which a page asked the network, from Chromium's log of it."""
-    text = log.read_text(errors="replace").rstrip()
-    events = json.loads(text if text.endswith("]}") else text.rstrip(",") + "]}")["events"]
-    started = [event["params"] for event in events if "initiator" in event.get("params", {})]
+    # One event per line; whether the end is written depends on how the browser ends.
+    lines = [line.rstrip(",") for line in log.read_text(errors="replace").splitlines()]
+    events = [json.loads(line) for line in lines if line.startswith('{"params"')]
+    started = [event["params"] for event in events if "initiator" in event["params"]]
     return {
         entry["url"]
         for entry in started
