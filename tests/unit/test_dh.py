@@ -9,11 +9,13 @@ import sympy
 
 from teleop_core.errors import ParameterError, ShapeError, TeleopError, UnknownNameError
 from teleop_core.geometry import rotation, transform
-from teleop_core.robots import IkStatus
+from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import CONVENTIONS, elementary, load_table, parse_table
 
 ROUNDING = 1e-14
-TABLES = ("puma560", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker")
+TABLES = (
+    "puma560", "rcrt1", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker"
+)  # fmt: skip
 REACHED = 1e-9
 
 
@@ -173,6 +175,13 @@ def test_poses_are_found_from_home_nearly_always(name):
     poses = robot.fk(rng.uniform(robot.lower, robot.upper, (200, robot.n)))
     status = robot.ik(poses).status
     assert np.isin(status, (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)).mean() > 0.97
+
+
+def test_the_rcrt1_table_is_the_closed_form_arm():
+    ours, arm = load_table("config/robots/rcrt1.yaml").robot(), load_robot("rcrt1")
+    for q in np.random.default_rng(7).uniform(arm.lower, arm.upper, (50, 6)):
+        assert np.abs(ours.fk(q) - arm.fk(q)).max() < ROUNDING
+        assert np.abs(ours.jacobian(q) - arm.jacobian(q)).max() < ROUNDING
 
 
 def test_the_puma_table_finds_all_eight_branches():
