@@ -109,26 +109,23 @@ class Distribution:
         median, p99, largest = (self.quantile_us(share) for share in (0.5, 0.99, 1.0))
         return Delay(_ms(median), _ms(p99), _ms(largest))
 
-    def histogram(self, bins: int) -> tuple[Array, Array, float]:
+    def histogram(self, width_us: int) -> tuple[Array, Array]:
         """Share of the durations per bin, for drawing.
 
-        Bins reach to the 99.9th percentile and are equally wide; what is longer counts as the last.
+        Bins reach to the 99.9th percentile; what is longer counts as the last one.
 
         Args:
-            bins: Largest number of bins.
+            width_us: Width of each bin, [µs].
 
         Returns:
-            Middles of the bins, shape (n,), [ms]; shares in per cent, shape (n,); bin width [ms].
+            Middles of the bins, shape (n,), [ms]; shares in per cent, shape (n,).
         """
         low, high = int(self.values_us[0]), self.quantile_us(0.999)
         assert high is not None
-        width = max(1, math.ceil((high - low + 1) / bins))
-        at = np.minimum((self.values_us - low) // width, (high - low) // width)
+        at = np.minimum(self.values_us - low, high - low) // width_us
         shares: Any = np.bincount(at, self.counts) * (100.0 / self.count)
-        middles: Array = (
-            low + (np.arange(len(shares), dtype=np.float64) + 0.5) * width - 0.5
-        ) * 1e-3
-        return middles, shares, width * 1e-3
+        middles: Array = low + (np.arange(len(shares), dtype=np.float64) + 0.5) * width_us
+        return middles * 1e-3, shares
 
 
 def _ms(value_us: int | None) -> float | None:

@@ -101,9 +101,16 @@ def _latency(score: Score) -> list[Row]:
     for stage in STAGES:
         delay = score.latency_ms[stage]
         known = (delay.median, delay.p99, delay.max)
-        text = MISSING if delay.max is None else "/".join(f"{value:.3g}" for value in known)
+        text = MISSING if delay.max is None else "/".join(map(_short, known))
         rows.append(Row("latency: median/p99/max", stage.replace("_", " "), "ms", text))
     return rows
+
+
+def _short(value: float | None) -> str:
+    """Text of a few milliseconds."""
+    if not value:
+        return "0"
+    return f"{value:.2f}" if abs(value) < 10.0 else f"{value:.1f}"
 
 
 def _counts(score: Score) -> list[Row]:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from teleop_core.evaluation.accumulators import Distribution
 from teleop_core.evaluation.figure import (
     BOX,
     COMMAND,
@@ -22,6 +23,7 @@ from teleop_core.evaluation.streams import STAGES
 from teleop_core.evaluation.summary import number
 from teleop_core.evaluation.traces import Box, Drawing
 
+_BINS = 150
 _STAGE_COLORS = (FIRST, "#e69f00", SECOND, THIRD, DARK)
 
 
@@ -163,10 +165,11 @@ def latency(study: Study) -> Figure | None:
     known = [stage for stage in STAGES if delays[stage].count]
     if not any(delays[stage].values_us.any() for stage in known):
         return None
+    width_us = _bin_width([delays[stage] for stage in known])
     traces = []
     for stage, color in zip(STAGES, _STAGE_COLORS, strict=True):
         if stage in known:
-            middles, shares, _ = delays[stage].histogram(120)
+            middles, shares = delays[stage].histogram(width_us)
             trace = line(middles, shares, stage.replace("_", " "), color, 1.8, "%")
             traces.append({**trace, "line": {**trace["line"], "shape": "hvh"}})
     total = study.score.latency_ms["total"]
@@ -174,5 +177,14 @@ def latency(study: Study) -> Figure | None:
         f"From the sample of the hand to the slave's setpoint: {number(total.median)} ms median, "
         f"{number(total.p99)} ms for 99 of 100. Other lines: what each stage adds."
     )
-    layout = {"xaxis": {"title": {"text": "delay [ms]"}}, "yaxis": {"title": {"text": "share [%]"}}}
+    layout = {
+        "xaxis": {"title": {"text": "delay [ms]"}},
+        "yaxis": {"title": {"text": f"share per {width_us * 1e-3:g} ms [%]"}},
+    }
     return Figure("Latency per stage", sentence, traces, layout, 340)
+
+
+def _bin_width(delays: list[Distribution]) -> int:
+    """Width of bins [µs] that is the same for all, so that their heights compare."""
+    spans = [(delay.quantile_us(0.999) or 0) - int(delay.values_us[0]) for delay in delays]
+    return max(1, -(-max(spans) // _BINS))
