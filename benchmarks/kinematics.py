@@ -2,8 +2,9 @@
 
 Run with ``python benchmarks/kinematics.py``. Solved means within 1e-6 m and 1e-6 rad of the
 target, legal means inside the joint limits too. The ratio is a peer's median over ours, the step
-is the largest joint move between neighbouring poses of a path. Peers that are not installed are
-named and skipped.
+is the largest joint move between neighbouring poses of a path. Slow peers get fewer poses, of a
+path those in its middle, where the singularity is. Peers that are not installed are named and
+skipped.
 """
 
 import argparse
@@ -30,6 +31,8 @@ TABLES = Path(__file__).parent.parent / "config" / "robots"
 ARMS = ("puma560", "rcrt1")
 TOLERANCE = 1e-6
 Solver = Callable[[Any, Any], Any]
+# Brings a pose into the form a peer takes, outside the measured time; and its solver.
+Adapted = tuple[Callable[[Any], Any], Solver]
 
 
 def motions(table: DhTable) -> Iterator[tuple[str, str, float, float]]:
@@ -52,7 +55,12 @@ def joint_frames(table: DhTable) -> tuple[list[tuple[Any, str]], Any]:
     return frames, fixed
 
 
-def eaik(table: DhTable, robot: Any) -> Solver:
+def as_it_is(pose: Any) -> Any:
+    """Return the pose: the peer takes a (4, 4) matrix."""
+    return pose
+
+
+def eaik(table: DhTable, robot: Any) -> Adapted:
     """EAIK with the branch nearest to the seed, by the largest joint move, inside the limits."""
     module = importlib.import_module("eaik.IK_HP")
     frames, tool = joint_frames(table)
@@ -68,18 +76,21 @@ def eaik(table: DhTable, robot: Any) -> Solver:
     solver = module.HPRobot(np.array(axes), np.diff(np.array(points), axis=0))
     turn = 2.0 * np.pi
 
-    def solve(pose: Any, seed: Any) -> Any:
+    def adapt(pose: Any) -> Any:  # its rotations count from the zero pose
         target = pose.copy()
         target[:3, :3] = pose[:3, :3] @ zero.T
+        return target
+
+    def solve(target: Any, seed: Any) -> Any:
         branches = np.asarray(solver.IK(target).Q)
         branches = branches - turn * np.round((branches - seed) / turn)
         outside = ((branches < robot.lower) | (branches > robot.upper)).any(axis=1)
         return branches[np.argmin(np.abs(branches - seed).max(axis=1) + 100.0 * outside)]
 
-    return solve
+    return adapt, solve
 
 
-def roboticstoolbox(table: DhTable, robot: Any) -> Solver:
+def roboticstoolbox(table: DhTable, robot: Any) -> Adapted:
     """Roboticstoolbox's compiled Levenberg-Marquardt, with its restarts."""
     rtb = importlib.import_module("roboticstoolbox")
     chain = rtb.ETS()
@@ -88,10 +99,10 @@ def roboticstoolbox(table: DhTable, robot: Any) -> Solver:
         chain = chain * make(amount) if amount else chain
         chain = chain * make(flip=sign < 0.0) if sign else chain
     chain.qlim = np.stack((robot.lower, robot.upper))
-    return lambda pose, seed: chain.ik_LM(pose, q0=seed, tol=1e-14)[0]
+    return as_it_is, lambda pose, seed: chain.ik_LM(pose, q0=seed, tol=1e-14)[0]
 
 
-def pinocchio(table: DhTable, robot: Any) -> Solver:
+def pinocchio(table: DhTable, robot: Any) -> Adapted:
     """Closed-loop inverse kinematics in a Python loop on pinocchio, as in its examples."""
     pin = importlib.import_module("pinocchio")
     model, parent = pin.Model(), 0
@@ -101,8 +112,8 @@ def pinocchio(table: DhTable, robot: Any) -> Solver:
         parent = model.addJoint(parent, joint, pin.SE3(fixed), f"joint{number}")
     data, end = model.createData(), pin.SE3(tool)
 
-    def solve(pose: Any, seed: Any) -> Any:
-        q, wanted = np.array(seed), pin.SE3(pose)
+    def solve(wanted: Any, seed: Any) -> Any:
+        q = np.array(seed)
         for _ in range(200):
             pin.computeJointJacobians(model, data, q)
             error = pin.log6((data.oMi[parent] * end).actInv(wanted))
@@ -115,10 +126,10 @@ def pinocchio(table: DhTable, robot: Any) -> Solver:
             q = q + jacobian.T @ np.linalg.solve(square, error.vector)
         return q
 
-    return solve
+    return pin.SE3, solve
 
 
-def ikpy(table: DhTable, robot: Any) -> Solver:
+def ikpy(table: DhTable, robot: Any) -> Adapted:
     """Ikpy's least squares, position and whole orientation."""
     chain_module = importlib.import_module("ikpy.chain")
     link_module = importlib.import_module("ikpy.link")
@@ -145,11 +156,11 @@ def ikpy(table: DhTable, robot: Any) -> Solver:
             1:-1
         ]
 
-    return solve
+    return as_it_is, solve
 
 
 # Peer, and how many poses it gets: slow ones fewer.
-PEERS: dict[str, tuple[Callable[[DhTable, Any], Solver], int]] = {
+PEERS: dict[str, tuple[Callable[[DhTable, Any], Adapted], int]] = {
     "EAIK + nearest": (eaik, 1000),
     "roboticstoolbox ik_LM": (roboticstoolbox, 500),
     "pinocchio CLIK": (pinocchio, 300),
@@ -174,9 +185,11 @@ def workloads(robot: Any, count: int) -> dict[str, tuple[Any, bool]]:
     }
 
 
-def run(solve: Solver, robot: Any, joints: Any, *, is_path: bool) -> tuple[list[float], Any]:
+def run(adapted: Adapted, robot: Any, joints: Any, *, is_path: bool) -> tuple[list[float], Any]:
     """Microseconds of each call, and the answers (NaN where a solver raised)."""
-    poses, seed = robot.fk(joints), joints[0].copy() if is_path else robot.home.copy()
+    adapt, solve = adapted
+    poses = [adapt(pose) for pose in robot.fk(joints)]
+    seed = joints[0].copy() if is_path else robot.home.copy()
     times, answers = [], []
     solve(poses[0], seed)
     for pose in poses:
@@ -208,9 +221,15 @@ def judge(robot: Any, joints: Any, answers: Any) -> tuple[float, float]:
     return 100.0 * solved / len(joints), 100.0 * legal / len(joints)
 
 
-def solvers(name: str, robot: Any) -> Iterator[tuple[str, Solver, int]]:
+def middle(joints: Any, count: int) -> Any:
+    """The middle of a workload: of the singular path, the part around the singularity."""
+    start = max(0, (len(joints) - count) // 2)
+    return joints[start : start + count]
+
+
+def solvers(name: str, robot: Any) -> Iterator[tuple[str, Adapted, int]]:
     """Ours, then every peer that is installed and can model the arm."""
-    yield "teleop_core", lambda pose, seed: robot.ik(pose, seed).q, 1000
+    yield "teleop_core", (as_it_is, lambda pose, seed: robot.ik(pose, seed).q), 1000
     table = load_table(TABLES / f"{name}.yaml")
     for peer, (make, count) in PEERS.items():
         try:
@@ -230,9 +249,9 @@ def compare(name: str, share: float) -> None:
           f"{'p99 µs':>9}{'ratio':>8}{'step':>8}")  # fmt: skip
     for workload, (joints, is_path) in workloads(robot, max(20, round(1000 * share))).items():
         ours = 0.0
-        for solver, solve, count in chosen:
-            some = joints[: max(20, round(count * share))]
-            times, answers = run(solve, robot, some, is_path=is_path)
+        for solver, adapted, count in chosen:
+            some = middle(joints, max(20, round(count * share)))
+            times, answers = run(adapted, robot, some, is_path=is_path)
             median = float(np.median(times))
             ours = ours or median
             step = np.nanmax(np.abs(np.diff(answers, axis=0))) if is_path else np.nan
