@@ -128,6 +128,14 @@ def test_roboticstoolbox_agrees_on_its_own_puma_of_another_convention():
         assert np.abs(ours[:3, 3] - theirs[:3, 3]).max() < 1e-12
 
 
+def test_lengths_and_joint_ranges_are_those_that_roboticstoolbox_quotes():
+    peer = rtb.models.DH.Puma560()
+    assert (A2, A3, D3, D4) == (peer.links[1].a, peer.links[2].a, peer.links[2].d, peer.links[3].d)
+    shift = np.array([0.0, math.pi, 0.0, 0.0, 0.0, 0.0])
+    assert np.abs(ARM.lower - (peer.qlim[0] - shift)).max() < ROUNDING
+    assert np.abs(ARM.upper - (peer.qlim[1] - shift)).max() < ROUNDING
+
+
 def test_the_eight_branches_are_different_and_in_the_documented_order():
     q = np.array([0.4, -0.6, -0.9, 0.5, 0.7, 0.3])
     solutions = ARM.ik_all(ARM.fk(q))

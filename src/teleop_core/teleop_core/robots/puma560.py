@@ -6,7 +6,8 @@ which lies d3 beside axis 1, u is the horizontal and z the vertical coordinate o
 
 Source:
     Ghosal 2020, lecture 6, PUMA 560, misprints corrected. Lengths: Corke and Armstrong-Hélouvry
-    1994. Joint ranges: Fu, Gonzalez and Lee 1987, brought to this table's zeros.
+    1994; joint ranges: Wang and Chen 1991; both as roboticstoolbox quotes them, brought to this
+    table's zeros.
 """
 
 import math
@@ -36,9 +37,7 @@ UPPER = np.array([160.0, 45.0, 45.0, 170.0, 100.0, 266.0]) * _DEGREES
 # Upper arm 45 degrees up, forearm level, tool 45 degrees down.
 HOME = np.array([0.0, -45.0, -45.0, 0.0, 45.0, 0.0]) * _DEGREES
 
-DRIVES = Drives(
-    # Motor inertias at the joint, effort limits and break-away torques: Armstrong, Khatib and
-    # Burdick 1986. Link inertias at home and everything else: assumed.
+DRIVES = Drives(  # assumed, of the size of this arm's drives; quoted from memory, not checked
     inertia=np.array([2.6, 6.8, 1.16, 0.20, 0.18, 0.19]),
     viscous=np.array([4.9, 8.2, 3.5, 0.4, 0.4, 0.3]),
     coulomb=np.array([6.3, 5.5, 2.6, 1.3, 1.0, 1.2]),
