@@ -130,7 +130,7 @@ def test_roboticstoolbox_agrees_on_its_own_puma_of_another_convention():
 
 def test_lengths_and_joint_ranges_are_those_that_roboticstoolbox_quotes():
     peer = rtb.models.DH.Puma560()
-    assert (A2, A3, D3, D4) == (peer.links[1].a, peer.links[2].a, peer.links[2].d, peer.links[3].d)
+    assert (peer.links[1].a, peer.links[2].a, peer.links[2].d, peer.links[3].d) == (A2, A3, D3, D4)
     shift = np.array([0.0, math.pi, 0.0, 0.0, 0.0, 0.0])
     assert np.abs(ARM.lower - (peer.qlim[0] - shift)).max() < ROUNDING
     assert np.abs(ARM.upper - (peer.qlim[1] - shift)).max() < ROUNDING
