@@ -7,7 +7,7 @@ import pytest
 import roboticstoolbox as rtb
 
 from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.geometry import transform
+from teleop_core.geometry import rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.four_bar import Assembly, FourBar
 
@@ -112,6 +112,23 @@ def test_both_chains_of_the_denavit_hartenberg_tables_meet():
                 right.fkine([phi1[mode]]).A @ [LOOP.l3, 0.0, 0.0, 1.0] + [LOOP.l0, 0.0, 0.0, 0.0],
             )
             assert np.allclose(*ends, atol=CLOSED)
+
+
+def test_matrix_loop_closes_with_the_tool_block_as_the_pose_of_r_in_the_tool():
+    def link(angle, length):
+        return transform(rotation("z", angle), np.zeros(3)) @ along(length)
+
+    def along(length):
+        return transform(np.eye(3), np.array([length, 0.0, 0.0]))
+
+    for theta1 in np.linspace(-3.0, 3.0, 7):
+        _, phi1, phi2, phi3 = LOOP.close(theta1)
+        for mode in range(2):
+            chain = link(theta1, LOOP.l1) @ link(phi2[mode], LOOP.l2) @ link(phi3[mode], LOOP.l3)
+            T_tool_r = transform(rotation("z", math.pi - phi1[mode]), np.zeros(3))
+            assert np.allclose(chain @ T_tool_r, along(LOOP.l0), atol=CLOSED)
+            inverted = chain @ np.linalg.inv(T_tool_r)  # as the slide labels it
+            assert np.abs(inverted - along(LOOP.l0)).max() > 0.3
 
 
 @pytest.mark.parametrize("mode", [1.0, -1.0])

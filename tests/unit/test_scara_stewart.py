@@ -4,11 +4,14 @@ import math
 
 import numpy as np
 import pytest
+import roboticstoolbox as rtb
 
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import rotation, rotation_angle_between, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.stewart import Layout
+from teleop_core.session.configuration import configure
+from teleop_core.session.graph import Graph
 
 # The source prints centimetres with four decimals; its inputs are rounded likewise, and near the
 # stretched arm that becomes 2e-4 degrees.
@@ -118,6 +121,19 @@ def test_base_bolted_to_link_two_moves_the_published_tip():
     legs = load_robot("scara_stewart").ik_all(EXAMPLE)[0, 3:]
     T = carried.fk([0.0, math.radians(30.0), 0.15, *legs])
     assert np.allclose(T[:3, 3], [0.95801270, 0.20669873, 0.43660254], atol=PRINTED_M)
+
+
+def test_scara_part_is_the_chain_of_its_denavit_hartenberg_rows():
+    # Unequal links tell the printed l2 of equation 3 from the l1 that is meant.
+    robot = load_robot("scara_stewart", l1=0.6, l2=0.35, h1=0.1, heading="carried")
+    chain = rtb.DHRobot(
+        [rtb.RevoluteMDH(d=0.1), rtb.RevoluteMDH(a=0.6), rtb.PrismaticMDH(a=0.35, qlim=[0, 1])]
+    )
+    for joints in np.random.default_rng(8).uniform([-2.0, -2.0, 0.0], [2.0, 2.0, 0.5], (10, 3)):
+        tool = transform(attitude(30.0, 0.0, 0.0), np.array([0.0, 0.0, 0.2]))
+        tool[:3, 3] += 0.1 * tool[:3, 2]
+        q = np.concatenate((joints, robot.home[3:]))
+        assert np.allclose(robot.fk(q), chain.fkine(joints).A @ tool, atol=SOLVED)
 
 
 @pytest.mark.parametrize("options", ROBOTS)
@@ -328,6 +344,20 @@ def test_it_is_a_slave_with_nine_actuators_and_a_home_it_can_hold():
         result = arm.ik(arm.fk(arm.home), seed=arm.home)
         assert result.status == IkStatus.FOLLOWED
         assert np.allclose(result.q, arm.home, atol=SOLVED)
+
+
+@pytest.mark.parametrize("options", ["", "heading=carried", "sigma_b=0.26, sigma_m=0.26"])
+def test_nine_simulated_actuators_follow_the_master_in_the_graph(options):
+    graph = Graph(configure(settings=["robot=scara_stewart", f"geometry=[{options}]"]).groups)
+    signals = graph.run(3000)
+    measured, setpoint = signals["slave_measured_cp"], signals["slave_setpoint_cp"]
+    assert signals["slave_measured_js"].shape[1] >= 9
+    assert np.isfinite(measured).all()
+    assert np.abs(np.diff(setpoint[:, :3], axis=0)).sum() > 1e-3  # it was led somewhere
+    # Lag of the assumed drives and, on similar hexagons, what encoders see of the turn.
+    assert np.linalg.norm(measured[:, :3] - setpoint[:, :3], axis=1).max() < 5e-4
+    between = np.abs(np.sum(measured[:, 3:] * setpoint[:, 3:], axis=1))
+    assert 2.0 * np.arccos(np.minimum(between, 1.0)).max() < math.radians(0.5)
 
 
 def test_bad_options_and_lengths_are_refused():

@@ -17,6 +17,7 @@ import numpy as np
 from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
+from teleop_core.robots.assumed_drives import geared_motors
 from teleop_core.robots.branches import bounded, turned, wrapped
 from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar
 from teleop_core.robots.robot import (
@@ -25,6 +26,7 @@ from teleop_core.robots.robot import (
     Kernels,
     Robot,
     geometry_of,
+    independent_axes,
     is_askable,
     pose_residual,
 )
@@ -205,6 +207,7 @@ def make(**geometry: float | str) -> Robot:
     lower, upper = ranges[0]
     if (lower, upper) == (-math.pi, math.pi):
         lower, upper = -_TURNS, _TURNS
+    drives = geared_motors(1)
     return Robot(
         name="four_bar",
         joint_names=("theta1",),
@@ -213,5 +216,7 @@ def make(**geometry: float | str) -> Robot:
         home=np.array([0.5 * (lower + upper)]),
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        drives=drives,
+        dynamics=independent_axes(drives.inertia),
         task_mask=(True, True, False, False, False, False),
     )

@@ -15,6 +15,7 @@ import numpy as np
 from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
+from teleop_core.robots.assumed_drives import geared_motors
 from teleop_core.robots.branches import bounded, turned
 from teleop_core.robots.robot import (
     REACHED,
@@ -22,6 +23,7 @@ from teleop_core.robots.robot import (
     Kernels,
     Robot,
     geometry_of,
+    independent_axes,
     is_askable,
     pose_residual,
 )
@@ -86,6 +88,7 @@ def make(**geometry: float | str) -> Robot:
     for symbol in ("l0", "l1"):
         if row[symbol] <= 0.0:
             raise ParameterError(symbol, row[symbol], "a length > 0 m")
+    drives = geared_motors(1)
     return Robot(
         name="parallelogram",
         joint_names=("theta1",),
@@ -94,5 +97,7 @@ def make(**geometry: float | str) -> Robot:
         home=np.array([0.5 * math.pi]),
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        drives=drives,
+        dynamics=independent_axes(drives.inertia),
         task_mask=(True, True, False, False, False, False),
     )

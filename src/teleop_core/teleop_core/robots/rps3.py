@@ -23,6 +23,7 @@ import numpy as np
 from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
+from teleop_core.robots.assumed_drives import electric_cylinders
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.robot import (
     REACHED,
@@ -30,6 +31,7 @@ from teleop_core.robots.robot import (
     Kernels,
     Robot,
     geometry_of,
+    independent_axes,
     is_askable,
     pose_residual,
 )
@@ -180,6 +182,7 @@ def make(**geometry: float | str) -> Robot:
     if row["l_home"] <= abs(row["b"] - row["a"]):
         raise ParameterError("l_home", row["l_home"], "more than |b - a|, so that legs meet")
     home = np.full(3, row["l_home"])
+    drives = electric_cylinders(3, speed_limit=2.0)  # a platform of a metre
     return Robot(
         name="rps3",
         joint_names=("l1", "l2", "l3"),
@@ -188,5 +191,7 @@ def make(**geometry: float | str) -> Robot:
         home=home,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        drives=drives,
+        dynamics=independent_axes(drives.inertia),
         task_mask=(False, False, True, True, True, False),
     )

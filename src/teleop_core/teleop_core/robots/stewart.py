@@ -26,6 +26,7 @@ import numpy as np
 from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.geometry import Array, checked_array, is_rigid
+from teleop_core.robots.assumed_drives import electric_cylinders
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.damped import smallest_singular_value
 from teleop_core.robots.robot import (
@@ -34,6 +35,7 @@ from teleop_core.robots.robot import (
     Kernels,
     Robot,
     geometry_of,
+    independent_axes,
     is_askable,
     pose_residual,
 )
@@ -258,6 +260,7 @@ def make(**geometry: float | str) -> Robot:
         raise ParameterError("z0", row["z0"], "a height at which no leg has length zero")
     row["size"] = layout.size
     row["is_singular"] = float(layout.is_architecturally_singular)
+    drives = electric_cylinders(6)
     return Robot(
         name="stewart",
         joint_names=tuple(f"leg{i}" for i in range(1, 7)),
@@ -266,4 +269,6 @@ def make(**geometry: float | str) -> Robot:
         home=lengths,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        drives=drives,
+        dynamics=independent_axes(drives.inertia),
     )

@@ -17,6 +17,7 @@ import numpy as np
 from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
+from teleop_core.robots.assumed_drives import finger_motors
 from teleop_core.robots.hand_fingers import finger_branch, finger_joints, finger_point
 from teleop_core.robots.hand_grasp import (
     FINGERS,
@@ -35,6 +36,7 @@ from teleop_core.robots.robot import (
     IkStatus,
     Kernels,
     Robot,
+    independent_axes,
     is_askable,
     pose_residual,
 )
@@ -151,6 +153,7 @@ def make(**geometry: float | str) -> Robot:
         if len(solutions) < 2 or (np.abs(solutions[bent]) > _LIMITS).any():
             raise ParameterError("side", side, "an object that the fingers reach before the palm")
         home[3 * i : 3 * i + 3] = solutions[bent]
+    drives = finger_motors(9)
     return Robot(
         name="three_finger_hand",
         joint_names=tuple(f"{joint}{i}" for i in (1, 2, 3) for joint in ("theta", "psi", "phi")),
@@ -159,4 +162,6 @@ def make(**geometry: float | str) -> Robot:
         home=home,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        drives=drives,
+        dynamics=independent_axes(drives.inertia),
     )

@@ -1,0 +1,91 @@
+"""Laws that every parallel and hybrid robot keeps, whatever it is asked."""
+
+import numpy as np
+import pytest
+
+from teleop_core.geometry import rotation, transform
+from teleop_core.robots import IkStatus, load_robot_set
+from teleop_core.session.configuration import configure
+from teleop_core.session.graph import Graph
+
+ROBOTS = [
+    ("four_bar", ""),
+    ("four_bar", "l0=4, l1=3, l2=3, l3=2, mode=-1"),
+    ("parallelogram", ""),
+    ("stewart", ""),
+    ("rps3", ""),
+    ("scara_stewart", ""),
+    ("scara_stewart", "heading=carried"),
+    ("scara_stewart", "sigma_b=0.26, sigma_m=0.26"),
+    ("three_finger_hand", ""),
+]
+# Clipping to seed ± step rounds once.
+ROUNDING = 1e-12
+
+
+def settings(geometry):
+    return [text for text in geometry.split(", ") if text]
+
+
+def any_pose(rng):
+    R = np.eye(3)
+    for axis in "xyz":
+        R = R @ rotation(axis, rng.uniform(-3.2, 3.2))
+    return transform(R, rng.uniform(-1.5, 1.5, 3))
+
+
+@pytest.mark.parametrize(("name", "geometry"), ROBOTS)
+@pytest.mark.parametrize("step", [np.inf, 1e-3])
+def test_any_pose_gives_finite_joints_inside_the_limits_and_the_step(name, geometry, step):
+    robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(1)
+    limits = robot.limits()
+    limits[2] = step
+    for _ in range(300):
+        seed = rng.uniform(robot.lower, robot.upper)
+        q, residual = np.empty(robot.n), np.empty(2)
+        status = robot.kernels.ik(any_pose(rng), seed, limits, robot.geometry_row, q, residual)
+        assert status in set(IkStatus)
+        assert np.isfinite(q).all()
+        assert np.isfinite(residual).all()
+        assert (q >= robot.lower).all()
+        assert (q <= robot.upper).all()
+        assert np.abs(q - seed).max() <= step + ROUNDING
+
+
+@pytest.mark.parametrize(("name", "geometry"), ROBOTS)
+def test_residual_is_what_forward_kinematics_leaves(name, geometry):
+    robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(2)
+    for _ in range(100):
+        T = any_pose(rng)
+        result = robot.ik(T, seed=rng.uniform(robot.lower, robot.upper))
+        gap = np.linalg.norm(robot.fk(result.q)[:3, 3] - T[:3, 3])
+        # Legs that hide the turn of a level platform put the tip of the tool elsewhere.
+        assert abs(gap - result.residual[0]) < 1e-6
+
+
+@pytest.mark.parametrize(("name", "geometry"), ROBOTS)
+def test_a_batch_is_the_same_as_its_single_questions(name, geometry):
+    robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(3)
+    poses = np.array([any_pose(rng) for _ in range(20)])
+    batch = robot.ik(poses)
+    for k, T in enumerate(poses):
+        single = robot.ik(T)
+        assert np.array_equal(single.q, batch.q[k])
+        assert single.status == batch.status[k]
+        assert np.array_equal(robot.fk(batch.q)[k], robot.fk(single.q))
+
+
+@pytest.mark.parametrize(("name", "geometry"), ROBOTS)
+def test_every_robot_is_led_through_the_graph_with_all_its_actuators(name, geometry):
+    graph = Graph(configure(settings=[f"robot={name}", f"geometry=[{geometry}]"]).groups)
+    signals, robot = graph.run(6000), graph.robot
+    measured = signals["slave_measured_cp"]
+    assert np.isfinite(measured).all()
+    servo = signals["slave_servo_jp"][:, : robot.n]
+    assert np.ptp(servo, axis=0).min() > 0.0
+    steps = np.abs(np.diff(servo, axis=0))
+    assert (steps <= robot.drives.speed_limit * 1e-3 + ROUNDING).all()
+    joints = signals["slave_measured_js"][:, : robot.n]
+    overshoot = 0.02 * (robot.upper - robot.lower)
+    assert (joints >= robot.lower - overshoot).all()
+    assert (joints <= robot.upper + overshoot).all()
