@@ -4,7 +4,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -20,8 +20,10 @@ from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.rate import Recent, Schedule, TickCounts
+from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.streams import Input, Output, message_type, profile
 from teleop_core.parameters import build, parameter, specs, values_of
+from teleop_core.session.configuration import RealTimeParameters
 from teleop_core.session.graph import Stage
 from teleop_core.signals import TICK_NS
 
@@ -43,6 +45,7 @@ class NodeParameters:
         100, unit="ticks", lower=0, upper=10_000, fixed=True,
         doc="missed ticks that one late wake-up makes up for; beyond them time is dropped",
     )  # fmt: skip
+    real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
 
 class CoreNode(LifecycleNode):  # type: ignore[misc]
@@ -70,10 +73,14 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self.add_on_set_parameters_callback(self._accept)
         self.stage: Any = None
         self.lock = threading.Lock()  # held while the stage works or takes parameters
+        self.gate = threading.Lock()  # held by a session while the node works in its thread
         self.ended, self.exit_code = Future(), 0
+        self.has_own_loop = True
+        """Whether the node works in a thread of its own, or in that of a whole session."""
+        self.is_at_work = False
         self._loop: Loop | None = None
-        self._inputs: dict[Topic, Input] = {}
-        self._outputs: dict[Topic, Output] = {}
+        self.inputs: dict[Topic, Input] = {}
+        self.outputs: dict[Topic, Output] = {}
         self._own_publishers: list[Any] = []
         self._fresh_counts()
         self._word = "unconfigured"
@@ -107,6 +114,11 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         """Names and texts to report beside the common ones."""
         return {}
 
+    @property
+    def nodes(self) -> "tuple[CoreNode, ...]":
+        """The nodes of a process that runs this one alone."""
+        return (self,)
+
     # -- topics ----------------------------------------------------------------------------------
 
     def open_streams(self, joint_names: tuple[str, ...] = ()) -> None:
@@ -114,12 +126,12 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         for topic in self._description.reads:
             target = self.stage.signals[topic.field]
             entry = Input(self, topic, joint_names, target, may_repeat=topic in _SETPOINTS)
-            self._inputs[topic] = entry
+            self.inputs[topic] = entry
         for topic in self._description.writes:
             if topic.kind is not Kind.REPORT:
                 source = self.stage.signals[topic.field]
                 publisher = self.open_publisher(topic)
-                self._outputs[topic] = Output(publisher, layout(topic, joint_names), source)
+                self.outputs[topic] = Output(publisher, layout(topic, joint_names), source)
 
     def open_publisher(self, topic: Topic) -> Any:
         """Publisher that is silent unless the node is active, and closed at cleanup."""
@@ -130,18 +142,18 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def input(self, topic: Topic) -> Input:
         """What the node reads from a topic."""
-        return self._inputs[topic]
+        return self.inputs[topic]
 
     def output(self, topic: Topic) -> Output:
         """What the node writes to a topic."""
-        return self._outputs[topic]
+        return self.outputs[topic]
 
     def _close(self) -> None:
-        for entry in self._inputs.values():
-            entry.subscription.close()
+        for entry in self.inputs.values():
+            entry.close()
         for publisher in self._own_publishers:
             self.destroy_lifecycle_publisher(publisher)
-        self._inputs, self._outputs, self._own_publishers = {}, {}, []
+        self.inputs, self.outputs, self._own_publishers = {}, {}, []
         self.stage = None
 
     # -- lifecycle -------------------------------------------------------------------------------
@@ -178,17 +190,23 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         return self._guard("recovery", self._clear, "unconfigured")
 
     def _begin(self) -> None:
-        for entry in self._inputs.values():
+        for entry in self.inputs.values():
             entry.forget()
         self.start()
-        self.schedule.start()
-        self._loop = Loop(self.get_name(), self.turn, self.fail)
+        self.is_at_work = True
+        if self.has_own_loop:
+            self.schedule.start()
+            self._loop = Loop(self.get_name(), self.turn, self.fail, self.prepare)
 
     def _halt(self) -> None:
+        if not self.is_at_work:
+            return
         if self._loop is not None:
             self._loop.stop()
             self._loop = None
-            self.stop()
+        with self.gate:
+            self.is_at_work = False
+        self.stop()
 
     def _clear(self) -> None:
         self._halt()
@@ -210,6 +228,11 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self._word = word
         self.report()
         return SUCCESS
+
+    def prepare(self) -> None:
+        """Take the real-time options for the thread that calls; say what the system refuses."""
+        for refusal in apply_options(self.options.real_time):
+            self.get_logger().warning(refusal)
 
     def fail(self, reason: str, is_expected: bool) -> None:
         """End the work from within the loop: the outputs fall silent, and the process ends."""
@@ -286,7 +309,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def report(self) -> None:
         """Publish how the node is."""
-        inputs = list(self._inputs.values())
+        inputs = list(self.inputs.values())
         is_active = self._word == "active"
         concerns = self._reporter.input_concerns(inputs)
         if is_active:
@@ -296,7 +319,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         rate = self._reporter.rate(self.counts.ticks)
         values = tick_values(self._word, rate, self.counts, TICK_NS * 1e-6)
         values |= input_values(inputs)
-        values |= {f"sent.{t.name}": str(o.sent) for t, o in self._outputs.items()}
+        values |= {f"sent.{t.name}": str(o.sent) for t, o in self.outputs.items()}
         values |= recent_values("lateness", self.schedule.lateness)
         values |= recent_values("delay", self.delay) | (self.values() if is_active else {})
         self._reporter.send(concerns, self._word, values)

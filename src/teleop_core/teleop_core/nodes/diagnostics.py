@@ -37,7 +37,7 @@ class Reporter:
         """What is wrong with what came in since the last call, in words."""
         concerns = []
         for entry in inputs:
-            publishers = entry.subscription.publishers()
+            publishers = entry.publishers()
             if publishers > 1:
                 concerns.append(f"{publishers} publishers on {entry.topic.name}, must be one")
             total = entry.refused.total()

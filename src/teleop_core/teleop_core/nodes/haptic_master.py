@@ -41,13 +41,17 @@ class HapticMasterNode(CoreNode):
     def turn(self) -> None:
         """Take all samples that are due."""
         for tick_ns in self.schedule.due():
-            self._servo_cf.take()
-            if self._servo_cf.age() > self.parameters.force_timeout:
-                self._force[:] = 0.0
-            with self.lock:
-                self.stage.step()
-            for sample in self._samples:
-                sample.send(tick_ns + self._epoch_ns)
+            self.work(tick_ns)
+
+    def work(self, tick_ns: int) -> None:
+        """Take the sample of one tick [ns, monotonic]."""
+        self._servo_cf.take()
+        if self._servo_cf.age() > self.parameters.force_timeout:
+            self._force[:] = 0.0
+        with self.lock:
+            self.stage.step()
+        for sample in self._samples:
+            sample.send(tick_ns + self._epoch_ns)
 
 
 def main() -> int:

@@ -26,6 +26,7 @@ class InverseKinematicsNode(CoreNode):
         self._servo_cp = self.input(topics.SLAVE_SERVO_CP)
         self._setpoint = self.input(topics.SLAVE_SETPOINT_JS)
         self._servo_jp = self.output(topics.SLAVE_SERVO_JP)
+        assert self._servo_cp.subscription is not None
         self._waiter = Waiter(self.context, self._servo_cp.subscription)
 
     def start(self) -> None:
@@ -35,6 +36,10 @@ class InverseKinematicsNode(CoreNode):
     def turn(self) -> None:
         """Answer the next pose."""
         self._waiter.wait(0.1)
+        self.work()
+
+    def work(self) -> None:
+        """Answer the pose that has come, if one has."""
         if self._setpoint.take():
             self._signals["setpoint_stamp_ns"] = self._setpoint.stamp_ns
         # Without knowing where the slave is, any solution could be another branch.

@@ -79,7 +79,7 @@ class _Session:
         self._duration = float(configuration.groups["teleop"].duration)
         self._console, self._observer, self._folder, self._env = console, observer, folder, env
         self._parameters = folder / "parameters.yaml"
-        self._parameters.write_text(_parameter_file(configuration, out))
+        self._parameters.write_text(parameter_file(configuration, str(out)))
         self._children: dict[str, Child] = {}
 
     def run(self) -> None:
@@ -168,11 +168,11 @@ class _Session:
                 signal.signal(signal.SIGINT, before)
 
 
-def _parameter_file(configuration: Configuration, out: Path) -> str:
-    """Parameters of all nodes, as ROS 2 reads them."""
+def parameter_file(configuration: Configuration, out: str) -> str:
+    """Parameters of all nodes as a ROS 2 parameter file; ``out`` is that of the recorder."""
     text = configuration.text()
     content: dict[str, Any] = yaml.safe_load(text)
     recorder = content[RECORDER]["ros__parameters"]
-    recorder["out"], recorder["configuration"] = str(out), text
+    recorder["out"], recorder["configuration"] = out, text
     recorder["scenario"] = configuration.scenario
     return yaml.safe_dump(content, allow_unicode=True)

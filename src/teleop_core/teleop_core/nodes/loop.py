@@ -15,12 +15,17 @@ class Loop:
         turn: One turn; blocks for a tenth of a second at most.
         fail: Told in words, and whether it was expected, why a turn could not be finished; the
             loop has ended then.
+        prepare: Called once in the thread before the first turn.
     """
 
     def __init__(
-        self, name: str, turn: Callable[[], None], fail: Callable[[str, bool], None]
+        self,
+        name: str,
+        turn: Callable[[], None],
+        fail: Callable[[str, bool], None],
+        prepare: Callable[[], None],
     ) -> None:
-        self._turn, self._fail = turn, fail
+        self._turn, self._fail, self._prepare = turn, fail, prepare
         self._is_running = True
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -34,6 +39,7 @@ class Loop:
     def _run(self) -> None:
         turn = self._turn
         try:
+            self._prepare()
             while self._is_running:
                 turn()
         except TeleopError as error:

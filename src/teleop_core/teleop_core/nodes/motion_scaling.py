@@ -31,6 +31,7 @@ class MotionScalingNode(CoreNode):
         self._servo_cf = self.output(topics.MASTER_SERVO_CF)
         self._state = self.open_publisher(topics.TELEOP_STATE)
         state_report(0, self._signals["teleop_state"])  # loads the message types, 60 ms
+        assert self._pose.subscription is not None
         self._waiter = Waiter(self.context, self._pose.subscription)
 
     def start(self) -> None:
@@ -41,6 +42,10 @@ class MotionScalingNode(CoreNode):
     def turn(self) -> None:
         """Answer the next sample of the master."""
         self._waiter.wait(0.1)
+        self.work()
+
+    def work(self) -> None:
+        """Answer the sample that has come, if one has."""
         if self._setpoint.take():
             self._signals["setpoint_stamp_ns"] = self._setpoint.stamp_ns
         self._buttons.take()

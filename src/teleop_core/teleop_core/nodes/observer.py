@@ -38,7 +38,9 @@ class Observer:
         self.statuses: dict[str, Status] = {}
         self._context = Context()
         self._context.init(args=[], domain_id=domain_id)
-        self._node = Node("teleop_live", context=self._context, use_global_arguments=False)
+        self._node = Node(
+            "teleop_live", context=self._context, use_global_arguments=False, enable_rosout=False
+        )
         self._reports = Subscription(self._node, DIAGNOSTICS, 100)
         self._waiter = Waiter(self._context, self._reports)
 

@@ -80,7 +80,7 @@ def _publishers(bag: Bag, names: list[str]) -> Iterator[dict[str, Any]]:
     types = {name: _type_in(bag, name) for name in names}
     context = Context()
     context.init(args=[])
-    node = Node("teleop_play", context=context, use_global_arguments=False)
+    node = Node("teleop_play", context=context, use_global_arguments=False, enable_rosout=False)
     try:
         publishers = {}
         for name, kind in types.items():

@@ -5,9 +5,13 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Protocol
 
 import rclpy
 import rclpy.utilities
+import yaml
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
@@ -22,19 +26,29 @@ _BAD_ARGUMENTS = (
 )
 
 
-def run(make_node: Callable[[], CoreNode]) -> int:
-    """Run one node until SIGINT or SIGTERM.
+class Crew(Protocol):
+    """What works in one process: a node, or several that are started in this order."""
+
+    @property
+    def nodes(self) -> "tuple[CoreNode, ...]":
+        """The nodes."""
+        ...
+
+
+def run(make_crew: Callable[[], Crew]) -> int:
+    """Run one node, or several together, until SIGINT or SIGTERM.
 
     Args:
-        make_node: The node's class.
+        make_crew: The node's class, or that of what holds several.
 
     Returns:
         Exit code: 0; 1 after a failure at work; 2 if a parameter or file is wrong.
     """
     signals = _signal_pipe()
     try:
+        _check_files(sys.argv)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        node = make_node()
+        nodes = make_crew().nodes
     except TeleopError as error:
         print(error, file=sys.stderr)
         return _finish(2)
@@ -43,10 +57,28 @@ def run(make_node: Callable[[], CoreNode]) -> int:
         return _finish(2)
     # Two threads share the interpreter: the loop must not wait 5 ms for its turn.
     sys.setswitchinterval(2e-4)
-    threading.Thread(target=_await_signal, args=(signals, node), daemon=True).start()
-    code = _serve(node)
-    node.destroy_node()
+    threading.Thread(target=_await_signal, args=(signals, nodes[0]), daemon=True).start()
+    code = _serve(nodes)
+    for node in nodes:
+        node.destroy_node()
     return _finish(code)
+
+
+def _check_files(arguments: list[str]) -> None:
+    """Refuse parameter files that cannot be read in words, which rcl does not.
+
+    Raises:
+        TeleopError: A file is missing or is not YAML.
+    """
+    for flag, file in pairwise(arguments):
+        if flag != "--params-file":
+            continue
+        try:
+            yaml.safe_load(Path(file).read_text())
+        except OSError as error:
+            raise TeleopError(f"{file}: cannot be read: {error.strerror}") from error
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise TeleopError(f"{file}: is not YAML: {' '.join(str(error).split())}") from error
 
 
 def _signal_pipe() -> int:
@@ -68,18 +100,27 @@ def _await_signal(signals: int, node: CoreNode) -> None:
     node.end(0)
 
 
-def _serve(node: CoreNode) -> int:
+def _serve(nodes: tuple[CoreNode, ...]) -> int:
     executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    if node.options.autostart:
-        if node.trigger_configure() is not SUCCESS:
-            return 2
-        if node.trigger_activate() is not SUCCESS:
-            return 1
-    executor.spin_until_future_complete(node.ended)
-    node.trigger_shutdown()
+    code = 0
+    for node in nodes:
+        executor.add_node(node)
+        node.ended = nodes[0].ended
+        code = code or _autostart(node)
+    if not code:
+        executor.spin_until_future_complete(nodes[0].ended)
+    for node in reversed(nodes):  # the one that was started first sees all others end
+        node.trigger_shutdown()
     executor.shutdown()
-    return node.exit_code
+    return max(code, *(node.exit_code for node in nodes), 0)
+
+
+def _autostart(node: CoreNode) -> int:
+    if not node.options.autostart:
+        return 0
+    if node.trigger_configure() is not SUCCESS:
+        return 2
+    return 0 if node.trigger_activate() is SUCCESS else 1
 
 
 def _finish(code: int) -> int:

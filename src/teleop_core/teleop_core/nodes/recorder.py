@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from teleop_core.session.runner import describe
 DEPTH = 2000
 """Messages of one topic that wait while the disk or another process is slow: two seconds."""
 _PAUSE = 5e-3
+Arrival = tuple[int, Topic, bytes, int]
+"""Time of arrival [ns], topic, bytes, time of sending [ns]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,10 +43,51 @@ class _Channel:
     """One recorded topic: what came and what the middleware lost on the way."""
 
     def __init__(self, node: CoreNode, topic: Topic) -> None:
-        depth = 10 if topic.quality is Quality.LATCHED else DEPTH
-        self.topic, self.subscription = topic, Subscription(node, topic, depth)
+        self.topic, self._node = topic, node
         self.received = self.lost = self._number = 0
         self.publishers = 0 if topic is topics.DIAGNOSTICS else 1
+        self._given: deque[Arrival] = deque()
+        self._subscription: Subscription | None = None
+        self._inside_ns: int | None = None
+        self._follow()
+
+    def join(self, is_inside: bool) -> None:
+        """Take messages from :meth:`give`, from a sender in this process, or from the topic."""
+        if is_inside is (self._inside_ns is None):
+            self._inside_ns = time.time_ns() if is_inside else None
+
+    def give(self, data: bytes) -> None:
+        """Take a message from a sender in this process, whose thread may be another one."""
+        now_ns = time.time_ns()
+        self._given.append((now_ns, self.topic, data, now_ns))
+
+    def drain(self, came: list[Arrival]) -> None:
+        """Append what has come since the last call."""
+        while self._given:
+            came.append(self._given.popleft())
+            self.received += 1
+        inside_ns = self._inside_ns
+        while self._subscription is not None and (taken := self._subscription.take()) is not None:
+            data, about = taken
+            if inside_ns is None or about["source_timestamp"] < inside_ns:
+                self.count(about["publication_sequence_number"])
+                arrival_ns = about["received_timestamp"]
+                came.append((arrival_ns, self.topic, data, about["source_timestamp"]))
+        self._follow()
+
+    def _follow(self) -> None:
+        """Listen to the topic or not, in the thread that takes from it."""
+        if self._inside_ns is not None:
+            self.close()
+        elif self._subscription is None:
+            depth = 10 if self.topic.quality is Quality.LATCHED else DEPTH
+            self._subscription, self._number = Subscription(self._node, self.topic, depth), 0
+
+    def close(self) -> None:
+        """Stop listening to the topic."""
+        if self._subscription is not None:
+            self._subscription.close()
+            self._subscription = None
 
     def count(self, number: int) -> None:
         """Note a message by its number in its publisher's sequence; a smaller one starts anew.
@@ -62,6 +106,7 @@ class RecorderNode(CoreNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(STAGE["recorder"], RecorderParameters, **options)
+        self.channels: dict[Topic, _Channel] = {}
 
     def setup(self, parameters: RecorderParameters) -> None:
         """Make the recording's directory."""
@@ -71,13 +116,12 @@ class RecorderNode(CoreNode):
             start_ns=time.time_ns(),
         )  # fmt: skip
         self.stage = self._writer
-        self._channels: list[_Channel] = []
         every = parameters.every_nth(topics.ALL)
         self._recorded = [topic for topic in topics.ALL if every[topic.name]]
 
     def start(self) -> None:
         """Open the topics; latched ones send what they have."""
-        self._channels = [_Channel(self, topic) for topic in self._recorded]
+        self.channels = {topic: _Channel(self, topic) for topic in self._recorded}
 
     def turn(self) -> None:
         """Record what has come."""
@@ -88,37 +132,33 @@ class RecorderNode(CoreNode):
     def stop(self) -> None:
         """Record what came last, and close the topics."""
         self._drain()
-        for channel in self._channels:
-            channel.subscription.close()
+        for channel in self.channels.values():
+            channel.close()
 
     def teardown(self) -> None:
         """Finish the recording."""
         self._writer.close()
 
     def _drain(self) -> None:
-        came = []
-        for channel in self._channels:
-            while (taken := channel.subscription.take()) is not None:
-                data, about = taken
-                channel.count(about["publication_sequence_number"])
-                came.append((about["received_timestamp"], channel.topic, data,
-                             about["source_timestamp"]))  # fmt: skip
+        came: list[Arrival] = []
+        for channel in self.channels.values():
+            channel.drain(came)
         came.sort(key=lambda message: message[0])
         for received_ns, topic, data, sent_ns in came:
             self._writer.write(topic, received_ns, data, sent_ns)
 
     def concerns(self) -> list[str]:
         """Topics of which messages were lost before they came here."""
-        for channel in self._channels:
+        for channel in self.channels.values():
             is_shared = channel.topic is topics.DIAGNOSTICS
-            channel.publishers = 0 if is_shared else channel.subscription.publishers()
-        lost = sum(channel.lost for channel in self._channels)
+            channel.publishers = 0 if is_shared else self.count_publishers(channel.topic.name)
+        lost = sum(channel.lost for channel in self.channels.values())
         return [f"the middleware lost {lost} messages on the way here"] if lost else []
 
     def values(self) -> dict[str, str]:
         """What came, what was lost, and where it is recorded."""
         values = {"out": str(self._writer.path)}
-        for channel in self._channels:
+        for channel in self.channels.values():
             values[f"received.{channel.topic.name}"] = str(channel.received)
             values[f"lost.{channel.topic.name}"] = str(channel.lost)
         return values

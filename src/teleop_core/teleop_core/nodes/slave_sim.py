@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Iterable
 from typing import Any
 
 from teleop_core.bags import topics
@@ -36,7 +37,10 @@ class SlaveSimNode(CoreNode):
 
     def turn(self) -> None:
         """Take the newest command and all steps that are due."""
-        ticks = self.schedule.due()
+        self.work(self.schedule.due())
+
+    def work(self, ticks: Iterable[int]) -> None:
+        """Take the newest command and the steps of some ticks [ns, monotonic]."""
         if self._servo_jp.take():
             self._signals["servo_stamp_ns"] = self._servo_jp.stamp_ns
         before_ns = int(self._signals["setpoint_stamp_ns"])

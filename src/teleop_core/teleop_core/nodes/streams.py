@@ -7,6 +7,7 @@ Both give the same values.
 
 import time
 from collections import Counter
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -89,10 +90,6 @@ class Subscription:
         """Oldest waiting message and what the middleware knows about it; None if there is none."""
         return self._take(self.type, True)  # type: ignore[no-any-return]
 
-    def publishers(self) -> int:
-        """How many publishers this topic has now."""
-        return self._own.get_publisher_count()  # type: ignore[no-any-return]
-
     def close(self) -> None:
         """Stop listening."""
         self._node.destroy_subscription(self._own)
@@ -142,7 +139,9 @@ class Input:
         target: Array,
         may_repeat: bool = False,
     ) -> None:
-        self.topic, self.subscription = topic, Subscription(node, topic)
+        self.topic, self._node = topic, node
+        self.subscription: Subscription | None = Subscription(node, topic)
+        self._is_new = False
         self._joint_names, self._target, self._may_repeat = joint_names, target, may_repeat
         self._layout = layout(topic, joint_names)
         self.received, self.refused = 0, Counter[Refusal]()
@@ -151,6 +150,9 @@ class Input:
 
     def take(self) -> bool:
         """Write the waiting message into the signals; whether there was a sound one."""
+        if self.subscription is None:
+            is_new, self._is_new = self._is_new, False
+            return is_new
         taken = self.subscription.take()
         if taken is None:
             return False
@@ -177,7 +179,7 @@ class Input:
 
     def _read(self, data: bytes) -> tuple[int, Values] | Refusal:
         """Stamp and values of a message with other bytes than ours."""
-        message = deserialize_message(data, self.subscription.type)
+        message = deserialize_message(data, message_type(self.topic.kind.ros_type))
         return read_values(self.topic.kind, message, self._joint_names)
 
     def age(self) -> float:
@@ -188,10 +190,37 @@ class Input:
 
     def forget(self) -> None:
         """Throw away what waits and start anew: the first message may have any stamp."""
-        while self.subscription.take() is not None:
+        while self.subscription is not None and self.subscription.take() is not None:
             pass
+        self._is_new = False
         self.stamp_ns = None
         self.arrival_ns = 0
+
+    def publishers(self) -> int:
+        """How many publishers the topic has now."""
+        return self._node.count_publishers(self.topic.name)  # type: ignore[no-any-return]
+
+    # -- within a process that holds the sender too ----------------------------------------------
+
+    def join(self, is_inside: bool) -> None:
+        """Take values from :meth:`give` alone, or again from the topic."""
+        if is_inside and self.subscription is not None:
+            self.close()
+        elif not is_inside and self.subscription is None:
+            self.subscription = Subscription(self._node, self.topic)
+
+    def give(self, stamp_ns: int, values: Values) -> None:
+        """Take a sound sample from a sender in this process."""
+        self._target[:] = values
+        self.stamp_ns, self.arrival_ns = stamp_ns, time.monotonic_ns()
+        self.received += 1
+        self._is_new = True
+
+    def close(self) -> None:
+        """Stop listening to the topic."""
+        if self.subscription is not None:
+            self.subscription.close()
+            self.subscription = None
 
 
 class Output:
@@ -204,13 +233,22 @@ class Output:
 
     Attributes:
         sent: Number of messages.
+        inputs: Readers of the topic in this process, which get the values beside the topic.
+        tap: Called with the bytes of every message, in place of a subscription in this process.
     """
 
     def __init__(self, publisher: Publisher, form: Layout, source: Array) -> None:
         self._publish, self._encode, self._source = publisher.publish, form.encode_one, source
         self.sent = 0
+        self.inputs: list[Input] = []
+        self.tap: Callable[[bytes], None] | None = None
 
     def send(self, stamp_ns: int) -> None:
         """Publish the present values under a stamp [ns]."""
-        self._publish(self._encode(stamp_ns, self._source))
+        for entry in self.inputs:
+            entry.give(stamp_ns, self._source)
+        data = self._encode(stamp_ns, self._source)
+        self._publish(data)
+        if self.tap is not None:
+            self.tap(data)
         self.sent += 1

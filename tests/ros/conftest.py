@@ -1,0 +1,219 @@
+"""Real nodes as processes, and a peer that talks to them over real topics."""
+
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+
+from teleop_core.bags.messages import discover, layout
+from teleop_core.bags.topics import Topic
+from teleop_core.nodes.children import environment, free_domain
+from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.streams import Subscription, message_type, profile
+from teleop_core.robots import load_robot
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # its parser imports a deprecated module of Python
+    import rosidl_generator_py  # noqa: F401
+
+TIMEOUT = 90.0
+JOINTS = load_robot("rcrt1").joint_names
+
+
+def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
+    """Result of ``condition`` as soon as it is true."""
+    deadline = time.monotonic() + timeout
+    while not (result := condition()):
+        assert time.monotonic() < deadline, f"not within {timeout} s: {what}"
+        time.sleep(0.002)
+    return result
+
+
+class Listener:
+    """What came on one topic since the test listens: stamps and values."""
+
+    def __init__(self, node: Node, topic: Topic) -> None:
+        self.topic, self._subscription = topic, Subscription(node, topic, 20_000)
+        self._layout: Any = None
+        self.stamps: list[int] = []
+        self.values: list[np.ndarray] = []
+
+    def take(self) -> int:
+        """Take what has come; returns how many there are in all."""
+        while (taken := self._subscription.take()) is not None:
+            if self._layout is None:
+                self._layout = discover(self.topic.kind, taken[0])
+            stamp_ns, values = self._layout.decode_one(taken[0])
+            self.stamps.append(stamp_ns)
+            self.values.append(values)
+        return len(self.stamps)
+
+    def forget(self) -> None:
+        """Throw away what has come so far."""
+        self.take()
+        self.stamps, self.values = [], []
+
+
+class NodeProcess:
+    """One node as a user starts it."""
+
+    def __init__(self, name: str, parameters: dict[str, Any], domain: str, folder: Path) -> None:
+        self.name = name
+        file = folder / f"{name}_{time.monotonic_ns()}.yaml"
+        file.write_text(yaml.safe_dump({name: {"ros__parameters": parameters}}))
+        self.stderr = file.with_suffix(".log")
+        with self.stderr.open("wb") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", f"teleop_core.nodes.{name}", "--ros-args", "--params-file",
+                 str(file)],
+                stderr=log, env=environment() | {"ROS_DOMAIN_ID": domain},
+            )  # fmt: skip
+
+    def end(self, number: int = signal.SIGINT) -> int:
+        """Send a signal; returns the exit code."""
+        self.process.send_signal(number)
+        return self.process.wait(TIMEOUT)
+
+
+class Peer:
+    """A ROS node of the test beside the nodes under test, on a domain of its own."""
+
+    wait = staticmethod(wait_until)
+
+    def __init__(self, folder: Path) -> None:
+        self.domain, self._folder = free_domain(), folder
+        environment()
+        self.context = Context()
+        self.context.init(args=[], domain_id=int(self.domain))
+        self.node = Node(
+            "peer", context=self.context, use_global_arguments=False, enable_rosout=False
+        )
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self.observer = Observer(int(self.domain))
+        self.nodes: list[NodeProcess] = []
+        self._publishers: dict[str, Any] = {}
+
+    def close(self) -> None:
+        for node in self.nodes:
+            if node.process.poll() is None:
+                node.process.kill()
+                node.process.wait()
+        self.observer.__exit__()
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    # -- nodes -----------------------------------------------------------------------------------
+
+    def start(self, name: str, wait: str = "active", **parameters: Any) -> NodeProcess:
+        """Start a node; double underscores in names stand for dots."""
+        named = {key.replace("__", "."): value for key, value in parameters.items()}
+        node = NodeProcess(name, named, self.domain, self._folder)
+        self.nodes.append(node)
+        self.observer.statuses.pop(name, None)
+        if wait:
+            self.wait_state(name, wait)
+        return node
+
+    def status(self, name: str) -> Any:
+        """Newest report of a node; None before the first."""
+        self.observer.listen(0.0)
+        return self.observer.statuses.get(name)
+
+    def wait_state(self, name: str, state: str) -> None:
+        def reached() -> bool:
+            for node in self.nodes:
+                died = node.name == name and node is self._newest(name) and node.process.poll()
+                assert not died, node.stderr.read_text()
+            status = self.status(name)
+            return status is not None and status.values["state"] == state
+
+        wait_until(reached, f"{name} {state}")
+
+    def _newest(self, name: str) -> NodeProcess:
+        return next(node for node in reversed(self.nodes) if node.name == name)
+
+    def wait_value(self, name: str, key: str, accept: Callable[[float], bool]) -> float:
+        """Number that a node reports under a key, once it is accepted."""
+
+        def accepted() -> tuple[float] | None:
+            status = self.status(name)
+            number = status.number(key) if status else 0.0
+            return (number,) if status and accept(number) else None
+
+        return wait_until(accepted, f"{name} {key}")[0]
+
+    # -- topics ----------------------------------------------------------------------------------
+
+    def listen(self, topic: Topic) -> Listener:
+        return Listener(self.node, topic)
+
+    def publisher(self, topic: Topic, readers: int = 1) -> Any:
+        """Publisher of a topic, once that many subscriptions are there."""
+        if topic.name not in self._publishers:
+            kind = message_type(topic.kind.ros_type)
+            reliable = profile(topic) if readers else QoSProfile(depth=10)
+            self._publishers[topic.name] = self.node.create_publisher(kind, topic.name, reliable)
+        own = self._publishers[topic.name]
+        wait_until(lambda: own.get_subscription_count() >= readers, f"readers of {topic.name}")
+        return own
+
+    def send(self, topic: Topic, stamp_ns: int, values: Any) -> None:
+        """Publish one message as our own nodes would."""
+        data = layout(topic, JOINTS).encode_one(stamp_ns, np.asarray(values, np.float64))
+        self.publisher(topic).publish(data)
+
+    # -- services --------------------------------------------------------------------------------
+
+    def call(self, service: Any, name: str, request: Any) -> Any:
+        """Answer of a service."""
+        client = self.node.create_client(service, name)
+        try:
+            wait_until(client.service_is_ready, f"service {name}")
+            future = client.call_async(request)
+            self._executor.spin_until_future_complete(future, TIMEOUT)
+            assert future.done(), f"no answer from {name}"
+            return future.result()
+        finally:
+            self.node.destroy_client(client)
+
+    def set(self, name: str, at_once: bool = False, **values: Any) -> list[Any]:
+        """Results of setting parameters over the node's services."""
+        messages: list[ParameterMessage] = [
+            Parameter(key.replace("__", "."), value=value).to_parameter_msg()
+            for key, value in values.items()
+        ]
+        if at_once:
+            request = SetParametersAtomically.Request(parameters=messages)
+            kind, service = SetParametersAtomically, "set_parameters_atomically"
+            return [self.call(kind, f"/{name}/{service}", request).result]
+        request = SetParameters.Request(parameters=messages)
+        return self.call(SetParameters, f"/{name}/set_parameters", request).results  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def peer(tmp_path: Path) -> Iterator[Peer]:
+    """A peer on a ROS domain that nobody else uses; the nodes it started end with the test."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = Peer(Path(folder))
+        try:
+            yield made
+        finally:
+            made.close()

@@ -1,0 +1,292 @@
+"""Every node, as a real process, answers on its topics, takes parameters and ends cleanly."""
+
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import DescribeParameters, GetParameters
+
+from teleop_core.bags import topics
+from teleop_core.bags.reader import Bag
+from teleop_core.nodes.children import environment
+from teleop_core.robots import load_robot
+from teleop_core.session.graph import STAGE, STAGES
+
+pytestmark = pytest.mark.ros
+
+HOME = load_robot("rcrt1").home
+REST = [0.0, -0.06, -0.08, 1.0, 0.0, 0.0, 0.0]
+MS = 1_000_000
+
+
+def test_haptic_master_sends_one_sample_per_millisecond_on_all_its_topics(peer):
+    listeners = {topic: peer.listen(topic) for topic in STAGE["haptic_master"].writes}
+    peer.start("haptic_master")
+    for topic, listener in listeners.items():
+        peer.wait(lambda own=listener: own.take() > 200, topic.name)
+    stamps = [set(listener.stamps) for listener in listeners.values()]
+    common = set.intersection(*stamps)
+    assert len(common) > 150
+    steps = np.diff(sorted(common))
+    assert (steps % MS == 0).all()
+
+
+def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer):
+    answers = peer.listen(topics.SLAVE_SERVO_CP)
+    forces = peer.listen(topics.MASTER_SERVO_CF)
+    peer.start("motion_scaling")
+    peer.send(topics.MASTER_MEASURED_CP, 1 * MS, REST)
+    peer.wait_value("motion_scaling", "received.master/measured_cp", lambda n: n == 1)
+    assert answers.take() == 0
+
+    where = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0]
+    peer.send(topics.SLAVE_SETPOINT_CP, 0, where)
+    stamp = 2 * MS
+
+    def answered():
+        nonlocal stamp
+        peer.send(topics.MASTER_MEASURED_CP, stamp, REST)
+        stamp += MS
+        return answers.take() and forces.take()
+
+    peer.wait(answered, "slave/servo_cp")
+    assert answers.stamps[0] in range(2 * MS, stamp, MS)
+    assert answers.stamps[0] == forces.stamps[0]
+    np.testing.assert_array_equal(answers.values[0], where)
+
+
+def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer):
+    robot = load_robot("rcrt1")
+    answers = peer.listen(topics.SLAVE_SERVO_JP)
+    peer.start("inverse_kinematics")
+    peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)
+    goal = robot.fk(HOME)
+    goal[0, 3] -= 1e-5  # within one tick's reach
+    pose = np.array([*goal[:3, 3], *_quaternion(goal)])
+    stamp = MS
+
+    def answered():
+        nonlocal stamp
+        stamp += MS
+        peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
+        return answers.take()
+
+    peer.wait(answered, "slave/servo_jp")
+    assert answers.stamps[0] in range(MS, stamp + 1, MS)
+    np.testing.assert_allclose(answers.values[0], robot.ik(goal, HOME).q, atol=1e-12)
+
+
+def _quaternion(transform):
+    from teleop_core.geometry import pose_from_transform
+
+    pose = np.empty(7)
+    pose_from_transform(np.ascontiguousarray(transform), pose)
+    return pose[3:]
+
+
+def test_slave_sim_follows_and_passes_the_stamp_of_the_command_on(peer):
+    setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
+    measured = peer.listen(topics.SLAVE_MEASURED_JS)
+    peer.start("slave_sim")
+    peer.wait(lambda: measured.take() > 100, "slave/measured_js")
+    assert set(setpoints.stamps) <= {0}
+    wanted, stamp = HOME + 0.001, 0
+
+    def passed_on():
+        nonlocal stamp
+        stamp += MS
+        peer.send(topics.SLAVE_SERVO_JP, stamp, wanted)
+        return setpoints.take() and setpoints.stamps[-1] in range(MS, stamp + 1, MS)
+
+    peer.wait(passed_on, "stamp passed on")
+
+    def arrived():
+        setpoints.take()
+        return np.allclose(setpoints.values[-1], wanted, atol=1e-9)
+
+    peer.wait(arrived, "slave at the reference")
+    steps = np.diff(measured.stamps)
+    assert (steps > 0).all()
+    assert (steps % MS == 0).all()
+
+
+def test_recorder_keeps_what_was_sent_and_the_configuration(peer, tmp_path):
+    recorder = peer.start("recorder", out=str(tmp_path / "bag"), scenario="mine")
+    for stamp in range(1, 501):
+        peer.send(topics.MASTER_MEASURED_CP, stamp * MS, REST)
+    peer.wait_value("recorder", "received.master/measured_cp", lambda n: n == 500)
+    assert recorder.end(signal.SIGTERM) == 0
+    bag = Bag(tmp_path / "bag")
+    series = bag.read(topics.MASTER_MEASURED_CP)
+    np.testing.assert_array_equal(series.stamp_ns, np.arange(1, 501) * MS)
+    assert bag.metadata["scenario"] == "mine"
+    assert "haptic_master" in bag.metadata["configuration"]
+
+
+def test_what_arrived_just_before_the_signal_is_recorded(peer, tmp_path):
+    recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    publisher = peer.publisher(topics.MASTER_MEASURED_CP)
+    for stamp in range(1, 1001):
+        peer.send(topics.MASTER_MEASURED_CP, stamp * MS, REST)
+    assert publisher is peer.publisher(topics.MASTER_MEASURED_CP)
+    assert recorder.end() == 0
+    stamps = Bag(tmp_path / "bag").read(topics.MASTER_MEASURED_CP).stamp_ns
+    assert stamps[-1] == 1000 * MS
+    assert len(stamps) == 1000
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_every_node_ends_with_0(peer, tmp_path, number):
+    for stage in STAGES:
+        parameters = {"out": str(tmp_path / "bag")} if stage.name == "recorder" else {}
+        peer.start(stage.name, wait="", **parameters)
+    for node in peer.nodes:
+        peer.wait_state(node.name, "active")
+    for node in peer.nodes:
+        node.process.send_signal(number)
+    assert {n.name: n.process.wait(60) for n in peer.nodes} == {s.name: 0 for s in STAGES}
+    assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
+
+
+def test_parameters_are_described_with_unit_and_bounds(peer):
+    peer.start("slave_sim", autostart=False, wait="unconfigured")
+    names = ["command_timeout", "gravity_compensation", "robot", "pid.kp", "integration_steps"]
+    request = DescribeParameters.Request(names=names)
+    found = peer.call(DescribeParameters, "/slave_sim/describe_parameters", request).descriptors
+    timeout, gravity, robot, gains, steps = found
+    assert timeout.description.endswith("[s]")
+    assert timeout.floating_point_range[0].to_value == 5.0
+    assert gravity.additional_constraints == "one of published, all, none"
+    assert robot.read_only
+    assert not gains.read_only
+    assert steps.integer_range[0].to_value == 50
+    answer = peer.call(
+        GetParameters, "/slave_sim/get_parameters", GetParameters.Request(names=names)
+    )
+    assert answer.values[3].type == 8  # doubles, although empty
+
+
+def test_parameters_are_accepted_or_refused_with_the_reason(peer):
+    peer.start("slave_sim")
+    accepted, refused, wrong_type, read_only, length, unknown = (
+        peer.set("slave_sim", **{name: value})[0]
+        for name, value in (
+            ("command_timeout", 0.2), ("command_timeout", 50.0), ("command_timeout", 1),
+            ("robot", "scara"), ("pid__kp", [1.0, 2.0]), ("no_such", 1.0),
+        )
+    )  # fmt: skip
+    assert accepted.successful
+    assert not refused.successful
+    assert "command_timeout" in refused.reason
+    assert "Type.DOUBLE" in wrong_type.reason
+    assert "read-only" in read_only.reason
+    assert "6 values" in length.reason
+    assert not unknown.successful
+    assert peer.set("slave_sim", viscous=[0.1] * 6)[0].successful
+    assert peer.set("slave_sim", viscous=[])[0].successful
+
+
+def test_relations_between_parameters_hold_and_can_be_changed_at_once(peer):
+    peer.start("slave_sim")
+    change = {"reference_filter__gain": 0.2, "reference_filter__zero": 50.0}
+    alone = peer.set("slave_sim", **change)
+    assert [entry.successful for entry in alone] == [False, False]
+    assert "gain" in alone[0].reason
+    assert peer.set("slave_sim", at_once=True, **change)[0].successful
+
+
+def test_a_new_gain_is_used_from_the_next_sample_on(peer):
+    answers = peer.listen(topics.SLAVE_SERVO_CP)
+    peer.start("motion_scaling", feedback_timeout=5.0)
+    where, pose, stamp = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0], list(REST), 0
+
+    def moved() -> float:
+        """Slave travel of one millimetre of master travel along x."""
+        nonlocal stamp
+        before = answers.take()
+        stamp += MS
+        pose[0] += 1e-3
+        peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
+        peer.wait(lambda: answers.take() > before, "answer")
+        return float(np.linalg.norm(answers.values[-1][:3] - answers.values[-2][:3]))
+
+    def engaged():
+        nonlocal stamp
+        stamp += MS
+        peer.send(topics.SLAVE_SETPOINT_CP, stamp, where)
+        peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
+        return answers.take() >= 3
+
+    peer.wait(engaged, "motion_scaling at work")
+    assert moved() == pytest.approx(1e-3, rel=1e-6)
+    assert peer.set("motion_scaling", coarse_gain=0.25)[0].successful
+    assert moved() == pytest.approx(0.25e-3, rel=1e-6)
+
+
+def change(peer, name, transition):
+    request = ChangeState.Request(transition=Transition(id=transition))
+    return peer.call(ChangeState, f"/{name}/change_state", request).success
+
+
+@pytest.mark.parametrize("name", [stage.name for stage in STAGES])
+def test_a_supervisor_drives_the_lifecycle_twice(peer, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)  # the recorder makes bags/ here
+    node = peer.start(name, autostart=False, wait="unconfigured")
+    watched = topics.SLAVE_MEASURED_JS if name == "slave_sim" else None
+    listener = peer.listen(watched) if watched else None
+    for _ in range(2):
+        assert change(peer, name, Transition.TRANSITION_CONFIGURE)
+        if listener:
+            assert listener.take() == 0
+        assert change(peer, name, Transition.TRANSITION_ACTIVATE)
+        if listener:
+            peer.wait(lambda: listener.take() > 10, "samples while active")
+        state = peer.call(GetState, f"/{name}/get_state", GetState.Request())
+        assert state.current_state.label == "active"
+        assert change(peer, name, Transition.TRANSITION_DEACTIVATE)
+        if listener:
+            peer.wait_value(name, "ticks", lambda n: n > 0)
+            listener.forget()
+        assert change(peer, name, Transition.TRANSITION_CLEANUP)
+        if name == "recorder":
+            (bag,) = (tmp_path / "bags").iterdir()
+            assert (bag / "metadata.yaml").exists()
+            bag.rename(tmp_path / f"bag{len(list(tmp_path.iterdir()))}")
+    assert node.end() == 0
+
+
+def test_a_refused_configure_leaves_the_node_usable_by_the_supervisor(peer, tmp_path):
+    (tmp_path / "taken").mkdir()
+    node = peer.start("recorder", autostart=False, out=str(tmp_path / "taken"), wait="unconfigured")
+    assert not change(peer, "recorder", Transition.TRANSITION_CONFIGURE)
+    (tmp_path / "taken").rmdir()
+    assert change(peer, "recorder", Transition.TRANSITION_CONFIGURE)
+    assert node.end() == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "needed"),
+    [
+        ("slave_sim", "command_timout: 0.1", "command_timeout"),
+        ("slave_sim", "command_timeout: 50.0", "between 0.002 and 5 s"),
+        ("slave_sim", "integration_steps: 1.5", "of type int"),
+        ("slave_sim", "robot: nobot", "rcrt1"),
+        ("haptic_master", "path: {kind: bag, bag: /no/such/bag}", "does not exist"),
+        ("recorder", "out: /tmp", "exists already"),
+        ("slave_sim", "bad: [1.0", "is not YAML"),
+    ],
+)
+def test_wrong_parameter_files_end_with_one_line_and_2(tmp_path, name, content, needed):
+    file = tmp_path / "parameters.yaml"
+    file.write_text(f"{name}:\n  ros__parameters:\n    {content}\n")
+    command = [sys.executable, "-m", f"teleop_core.nodes.{name}", "--ros-args", "--params-file"]
+    done = subprocess.run(
+        [*command, file], capture_output=True, text=True, timeout=90, env=environment(), check=False
+    )
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert needed in done.stderr
