@@ -4,7 +4,14 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
-NODES = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "recorder")
+NODES = (
+    "haptic_master",
+    "motion_scaling",
+    "inverse_kinematics",
+    "slave_sim",
+    "recorder",
+    "teleop_session",
+)
 
 
 def files(folder: str, pattern: str) -> tuple[str, list[str]]:

@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,22 @@ from teleop_core.session.graph import STAGES
 
 
 @dataclass(frozen=True, kw_only=True)
+class RealTimeParameters:
+    """What a live node asks of the system; a refusal is reported and the node works on."""
+
+    priority: int = parameter(
+        0, lower=0, upper=98, fixed=True, doc="SCHED_FIFO priority of the loop; 0: fair shares"
+    )
+    cpus: tuple[int, ...] = parameter(
+        (), lower=0, fixed=True, doc="processors that the loop may use; empty: all"
+    )
+    lock_memory: bool = parameter(False, fixed=True, doc="keep all memory out of swap")
+    freeze_gc: bool = parameter(
+        True, fixed=True, doc="keep what exists at the start out of garbage collections"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class SessionParameters:
     """Parameters of a session as a whole."""
 
@@ -21,6 +37,7 @@ class SessionParameters:
     duration: float = parameter(
         10.0, unit="s", lower=0.001, upper=86400.0, doc="simulated or live time"
     )
+    real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
 
 GROUPS: dict[str, type] = {
