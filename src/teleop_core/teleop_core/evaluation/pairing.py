@@ -8,6 +8,7 @@ from teleop_core.evaluation.accumulators import Integers
 
 NONE = -1
 """Index of a sample that has no partner."""
+_ROW = 3
 _SMOOTHED = 21  # samples; bursts of half as many leave the pairing alone
 _FARTHEST_NS = 50_000_000
 _FAR = 2**62
@@ -16,10 +17,11 @@ _FAR = 2**62
 def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:
     """Partners of samples that one node publishes in pairs, tick by tick, without a common stamp.
 
-    Where the nearest sample in log time is far nearer than any other, it is the partner. Where
-    several ticks came at once, partners are counted off: the difference of the two indices is
-    constant until a message is lost. It is the running median of the difference to the nearest
-    sample, which ignores bursts and follows losses at once (a median keeps edges).
+    Partners are counted off: the difference of the two indices is constant until a message is
+    lost. It is known wherever the nearest sample in log time is far nearer than any other, some
+    times in a row. In between, where a late recorder or network mixed the ticks, it is the same
+    if it is the same on both sides; if it is not, something was lost there, and it is the running
+    median of the difference to the nearest sample (a median ignores bursts and keeps edges).
 
     Args:
         log_ns: Log times of one topic, shape (N,), in order, [ns].
@@ -34,14 +36,13 @@ def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:
         return index
     if not len(log_ns) or not len(other_log_ns):
         return np.full(len(log_ns), NONE)
-    nearest = _nearest(log_ns, other_log_ns)
-    is_clear = _is_clear(log_ns, other_log_ns, nearest)
-    partner = np.where(is_clear, nearest, index + _running_median(nearest - index))
+    offset, is_certain = _offsets(log_ns, other_log_ns)
+    partner = index + offset
     is_inside = (partner >= 0) & (partner < len(other_log_ns))
     apart = np.abs(other_log_ns[np.where(is_inside, partner, 0)] - log_ns)
-    step = np.diff(partner)
-    is_taken = np.append(step <= 0, False) | np.insert(step <= 0, 0, False)
-    return np.where(is_inside & (apart <= _FARTHEST_NS) & (is_clear | ~is_taken), partner, NONE)
+    is_step = np.diff(partner) <= 0
+    is_taken = np.append(is_step, False) | np.insert(is_step, 0, False)
+    return np.where(is_inside & (apart <= _FARTHEST_NS) & (is_certain | ~is_taken), partner, NONE)
 
 
 def latest(stamp_ns: Integers, other_stamp_ns: Integers) -> Integers:
@@ -82,6 +83,28 @@ def _nearest(times: Integers, others: Integers) -> Integers:
     before, after = np.maximum(after - 1, 0), np.minimum(after, len(others) - 1)
     is_before: NDArray[np.bool_] = times - others[before] < others[after] - times
     return np.where(is_before, before, after)
+
+
+def _offsets(log_ns: Integers, other_log_ns: Integers) -> tuple[Integers, NDArray[np.bool_]]:
+    """Partner's index minus own, and whether it is certain, both of shape (N,)."""
+    nearest = _nearest(log_ns, other_log_ns)
+    offset = nearest - np.arange(len(log_ns))
+    is_certain = _in_a_row(_is_clear(log_ns, other_log_ns, nearest), offset)
+    known = np.flatnonzero(is_certain)
+    median = _running_median(offset)
+    if not len(known):
+        return median, is_certain
+    at = np.searchsorted(known, np.arange(len(offset)), side="right")
+    before, after = offset[known[np.maximum(at - 1, 0)]], known[np.minimum(at, len(known) - 1)]
+    return np.where(is_certain | (before == offset[after]), before, median), is_certain
+
+
+def _in_a_row(is_clear: NDArray[np.bool_], offset: Integers) -> NDArray[np.bool_]:
+    """Samples that are clear with the same offset at least :data:`_ROW` times in a row."""
+    is_new = np.diff(np.where(is_clear, offset, _FAR), prepend=_FAR - 1) != 0
+    run = np.cumsum(is_new) - 1
+    in_a_row: NDArray[np.bool_] = is_clear & (np.bincount(run)[run] >= _ROW)
+    return in_a_row
 
 
 def _is_clear(times: Integers, others: Integers, nearest: Integers) -> NDArray[np.bool_]:

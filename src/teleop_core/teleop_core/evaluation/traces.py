@@ -52,7 +52,9 @@ class Envelope:
         low, high = self._lowest[is_full], self._highest[is_full]
         if not len(low):
             return np.empty(0), np.empty((0, low.shape[1]))
-        middle = np.where(np.isfinite(low), 0.5 * (low + high), 0.0)
+        is_known = np.isfinite(low)
+        middle = np.where(is_known, 0.5 * (low + np.where(is_known, high, 0.0)), 0.0)
+        low, high = np.where(is_known, low, np.nan), np.where(is_known, high, np.nan)
         rises = np.gradient(middle, axis=0) >= 0.0 if len(low) > 1 else np.ones_like(low, bool)
         pairs: Array = np.stack((np.where(rises, low, high), np.where(rises, high, low)), axis=1)
         times = (np.flatnonzero(is_full)[:, None] + np.array([0.25, 0.75])) * width
