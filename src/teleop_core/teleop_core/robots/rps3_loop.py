@@ -18,6 +18,12 @@ _LARGEST_TURN = 0.5  # rad, of one iteration
 
 
 @kernel
+def _dot(a: Array, b: Array) -> float:
+    """Scalar product of vectors (3,); numba's own needs BLAS and seconds to compile."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@kernel
 def points(lengths: Array, theta: Array, b: float, S: Array) -> None:
     """Write ball joints (3, 3) [m], one a row."""
     for i in range(3):
@@ -34,10 +40,10 @@ def frame(S: Array, T: Array) -> None:
     for r in range(3):
         T[r, 3] = (S[0, r] + S[1, r] + S[2, r]) / 3.0
         x[r], y[r] = S[0, r] - T[r, 3], S[1, r] - S[2, r]
-    xx, xy = np.dot(x, x), np.dot(x, y)
+    xx, xy = _dot(x, x), _dot(x, y)
     for r in range(3):
         y[r] -= xy / xx * x[r]
-    yy = np.dot(y, y)
+    yy = _dot(y, y)
     for r in range(3):
         T[r, 0], T[r, 1] = x[r] / math.sqrt(xx), y[r] / math.sqrt(yy)
         T[3, r] = 0.0
@@ -65,8 +71,8 @@ def constraints(
         G: Slopes along the angles (3, 3) [m²/rad].
         H: Slopes along the lengths (3, 3) [m].
     """
-    G[:], H[:] = 0.0, 0.0
     for k in range(3):
+        G[k, (k + 2) % 3] = H[k, (k + 2) % 3] = 0.0
         for first in range(2):
             i, j = (k + first) % 3, (k + 1 - first) % 3
             li, lj = lengths[i], lengths[j]
@@ -116,7 +122,7 @@ def settle(lengths: Array, b: float, a: float, theta: Array) -> float:
     G, H = np.empty((3, 3)), np.empty((3, 3))
     constraints(lengths, theta, b, a, gap, G, H)
     scale = (a * a + b * b) ** 2
-    cost, damping = np.dot(gap, gap), 1e-3 * scale
+    cost, damping = _dot(gap, gap), 1e-3 * scale
     for _ in range(_ITERATIONS):
         if cost <= 1e-31 * scale or damping > 1e8 * scale:
             break
@@ -124,7 +130,7 @@ def settle(lengths: Array, b: float, a: float, theta: Array) -> float:
         for i in range(3):
             trial[i] = theta[i] + turn[i]
         constraints(lengths, trial, b, a, gap, G, H)
-        trial_cost = np.dot(gap, gap)
+        trial_cost = _dot(gap, gap)
         if trial_cost >= cost:
             if cost <= _ROUNDING * scale:
                 break
@@ -132,7 +138,8 @@ def settle(lengths: Array, b: float, a: float, theta: Array) -> float:
             damping = max(10.0 * damping, 1e-12 * scale)
             continue
         gained, cost, damping = cost - trial_cost, trial_cost, 0.05 * damping
-        theta[:] = trial
+        for i in range(3):
+            theta[i] = trial[i]
         if gained <= 1e-14 * cost:
             break
-    return float(np.abs(gap).max())
+    return max(abs(gap[0]), abs(gap[1]), abs(gap[2]))

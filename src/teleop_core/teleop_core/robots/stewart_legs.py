@@ -86,8 +86,25 @@ def _damped_move(J: Array, gap: Array, damping: float, size: float, move: Array)
 
 
 @kernel
-def _largest(move: Array) -> float:
-    return float(np.abs(move).max())
+def _largest(values: Array) -> float:
+    largest = 0.0
+    for i in range(values.shape[0]):
+        largest = max(largest, abs(values[i]))
+    return largest
+
+
+@kernel
+def _pin(J: Array) -> None:
+    """Take the shifts out of a leg Jacobian (6, 6)."""
+    for i in range(6):
+        J[i, 0] = J[i, 1] = J[i, 2] = 0.0
+
+
+@kernel
+def _copy(source: Array, target: Array) -> None:
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
 
 
 @kernel
@@ -123,11 +140,12 @@ def direct(
     J, trial_J, trial = np.empty((6, 6)), np.empty((6, 6)), np.empty((4, 4))
     lengths, gap, move = np.empty(6), np.empty(6), np.empty(6)
     leg_system(T, base, platform, lengths, J)
-    cost, damping, pinned = _gaps(wanted, lengths, gap), 1e-4, 3 if is_pinned else 0
+    cost, damping = _gaps(wanted, lengths, gap), 1e-4
     for _ in range(_ITERATIONS):
         if cost <= 1e-29 * size * size or damping > 1e8:
             break
-        J[:, :pinned] = 0.0
+        if is_pinned:
+            _pin(J)
         _damped_move(J, gap, damping, size, move)
         moved(T, move, trial)
         leg_system(trial, base, platform, lengths, trial_J)
@@ -140,11 +158,19 @@ def direct(
             damping = max(10.0 * damping, 1e-12)
             continue
         gained = cost - trial_cost
-        T[:], J[:] = trial, trial_J
+        _copy(trial, T)
+        _copy(trial_J, J)
         cost, damping = _gaps(wanted, lengths, gap), 0.05 * damping
         if gained <= 1e-14 * cost:
             break
-    return float(np.abs(gap).max())
+    return _largest(gap)
+
+
+@kernel
+def _identity(A: Array) -> None:
+    for i in range(A.shape[0]):
+        for j in range(A.shape[0]):
+            A[i, j] = 1.0 if i == j else 0.0
 
 
 @kernel
@@ -154,7 +180,7 @@ def invert(A: Array, inverse: Array) -> float:
     Partial pivoting; a pivot of nothing counts as 1e-12, so that the result stays finite.
     """
     n, sign = A.shape[0], 1.0
-    inverse[:] = np.eye(n)
+    _identity(inverse)
     for k in range(n):
         best = k
         for i in range(k + 1, n):
