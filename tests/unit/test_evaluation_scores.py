@@ -28,7 +28,7 @@ from teleop_core.errors import EvaluationError, RecordingError
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.metrics import evaluate, study
 from teleop_core.evaluation.page import report_page
-from teleop_core.evaluation.score import KEYS
+from teleop_core.evaluation.score import KEYS, key_table
 from teleop_core.evaluation.streams import STAGES
 from teleop_core.evaluation.table import score_tables
 from teleop_core.evaluation.windows import WINDOW_NS, DisorderError, windows
@@ -344,6 +344,12 @@ def test_json_has_exactly_the_documented_keys(recipe, path):
         assert any(p.fullmatch(leaf) for p in patterns), f"{leaf} is not documented"
     for key, p in zip(KEYS, patterns, strict=True):
         assert any(p.fullmatch(leaf) for leaf in found), f"{key.path} does not occur"
+
+
+def test_documentation_of_the_keys_is_a_table_with_all_of_them():
+    lines = key_table().splitlines()
+    assert len(lines) == len(KEYS) + 2
+    assert {line.count("|") for line in lines} == {4}
 
 
 def leaves(tree, before=""):

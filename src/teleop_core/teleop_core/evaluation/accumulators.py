@@ -112,7 +112,7 @@ class Distribution:
     def histogram(self, width_us: int) -> tuple[Array, Array]:
         """Share of the durations per bin, for drawing.
 
-        Bins reach to the 99.9th percentile; what is longer counts as the last one.
+        Bins reach to the 99th percentile; what is longer counts as the last one.
 
         Args:
             width_us: Width of each bin, [µs].
@@ -120,7 +120,7 @@ class Distribution:
         Returns:
             Middles of the bins, shape (n,), [ms]; shares in per cent, shape (n,).
         """
-        low, high = int(self.values_us[0]), self.quantile_us(0.999)
+        low, high = int(self.values_us[0]), self.quantile_us(0.99)
         assert high is not None
         at = np.minimum(self.values_us - low, high - low) // width_us
         shares: Any = np.bincount(at, self.counts) * (100.0 / self.count)

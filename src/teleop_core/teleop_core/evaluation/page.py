@@ -90,7 +90,7 @@ def _header(scores: Sequence[Score]) -> str:
     return (
         "<h1>Teleoperation report</h1>\n"
         f'<p class="facts">Scores beside the published figures of the RCRT-1 ({escape(SOURCE)}), '
-        "which were taken against the filtered reference too.</p>\n"
+        "presumably taken against the filtered reference too.</p>\n"
         f"<nav>{links}</nav>"
     )
 

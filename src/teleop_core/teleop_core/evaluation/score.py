@@ -57,9 +57,17 @@ KEYS = (
     Key("ticks.executed|late|missed", "", "control ticks of the slave; late is null if uncounted"),
     Key("nodes.<node>.<name>", "", "counts that the nodes reported last on diagnostics"),
     Key("topics.<name>.count", "", "messages"),
-    Key("topics.<name>.gaps", "", "messages missing by their stamps; null if not a stream"),
+    Key("topics.<name>.gaps", "",
+        "messages missing by their stamps, lost or passed over by a stage that takes only the "
+        "newest; null if not a stream"),
 )  # fmt: skip
 """Every key of the JSON, in its order. Numbers are finite; null stands for not applicable."""
+
+
+def key_table() -> str:
+    """The keys as a Markdown table, for documents."""
+    rows = (f"| `{key.path.replace('|', ', ')}` | {key.unit} | {key.meaning} |" for key in KEYS)
+    return "\n".join(("| key | unit | meaning |", "|---|---|---|", *rows))
 
 
 @dataclass(frozen=True)

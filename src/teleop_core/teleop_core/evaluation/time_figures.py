@@ -175,7 +175,8 @@ def latency(study: Study) -> Figure | None:
     total = study.score.latency_ms["total"]
     sentence = (
         f"From the sample of the hand to the slave's setpoint: {number(total.median)} ms median, "
-        f"{number(total.p99)} ms for 99 of 100. Other lines: what each stage adds."
+        f"{number(total.p99)} ms for 99 of 100. Other lines: what each stage adds. "
+        "The last step of a line holds all that took longer."
     )
     layout = {
         "xaxis": {"title": {"text": "delay [ms]"}},
@@ -186,5 +187,5 @@ def latency(study: Study) -> Figure | None:
 
 def _bin_width(delays: list[Distribution]) -> int:
     """Width of bins [µs] that is the same for all, so that their heights compare."""
-    spans = [(delay.quantile_us(0.999) or 0) - int(delay.values_us[0]) for delay in delays]
+    spans = [(delay.quantile_us(0.99) or 0) - int(delay.values_us[0]) for delay in delays]
     return max(1, -(-max(spans) // _BINS))
