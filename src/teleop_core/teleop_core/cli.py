@@ -75,6 +75,9 @@ def _add_sim(commands: Any) -> None:
 def _add_live(commands: Any) -> None:
     live = _command(commands, "live", _live, "run and record a session as ROS 2 nodes")
     _session_arguments(live)
+    live.add_argument(
+        "--composed", action="store_true", help="all nodes in one process: the fastest session"
+    )
 
 
 def _add_replay(commands: Any) -> None:
@@ -205,7 +208,8 @@ def _live(arguments: argparse.Namespace) -> int:
     from teleop_core.session.configuration import configure
 
     configuration = configure(arguments.scenario, arguments.config, _settings(arguments))
-    _ros("live").live(configuration, arguments.out, Console())
+    composed = arguments.composed
+    _ros("live").live(configuration, arguments.out, Console(), is_composed=composed)
     print(f"{arguments.out}: recorded; next: teleop evaluate {arguments.out}")
     return 0
 

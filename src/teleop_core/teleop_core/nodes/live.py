@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +24,24 @@ START_TIMEOUT = 180.0
 SILENCE = 10.0
 """A node that has not reported for this long hangs [s]."""
 RECORDER = "recorder"
-_OTHERS = tuple(stage.name for stage in STAGES if stage.name != RECORDER)
+_NODES = tuple(stage.name for stage in STAGES)
+_OTHERS = tuple(name for name in _NODES if name != RECORDER)
+Crew = dict[str, tuple[str, ...]]
+"""Processes that are started together, each with its nodes."""
+_ONE_EACH: tuple[Crew, ...] = ({RECORDER: (RECORDER,)}, {name: (name,) for name in _OTHERS})
+_ALL_IN_ONE: Crew = {"teleop_session": _NODES}
 
 
-def live(configuration: Configuration, out: Path, console: Console) -> None:
+def live(
+    configuration: Configuration, out: Path, console: Console, *, is_composed: bool = False
+) -> None:
     """Run and record a session as ROS 2 nodes, for the configured duration or until Ctrl-C.
 
     Args:
         configuration: What runs, and for how long.
         out: Directory of the recording, made here.
         console: Where the progress is shown.
+        is_composed: Whether all nodes share one process, in place of one each.
 
     Raises:
         RecordingError: The directory exists.
@@ -47,6 +56,7 @@ def live(configuration: Configuration, out: Path, console: Console) -> None:
         Observer(int(env["ROS_DOMAIN_ID"])) as observer,
     ):
         session = _Session(configuration, out, console, observer, Path(folder), env)
+        session.crews = (_ALL_IN_ONE,) if is_composed else _ONE_EACH
         with _terminable():
             session.run()
 
@@ -81,13 +91,14 @@ class _Session:
         self._parameters = folder / "parameters.yaml"
         self._parameters.write_text(parameter_file(configuration, str(out)))
         self._children: dict[str, Child] = {}
+        self.crews = _ONE_EACH
 
     def run(self) -> None:
         """Start, watch and stop all nodes; the recorder comes first and goes last."""
         is_begun = False
         try:
-            self._start((RECORDER,))
-            self._start(_OTHERS)
+            for crew in self.crews:
+                self._start(crew)
             is_begun = True
             self._watch()
         except KeyboardInterrupt:
@@ -97,22 +108,21 @@ class _Session:
         finally:
             self._stop()
 
-    def _start(self, names: tuple[str, ...]) -> None:
-        for name in names:
-            child = Child(name, self._parameters, self._folder, self._env)
-            self._children[name] = child
+    def _start(self, crew: Crew) -> None:
+        for name in crew:
+            self._children[name] = Child(name, self._parameters, self._folder, self._env)
         deadline = time.monotonic() + START_TIMEOUT
-        waiting = list(names)
+        waiting = [node for nodes in crew.values() for node in nodes]
+        home = {node: name for name, nodes in crew.items() for node in nodes}
         while waiting:
             self._observer.listen(0.1)
             self._check()
             for name in [name for name in waiting if self._observer.is_active(name)]:
                 waiting.remove(name)
-                ready = len(self._children) - len(waiting)
-                self._say(f"{name} is ready ({ready} of {len(STAGES)})")
+                self._say(f"{name} is ready")
             if waiting and time.monotonic() > deadline:
-                child = self._children[waiting[0]]
-                reason = f"{child.name} was not ready within {START_TIMEOUT:g} s"
+                child = self._children[home[waiting[0]]]
+                reason = f"{waiting[0]} was not ready within {START_TIMEOUT:g} s"
                 raise SessionError(reason + child.last_words())
 
     def _watch(self) -> None:
@@ -126,8 +136,14 @@ class _Session:
                 self._say(f"{shown:3d}/{self._duration:g} s  {self._line()}")
 
     def _check(self) -> None:
-        for name, child in self._children.items():
-            child.check()
+        for crew in self.crews:
+            for name in [name for name in crew if name in self._children]:
+                child = self._children[name]
+                child.check()
+                self._check_reports(child, crew[name])
+
+    def _check_reports(self, child: Child, nodes: tuple[str, ...]) -> None:
+        for name in nodes:
             status = self._observer.statuses.get(name)
             silence = time.monotonic() - status.arrival if status else 0.0
             if silence > SILENCE:
@@ -172,6 +188,10 @@ def parameter_file(configuration: Configuration, out: str) -> str:
     """Parameters of all nodes as a ROS 2 parameter file; ``out`` is that of the recorder."""
     text = configuration.text()
     content: dict[str, Any] = yaml.safe_load(text)
+    shared = content.pop("teleop")["ros__parameters"]
+    for node in content.values():
+        wanted = {k: v for k, v in shared.items() if k.startswith("real_time.")}
+        node["ros__parameters"] |= deepcopy(wanted)  # rcl cannot read YAML's aliases
     recorder = content[RECORDER]["ros__parameters"]
     recorder["out"], recorder["configuration"] = out, text
     recorder["scenario"] = configuration.scenario
