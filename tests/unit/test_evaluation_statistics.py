@@ -285,6 +285,12 @@ def test_without_a_gain_nothing_is_compared(gain):
     assert published_for(gain) is None
 
 
+def test_another_robot_is_not_held_against_the_published_figures():
+    assert published_for(1.0, "puma560") is None
+    assert published_for(1.0, "rcrt1") is COARSE
+    assert published_for(1.0, None) is COARSE
+
+
 # -- drawing ---------------------------------------------------------------------------------------
 
 

@@ -113,7 +113,7 @@ def _section(anchor: str, study: Study, plots: list[Figure], places: list[str]) 
 def _table(scores: Sequence[Score]) -> str:
     heads, kinds = "", ""
     for score in scores:
-        mode = published_for(score.session.gain)
+        mode = published_for(score.session.gain, score.session.robot)
         text = escape(score.session.name)
         heads += f'<th colspan="2">{text}</th>'
         kinds += "<th><small>measured</small></th>"

@@ -28,8 +28,13 @@ ORIENTATION_MAX_DEG = 0.9
 """What the source claims for every angle in both modes [deg] (chapter 8)."""
 
 
-def published_for(gain: float | None) -> Published | None:
-    """Figures of the mode whose gain is nearer, on a scale of ratios; None without a gain."""
-    if gain is None or not gain > 0.0:
+def published_for(gain: float | None, robot: str | None = "rcrt1") -> Published | None:
+    """Figures of the mode whose gain is nearer, on a scale of ratios.
+
+    Returns:
+        None without a gain, and for another robot than the one they are of; a recording that
+        does not name its robot (None) may be of it.
+    """
+    if gain is None or not gain > 0.0 or robot not in {"rcrt1", None}:
         return None
     return min((COARSE, FINE), key=lambda mode: abs(math.log(gain / mode.gain)))

@@ -28,7 +28,7 @@ class Row:
 
 def summary(score: Score) -> list[Row]:
     """Rows of a score; the same labels for every score, in the same order."""
-    mode = published_for(score.session.gain)
+    mode = published_for(score.session.gain, score.session.robot)
     return [
         *_errors(score, mode),
         *_command(score),

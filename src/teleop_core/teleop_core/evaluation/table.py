@@ -47,7 +47,7 @@ def score_table(scores: Sequence[Score]) -> Table:
 def heading(session: Session) -> str:
     """Name of a recording and what it was, in three lines."""
     gain = "" if session.gain is None else f"gain {session.gain:g}, "
-    mode = published_for(session.gain)
+    mode = published_for(session.gain, session.robot)
     seed = "" if session.seed is None else f", seed {session.seed}"
     return "\n".join(
         (session.title, f"{gain}{session.duration_s:.3g} s", f"{session.robot or 'unknown'}{seed}")
