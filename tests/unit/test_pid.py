@@ -1,0 +1,152 @@
+"""PID: poles where they are claimed, no windup, no kick beyond what the drive can move."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from teleop_core.robots.rcrt1_dynamics import DRIVES
+from teleop_core.slave.pid import critically_damped_gains, pid_step
+
+DT = 1e-3
+GAINS = np.stack(critically_damped_gains(DRIVES.inertia, DRIVES.viscous, DRIVES.bandwidth), axis=1)
+AXES = range(6)
+
+
+def run(errors, gains=(2.0, 0.0, 0.0), limit=math.inf, memory=None, feedforward=0.0):
+    """Efforts for a sequence of errors, and the memory after it."""
+    memory = np.array([0.0, errors[0], 0.0]) if memory is None else memory
+    row = np.array(gains, dtype=float)
+    return np.array([pid_step(e, row, memory, feedforward, limit, DT) for e in errors]), memory
+
+
+def loop_matrix(axis):
+    """One tick of an axis under its PID, linear: states q, dq, integral, last error, error rate."""
+    inertia, viscous = DRIVES.inertia[axis], DRIVES.viscous[axis]
+    plant = np.array([[0, 1, 0], [0, -viscous / inertia, 1 / inertia], [0, 0, 0]])
+    one_tick = expm(plant * DT)
+
+    def tick(state):
+        memory = state[2:].copy()
+        effort = pid_step(-state[0], GAINS[axis], memory, 0.0, math.inf, DT)
+        moved = one_tick @ np.array([state[0], state[1], effort])
+        return np.array([moved[0], moved[1], *memory])
+
+    return np.stack([tick(unit) for unit in np.eye(5)], axis=1)
+
+
+@given(st.floats(1e-4, 50.0), st.floats(0.0, 1.0), st.floats(1.0, 300.0))
+def test_gains_put_three_poles_at_the_bandwidth(inertia, friction_share, bandwidth):
+    viscous = friction_share * 3.0 * inertia * bandwidth
+    kp, ki, kd = critically_damped_gains(
+        np.array([inertia]), np.array([viscous]), np.array([bandwidth])
+    )
+    polynomial = np.array([inertia, (viscous + kd)[0], kp[0], ki[0]])
+    wanted = inertia * np.poly([-bandwidth] * 3)
+    assert np.allclose(polynomial, wanted, rtol=1e-12, atol=0)
+
+
+def test_friction_that_damps_more_than_wanted_leaves_no_derivative_gain():
+    _, _, kd = critically_damped_gains(np.array([1.0]), np.array([100.0]), np.array([10.0]))
+    assert kd[0] == 0.0
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_sampled_loop_of_every_axis_is_stable_and_well_damped(axis):
+    poles = np.linalg.eigvals(loop_matrix(axis))
+    poles = np.log(poles[np.abs(poles) > 1e-6].astype(complex)) / DT
+    slow = poles[np.abs(poles) < 2.0 * DRIVES.bandwidth[axis]]
+    # The tick and the rate filter delay by 2 ms, an eighth of the pole's time constant: the
+    # triple pole splits and its slow pair comes to two thirds of the bandwidth.
+    assert len(slow) >= 2
+    assert poles.real.max() < -0.6 * DRIVES.bandwidth[axis]
+    damping = -slow.real / np.abs(slow)
+    assert damping.min() > 0.9
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_axis_returns_from_a_displacement_without_swinging(axis):
+    state, trace, matrix = np.array([1.0, 0, 0, -1.0, 0]), [], loop_matrix(axis)
+    for _ in range(1000):
+        state = matrix @ state
+        trace.append(state[0])
+    # The integral of a step of load must pay back: one swing through zero, and only one.
+    assert np.count_nonzero(np.diff(np.sign(np.array(trace)[np.abs(trace) > 1e-3]))) == 1
+    assert abs(trace[-1]) < 1e-9
+
+
+def test_proportional_part_is_immediate():
+    efforts, _ = run([0.5, -0.25])
+    assert np.array_equal(efforts, (1.0, -0.5))
+
+
+def test_integral_part_sums_the_error_over_time():
+    efforts, memory = run([0.5] * 1000, gains=(0.0, 2.0, 0.0))
+    assert math.isclose(efforts[-1], 2.0 * 0.5 * 1.0, rel_tol=1e-12)
+    assert math.isclose(memory[0], 1.0, rel_tol=1e-12)
+
+
+def test_derivative_part_reaches_the_rate_of_the_error_within_ten_ticks():
+    errors = np.arange(20) * DT * 3.0
+    efforts, _ = run(errors, gains=(0.0, 0.0, 2.0))
+    # The filter halves what is missing in every tick.
+    assert math.isclose(efforts[10], 6.0, rel_tol=2.0**-9)
+    assert (np.diff(efforts[1:]) > 0.0).all()
+
+
+def test_feedforward_is_added_before_the_limit():
+    efforts, _ = run([0.5], feedforward=3.0, limit=3.5)
+    assert efforts[0] == 3.5
+    assert run([0.5], feedforward=3.0)[0][0] == 4.0
+
+
+efforts_and_gains = st.tuples(st.floats(0.0, 1e4), st.floats(0.0, 1e5), st.floats(0.0, 1e2))
+
+
+@given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=50), efforts_and_gains)
+def test_effort_never_exceeds_the_limit(errors, gains):
+    efforts, _ = run(errors, gains, limit=5.9)
+    assert np.abs(efforts).max() <= 5.9
+
+
+@given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=300), st.sampled_from(list(AXES)))
+def test_integral_never_grows_beyond_what_the_drive_can_give(errors, axis):
+    limit, memory = DRIVES.effort_limit[axis], np.zeros(3)
+    for error in np.repeat(errors, 3):
+        pid_step(error, GAINS[axis], memory, 0.0, limit, DT)
+        # It grows only while the whole effort is inside the limit, so the other parts, of at
+        # most this size, may hold it at limit plus themselves.
+        rest = GAINS[axis, 0] * 1.0 + GAINS[axis, 2] * 2.0 / DT
+        assert abs(memory[0]) <= limit + rest + GAINS[axis, 1] * DT
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_integral_stands_still_while_a_constant_error_saturates_the_drive(axis):
+    limit = DRIVES.effort_limit[axis]
+    error = 2.0 * limit / GAINS[axis, 0]
+    _, memory = run([error] * 10_000, GAINS[axis], limit)
+    assert memory[0] == 0.0
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_drive_leaves_saturation_as_soon_as_the_error_turns(axis):
+    limit = DRIVES.effort_limit[axis]
+    error = 2.0 * limit / GAINS[axis, 0]
+    _, memory = run([error] * 10_000, GAINS[axis], limit)
+    efforts, _ = run([-error] * 3, GAINS[axis], limit, memory)
+    assert (efforts == -limit).all()
+
+
+def test_without_the_hold_the_integral_would_wind_up():
+    # What ten seconds of the same error would have left in a plain integral of axis 1.
+    error = 2.0 * DRIVES.effort_limit[0] / GAINS[0, 0]
+    assert GAINS[0, 1] * error * 10.0 > 50 * DRIVES.effort_limit[0]
+
+
+def test_integral_may_shrink_while_the_drive_is_saturated():
+    memory = np.array([100.0, -0.1, 0.0])
+    pid_step(-0.1, np.array([1.0, 50.0, 0.0]), memory, 0.0, 5.9, DT)
+    assert memory[0] < 100.0

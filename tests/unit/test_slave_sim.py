@@ -1,0 +1,460 @@
+"""Slave simulator: exact where it can be, within its limits, calm at rest, safe on bad commands."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from teleop_core.compiled import pointer
+from teleop_core.errors import ParameterError
+from teleop_core.robots import load_robot
+from teleop_core.robots.robot import ACCELERATION, independent_acceleration
+from teleop_core.signals import TICK_NS
+from teleop_core.slave.joints import integrate
+from teleop_core.slave.slave_sim import (
+    CommandStatus,
+    PidParameters,
+    ReferenceFilterParameters,
+    SlaveSim,
+    SlaveSimParameters,
+)
+
+ARM = load_robot("rcrt1")
+DRIVES = ARM.drives
+COUNT = DRIVES.encoder_step
+# Well inside the limits and off the singularities.
+MIDDLE = np.array([0.1, 1.7, 0.36, 0.2, 0.5, 0.1])
+TIMEOUT_TICKS = 100
+JOINTS = range(6)
+
+
+class Bench:
+    """A slave and the ticks that its commands come in."""
+
+    def __init__(self, **values):
+        self.slave = SlaveSim(SlaveSimParameters(**values))
+        self.row, self.now_ns = self.slave.signals, 0
+
+    def tick(self, command=None, stamp_ns=None):
+        """One tick, with a command or without; returns the status."""
+        self.now_ns += TICK_NS
+        if command is not None:
+            self.row["slave_servo_jp"] = command
+            self.row["servo_stamp_ns"] = self.now_ns if stamp_ns is None else stamp_ns
+        self.slave.step(self.now_ns)
+        return CommandStatus(self.row["command_status"])
+
+    def trace(self, command, ticks):
+        """True joints (ticks, 6) and efforts (ticks, 6) under a constant command."""
+        joints, efforts = np.empty((ticks, 6)), np.empty((ticks, 6))
+        for i in range(ticks):
+            self.tick(command)
+            joints[i], efforts[i] = self.joints, self.row["slave_measured_js"][12:]
+        return joints, efforts
+
+    def go_to(self, goal, ticks=3000):
+        start = self.row["slave_setpoint_js"].copy()
+        for share in np.linspace(0.0, 1.0, ticks - 1000):
+            self.tick(start + share * (goal - start))
+        self.trace(goal, 1000)
+
+    @property
+    def joints(self):
+        return self.slave.work[0].copy()
+
+    @property
+    def setpoint(self):
+        return self.row["slave_setpoint_js"].copy()
+
+
+# Integration.
+
+SPIN = pointer(independent_acceleration, ACCELERATION)
+
+
+def one_tick_error(rate, steps):
+    """Error of position and speed, relative to the start speed, of a joint that friction stops."""
+    q, dq = np.zeros(1), np.ones(1)
+    one, none = np.ones(1), np.zeros(1)
+    effort = np.array([0.3 * rate])
+    integrate(SPIN, one, rate * one, none, one, steps, effort, q, dq)
+    exact = expm(np.array([[0, 1, 0], [0, -rate, 1], [0, 0, 0]]) * 1e-3) @ [0.0, 1.0, effort[0]]
+    return max(abs(q[0] - exact[0]) / 1e-3, abs(dq[0] - exact[1]))
+
+
+def test_error_against_the_exact_solution_falls_with_the_fourth_power_of_the_steps():
+    errors = [one_tick_error(1000.0, steps) for steps in (1, 2, 4, 8, 16)]
+    order = np.log2(np.divide(errors[:-1], errors[1:]))
+    # Classical Runge-Kutta is of fourth order; large steps still carry the fifth.
+    assert (order > 3.8).all()
+    assert (order < 4.7).all()
+
+
+def test_default_steps_resolve_the_stiffest_friction_of_the_arm():
+    # Dry friction grows through zero speed like viscous friction of coulomb / friction_speed.
+    rates = (DRIVES.viscous + DRIVES.coulomb / DRIVES.friction_speed) / DRIVES.inertia
+    steps = SlaveSimParameters().integration_steps
+    # Fifth-order term (rate h)^5 / 120 in each step of h = 1 ms / steps: 670/s makes 7e-5.
+    bound = steps * (rates.max() * 1e-3 / steps) ** 5 / 120.0
+    assert bound < 1e-4
+    assert one_tick_error(rates.max(), steps) < bound
+
+
+def test_more_steps_change_the_path_of_the_arm_less_and_less():
+    slave, ends = SlaveSim(SlaveSimParameters()), []
+    effort = np.array([2.0, -3.0, 5.0, 0.05, 0.03, 0.02])
+    for steps in (1, 2, 4, 8):
+        q, dq = MIDDLE.copy(), np.array([1.0, -1.0, 0.02, 1.0, -1.0, 1.0])
+        for _ in range(100):
+            integrate(
+                slave.pointers[1], slave.dynamics, DRIVES.viscous, DRIVES.coulomb,
+                DRIVES.friction_speed, steps, effort, q, dq,
+            )  # fmt: skip
+        ends.append(q)
+    in_counts = np.array([np.abs((b - a) / COUNT).max() for a, b in pairwise(ends)])
+    # Where joints turn round, dry friction is steep: there the order shows from 4 steps on only.
+    assert (in_counts[1:] < in_counts[:-1]).all()
+    assert in_counts[2] < in_counts[1] / 8.0
+    # The default of two steps is good to a tenth of what the encoders see.
+    assert in_counts[1] < 0.1
+
+
+# At rest.
+
+
+def test_arm_that_starts_at_home_in_balance_does_not_move():
+    bench = Bench()
+    joints, _ = bench.trace(ARM.home, 2000)
+    # Home is no whole number of counts; the integral settles inside one.
+    assert (np.abs(joints - ARM.home) <= COUNT).all()
+    assert np.allclose(bench.setpoint, ARM.home, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("compensation", ["published", "all", "none"])
+def test_arm_starts_in_balance_whatever_is_compensated(compensation):
+    joints, _ = Bench(gravity_compensation=compensation).trace(ARM.home, 500)
+    assert (np.abs(joints - ARM.home) <= COUNT).all()
+
+
+def test_arm_without_any_command_holds_home():
+    bench = Bench()
+    for _ in range(500):
+        bench.tick()
+    assert (np.abs(bench.joints - ARM.home) <= COUNT).all()
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_step_through_the_filter_overshoots_by_less_than_a_count(joint, sign):
+    bench, goal = Bench(), MIDDLE.copy()
+    bench.go_to(MIDDLE)
+    goal[joint] += sign * (0.004 if joint == 2 else 0.2)
+    joints, _ = bench.trace(goal, 3000)
+    beyond = sign * (joints[:, joint] - goal[joint])
+    assert beyond.max() <= COUNT[joint]
+    assert abs(joints[-1, joint] - goal[joint]) <= COUNT[joint]
+
+
+def test_gravity_is_held_to_a_count_without_any_compensation():
+    bench = Bench(gravity_compensation="none")
+    bench.go_to(MIDDLE)
+    assert (np.abs(bench.joints - MIDDLE) <= COUNT).all()
+
+
+def test_compensation_keeps_axis_2_nearer_to_a_moving_setpoint():
+    squares = {}
+    for compensation in ("none", "published"):
+        # Without friction and slowly, so that gravity is what has to be followed.
+        none = (0.0,) * 6
+        bench, square = Bench(gravity_compensation=compensation, viscous=none, coulomb=none), 0.0
+        bench.go_to(MIDDLE)
+        for k in range(2000):
+            swing = 0.5 * (1.0 - math.cos(1.5e-3 * k))
+            bench.tick(MIDDLE + np.array([0, swing, 0, 0, 0, 0]))
+            square += (bench.row["slave_measured_js"][1] - bench.setpoint[1]) ** 2
+        squares[compensation] = square
+    assert squares["published"] < 0.5 * squares["none"]
+
+
+# Limits.
+
+
+def test_command_filter_kicks_no_further_than_a_tick_at_full_speed():
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    before = bench.setpoint
+    bench.tick(MIDDLE + 0.05 * DRIVES.speed_limit)
+    # A tenth of the step passes the filter at once, cut to what the drive can move.
+    step = np.abs(bench.setpoint - before)
+    assert np.allclose(step, np.minimum(0.1 * 0.05, 1e-3) * DRIVES.speed_limit, rtol=1e-6, atol=0)
+
+
+def test_setpoint_that_starts_to_move_kicks_the_drive_no_more_than_its_speed_does():
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    rest = bench.row["slave_measured_js"][12:].copy()
+    gains = bench.slave.parameters["gains"].copy()
+    speed = np.array([0.05, 0.05, 0.002, 0.05, 0.05, 0.05])
+    efforts = []
+    for k in range(1, 20):
+        bench.tick(MIDDLE + speed * k * 1e-3)
+        efforts.append(np.abs(bench.row["slave_measured_js"][12:] - rest))
+    # Kd times the rate of the error, which is at most the reference's and a count per tick.
+    allowed = gains[:, 2] * (speed + 2.0 * COUNT / 1e-3) + gains[:, 0] * speed * 20e-3
+    assert (np.array(efforts) <= allowed + DRIVES.coulomb).all()
+
+
+bounded_joints = st.tuples(*[st.floats(-1.0, 1.0)] * 6).map(np.array)
+
+
+@given(st.lists(bounded_joints, min_size=1, max_size=10))
+@settings(max_examples=20)
+def test_drives_and_setpoint_keep_their_limits_under_any_commands(shares):
+    bench, last = Bench(), ARM.home.copy()
+    for share in shares:
+        command = bench.slave.state["command"] + 0.099 * share * DRIVES.speed_limit
+        for _ in range(50):
+            bench.tick(command)
+            setpoint, effort = bench.setpoint, bench.row["slave_measured_js"][12:]
+            assert (np.abs(effort) <= DRIVES.effort_limit).all()
+            assert (np.abs(setpoint - last) <= DRIVES.speed_limit * 1e-3 + 1e-15).all()
+            assert ((setpoint >= ARM.lower) & (setpoint <= ARM.upper)).all()
+            # Beyond its rated speed a motor gives nothing after another tenth.
+            assert (np.abs(bench.slave.work[1]) <= 1.1 * DRIVES.speed_limit).all()
+            assert np.isfinite(bench.joints).all()
+            last = setpoint
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_long_move_runs_at_the_speed_limit_and_recovers_without_windup(joint):
+    bench, goal, fastest = Bench(), MIDDLE.copy(), 0.0
+    bench.go_to(MIDDLE)
+    target = min(MIDDLE[joint] + 0.5 * DRIVES.speed_limit[joint], ARM.upper[joint] - 1e-3)
+    for _ in range(900):
+        goal[joint] = min(goal[joint] + 1e-3 * DRIVES.speed_limit[joint], target)
+        bench.tick(goal)
+        fastest = max(fastest, abs(bench.slave.work[1][joint]))
+    joints, _ = bench.trace(goal, 1500)
+    assert fastest <= 1.1 * DRIVES.speed_limit[joint]
+    assert np.abs(joints[:, joint]).max() <= target + COUNT[joint]
+    assert abs(joints[-1, joint] - target) <= COUNT[joint]
+
+
+def test_integral_stays_bounded_while_an_overload_holds_the_arm_back():
+    # A friction far above the rated torque: the setpoint goes, the arm cannot.
+    bench = Bench(coulomb=(20.0, *DRIVES.coulomb[1:]))
+    goal = ARM.home + np.array([0.2, 0, 0, 0, 0, 0])
+    bench.trace(goal, 5000)
+    integral = abs(bench.slave.work[3][0, 0])
+    assert integral <= DRIVES.effort_limit[0]
+    bench.slave.retune(SlaveSimParameters())
+    joints, _ = bench.trace(goal, 2000)
+    assert abs(joints[-1, 0] - goal[0]) <= COUNT[0]
+    # An eighth of the way at most: a tenth of a second of full torque before it brakes.
+    assert joints[:, 0].max() <= goal[0] + 0.25 * 0.2
+
+
+# Encoders.
+
+
+def test_readings_are_whole_counts_within_half_a_count_of_the_joints():
+    bench = Bench()
+    for k in range(300):
+        before = bench.joints
+        bench.tick(ARM.home - 1e-3 * k * 0.5 * DRIVES.speed_limit)
+        counts = bench.row["slave_measured_js"][:6] / COUNT
+        # Up to 5e6 counts, known to 1e-9 of one.
+        assert np.abs(counts - np.round(counts)).max() < 1e-8
+        off = np.abs(bench.row["slave_measured_js"][:6] - before)
+        assert (off <= 0.5 * COUNT * (1 + 1e-9)).all()
+
+
+def test_poses_are_those_of_setpoint_and_readings():
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    for joints, pose in (
+        (bench.setpoint, bench.row["slave_setpoint_cp"]),
+        (bench.row["slave_measured_js"][:6].copy(), bench.row["slave_measured_cp"]),
+    ):
+        assert np.allclose(ARM.fk(joints)[:3, 3], pose[:3], rtol=0, atol=1e-15)
+
+
+def test_measured_speed_follows_the_motion():
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    for k in range(500):
+        bench.tick(MIDDLE + np.array([1e-3 * k * 0.5, 0, 0, 0, 0, 0]))
+    # Encoder noise of a count per tick, filtered over 6 ticks: 3 mrad/s.
+    assert math.isclose(bench.row["slave_measured_js"][6], 0.5, abs_tol=5e-3)
+
+
+# Commands.
+
+
+def test_command_is_fresh_until_the_timeout_and_stale_after_it():
+    bench = Bench()
+    assert bench.tick(ARM.home) is CommandStatus.FRESH
+    statuses = [bench.tick() for _ in range(TIMEOUT_TICKS + 1)]
+    assert statuses == [CommandStatus.FRESH] * TIMEOUT_TICKS + [CommandStatus.STALE]
+
+
+def test_last_reference_is_held_when_commands_end():
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    goal = MIDDLE + 0.01 * DRIVES.speed_limit
+    bench.tick(goal)
+    for _ in range(3000):
+        status = bench.tick()
+    assert status is CommandStatus.STALE
+    assert np.allclose(bench.setpoint, goal, rtol=0, atol=1e-12)
+    assert (np.abs(bench.joints - goal) <= COUNT).all()
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_jump_is_refused_counted_and_not_followed(joint):
+    bench, calm = Bench(), Bench()
+    bench.go_to(MIDDLE)
+    calm.go_to(MIDDLE)
+    jump = MIDDLE.copy()
+    jump[joint] += 0.1001 * DRIVES.speed_limit[joint]
+    assert bench.tick(jump) is CommandStatus.REFUSED
+    assert bench.slave.refused == 1
+    calm.tick()
+    assert np.array_equal(bench.setpoint, calm.setpoint)
+    assert np.array_equal(bench.joints, calm.joints)
+
+
+def test_largest_step_that_is_no_jump_is_followed():
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    assert bench.tick(MIDDLE + 0.0999 * DRIVES.speed_limit) is CommandStatus.FRESH
+
+
+def test_slave_resumes_when_the_command_comes_back_near():
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    for _ in range(300):
+        bench.tick(MIDDLE + 0.5 * DRIVES.speed_limit)
+    near = MIDDLE + 0.01 * DRIVES.speed_limit
+    assert bench.tick(near) is CommandStatus.FRESH
+    bench.trace(near, 2000)
+    assert (np.abs(bench.joints - near) <= COUNT).all()
+
+
+def test_refused_commands_do_not_count_as_fresh_ones():
+    bench = Bench()
+    bench.tick(ARM.home)
+    far = ARM.home - 0.5 * DRIVES.speed_limit
+    statuses = {bench.tick(far) for _ in range(TIMEOUT_TICKS + 10)}
+    assert statuses == {CommandStatus.REFUSED}
+    assert bench.tick() is CommandStatus.STALE
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300])
+@pytest.mark.parametrize("joint", JOINTS)
+def test_command_that_is_no_number_is_refused_and_harms_nothing(joint, bad):
+    bench = Bench()
+    bench.tick(ARM.home)
+    command = ARM.home.copy()
+    command[joint] = bad
+    assert bench.tick(command) is CommandStatus.REFUSED
+    assert bench.slave.refused == 1
+    joints, efforts = bench.trace(ARM.home, 200)
+    assert (np.abs(joints - ARM.home) <= COUNT).all()
+    assert np.isfinite(efforts).all()
+
+
+def test_old_stamps_are_not_taken_again():
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    bench.tick(MIDDLE + 0.05 * DRIVES.speed_limit, stamp_ns=bench.now_ns - 10 * TICK_NS)
+    assert np.array_equal(bench.slave.state["command"], MIDDLE)
+
+
+def test_command_outside_the_limits_is_followed_up_to_them():
+    bench = Bench()
+    bench.tick(ARM.home + np.array([0, 0, 1e-3, 0, 0, 0]))
+    assert bench.slave.state["command"][2] == ARM.upper[2]
+
+
+def test_stamp_of_the_command_in_force_is_passed_on():
+    bench = Bench()
+    bench.tick(ARM.home, stamp_ns=1234)
+    assert bench.row["setpoint_stamp_ns"] == 1234
+    bench.tick(ARM.home + DRIVES.speed_limit, stamp_ns=5678)
+    assert bench.row["setpoint_stamp_ns"] == 1234
+
+
+# Repeating and retuning.
+
+
+def wander(bench, ticks=800):
+    out = []
+    for k in range(ticks):
+        swing = np.sin(1e-3 * k * np.array([2, 3, 1, 5, 4, 6]))
+        bench.tick(ARM.home - 0.02 * DRIVES.speed_limit * (1.0 + swing) * min(1.0, k / 400))
+        out.append(bench.row.copy())
+    return np.array(out)
+
+
+def test_same_commands_give_the_same_bits():
+    assert np.array_equal(wander(Bench()), wander(Bench()))
+
+
+def test_reset_repeats_the_motion_to_the_bit():
+    bench = Bench()
+    first = wander(bench)
+    bench.slave.reset()
+    bench.now_ns = 0
+    bench.row["servo_stamp_ns"] = bench.row["stamp_ns"] = 0
+    second = wander(bench)
+    for name in ("slave_setpoint_js", "slave_measured_js", "slave_measured_cp"):
+        assert np.array_equal(first[name], second[name]), name
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"gravity_compensation": "none"},
+        {"gravity_compensation": "all"},
+        {"viscous": tuple(2.0 * DRIVES.viscous)},
+        {"pid": PidParameters(bandwidth=tuple(0.8 * DRIVES.bandwidth))},
+        {"reference_filter": ReferenceFilterParameters(is_on=False)},
+        {"integration_steps": 8},
+    ],
+)
+def test_retuning_at_rest_moves_the_arm_by_a_few_counts_at_most(values):
+    bench = Bench()
+    bench.go_to(MIDDLE)
+    bench.slave.retune(SlaveSimParameters(**values))
+    joints, _ = bench.trace(MIDDLE, 1000)
+    # Friction and gravity stay held by what holds them; sixteen counts are 0.1 mm at the tip.
+    assert (np.abs(joints - MIDDLE) <= 16 * COUNT).all()
+
+
+@pytest.mark.parametrize("length", [1, 5, 7])
+@pytest.mark.parametrize("name", ["viscous", "coulomb"])
+def test_list_of_another_length_than_the_joints_is_refused(name, length):
+    with pytest.raises(ParameterError) as error:
+        SlaveSim(SlaveSimParameters(**{name: (1.0,) * length}))
+    assert error.value.name == f"slave_sim.{name}"
+
+
+@pytest.mark.parametrize("name", ["bandwidth", "kp", "ki", "kd"])
+def test_gains_of_another_length_than_the_joints_are_refused(name):
+    with pytest.raises(ParameterError) as error:
+        SlaveSim(SlaveSimParameters(pid=PidParameters(**{name: (1.0,) * 5})))
+    assert error.value.name == f"slave_sim.pid.{name}"
+
+
+def test_refused_retuning_changes_nothing():
+    bench = Bench()
+    before = bench.slave.parameters.copy()
+    wrong = SlaveSimParameters(viscous=(1.0,) * 6, pid=PidParameters(kp=(1.0,) * 5))
+    with pytest.raises(ParameterError):
+        bench.slave.retune(wrong)
+    assert bench.slave.parameters == before
