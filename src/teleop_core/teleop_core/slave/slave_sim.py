@@ -111,7 +111,8 @@ def _take_command(p: Any, s: Any, row: Any) -> int:
         s.seen_ns = stamp
         far = p.timeout_ns * 1e-9
         for i in range(s.command.shape[0]):
-            if abs(row.slave_servo_jp[i] - s.command[i]) > p.speed_limit[i] * far:
+            near = abs(row.slave_servo_jp[i] - s.command[i]) <= p.speed_limit[i] * far
+            if not near:  # NaN is not near either
                 s.refused += 1
                 return 2
         for i in range(s.command.shape[0]):
@@ -246,23 +247,28 @@ class SlaveSim:
         pose_from_transform(transform, row["slave_setpoint_cp"])
 
     def retune(self, parameters: SlaveSimParameters) -> None:
-        """Take new parameters from the next tick on.
+        """Take new parameters from the next tick on; the integrators keep the arm in balance.
 
         Raises:
-            ParameterError: A list has another length than the robot has joints.
+            ParameterError: A list has another length than the robot has joints; nothing changed.
         """
         robot, p, drives = self.robot, self.parameters, self.robot.drives
         assert drives is not None
         assert robot.dynamics is not None
+        viscous = _per_joint(robot, "viscous", parameters.viscous, drives.viscous)
+        coulomb = _per_joint(robot, "coulomb", parameters.coulomb, drives.coulomb)
+        p["gains"] = self._gains(parameters.pid, viscous)
+        p["viscous"], p["coulomb"] = viscous, coulomb
         p["lower"], p["upper"] = robot.lower, robot.upper
         for name in ("effort_limit", "speed_limit", "encoder_step", "friction_speed"):
             p[name] = getattr(drives, name)
-        p["viscous"] = _per_joint(robot, "viscous", parameters.viscous, drives.viscous)
-        p["coulomb"] = _per_joint(robot, "coulomb", parameters.coulomb, drives.coulomb)
-        p["compensated"] = {
+        compensated = {
             "published": robot.dynamics.compensated, "all": 1.0, "none": 0.0
         }[parameters.gravity_compensation]  # fmt: skip
-        p["gains"] = self._gains(parameters.pid, p["viscous"])
+        memory, gravity = self.work[3], self.work[4]
+        robot.dynamics.gravity(self.work[0], self.dynamics, gravity)
+        memory[:, 0] += gravity * (p["compensated"] - compensated)
+        p["compensated"] = compensated
         lag = parameters.reference_filter
         p["is_filtered"], p["filter_gain"] = lag.is_on, lag.gain
         p["filter_zero"], p["filter_pole"] = lag.zero, lag.pole
