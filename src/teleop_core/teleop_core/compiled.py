@@ -42,7 +42,7 @@ def _stamped(compiled: Any, function: Callable[..., Any]) -> Any:
 def _stamp(compiled: Any, files: frozenset[str]) -> None:
     if not isinstance(compiled._cache, NullCache):
         stats = [Path(file).stat() for file in sorted(files)]
-        stamp = (max(s.st_mtime for s in stats), sum(s.st_size for s in stats))
+        stamp = tuple((s.st_mtime, s.st_size) for s in stats)  # older files count as changed too
         compiled._cache._cache_file._source_stamp = stamp
 
 
