@@ -1,28 +1,31 @@
-"""Live: the five nodes beside a bare relay chain of the same length, in one run.
+"""Live: the nodes, apart and composed, beside bare relay chains of the same length, in one run.
 
-The chain is source -> 3 relays -> sink, PoseStamped at 1 kHz, best effort, depth 1, raw bytes
-passed on: what ROS 2 topics between Python processes cost without any work in them.
+A chain is source -> 2 relays -> sink, PoseStamped at 1 kHz: as many hops as a master's sample
+takes to the slave's command (haptic_master -> motion_scaling -> inverse_kinematics -> reader),
+without any work on the way. Seconds differ between machines and hours; the ratios count.
 """
 
 import argparse
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import psutil
 
-RELAYS = 3
-WARM_UP = 3.0
+RELAYS = 2
 
 
-def chain(seconds: float) -> dict[str, float]:
-    """Run the bare relay chain; latency [ms] and loss [%] from source to sink."""
-    start = [sys.executable, __file__, "--role"]
+def chain(seconds: float, style: str) -> dict[str, float]:
+    """Run a bare relay chain; latency [ms], loss [%] and processor share [%] of all its parts."""
+    start = [sys.executable, __file__, "--style", style, "--role"]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     relays = [
         subprocess.Popen([*start, "relay", "--position", str(i)], env=os.environ)
         for i in range(RELAYS)
@@ -30,30 +33,39 @@ def chain(seconds: float) -> dict[str, float]:
     sink = subprocess.Popen(
         [*start, "sink", "--seconds", str(seconds)], stdout=subprocess.PIPE, text=True
     )
-    source = subprocess.Popen([*start, "source", "--seconds", str(seconds + WARM_UP)])
+    others = [*relays, subprocess.Popen([*start, "source"])]
+    begin = time.monotonic()
     out, _ = sink.communicate(timeout=seconds + 60)
-    source.wait(timeout=60)
-    for relay in relays:
-        relay.terminate()
-        relay.wait(timeout=10)
-    result: dict[str, float] = json.loads(out)
-    return result
+    elapsed = time.monotonic() - begin
+    for process in others:
+        process.kill()
+        process.wait()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return {**json.loads(out), "cpu": 100.0 * used / elapsed}
 
 
-def _spin(position: int, handle: object) -> None:
-    """Listen on hop ``position`` until terminated; ``handle(publisher, bytes)`` on each message."""
+def _quality(style: str) -> Any:
+    from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+    if style == "typed":
+        return QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+    return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def _spin(position: int, style: str, handle: Any) -> None:
+    """Listen on hop ``position`` until terminated; ``handle(publisher, message)`` on each."""
     import rclpy
     from geometry_msgs.msg import PoseStamped
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-    from rclpy.qos import QoSProfile, ReliabilityPolicy
 
     rclpy.init()
-    node = rclpy.create_node(f"hop{position}")
-    qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    node, qos = rclpy.create_node(f"hop{position}"), _quality(style)
     publisher = node.create_publisher(PoseStamped, f"hop{position + 1}", qos)
     node.create_subscription(
-        PoseStamped, f"hop{position}", lambda data: handle(publisher, data), qos, raw=True
-    )
+        PoseStamped, f"hop{position}", lambda data: handle(publisher, data), qos,
+        raw=style == "raw",
+    )  # fmt: skip
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
@@ -63,103 +75,162 @@ def _spin(position: int, handle: object) -> None:
         pass
 
 
-def relay(position: int) -> None:
-    """Pass bytes on."""
-    _spin(position, lambda publisher, data: publisher.publish(data))
+def relay(position: int, style: str) -> None:
+    """Pass messages on."""
+    _spin(position, style, lambda publisher, message: publisher.publish(message))
 
 
-def sink(seconds: float) -> None:
+def sink(seconds: float, style: str) -> None:
     """Collect delays of the last hop for some seconds and print them as JSON."""
     delays, stamps = [], []
 
-    def handle(_: object, data: bytes) -> None:
+    def handle(_: object, message: Any) -> None:
         now = time.time_ns()
-        second, nanosecond = np.frombuffer(data, "<u4", 2, 4)
-        stamps.append(int(second) * 10**9 + int(nanosecond))
+        if style == "raw":
+            second, nanosecond = map(int, np.frombuffer(message, "<u4", 2, 4))
+        else:
+            second, nanosecond = message.header.stamp.sec, message.header.stamp.nanosec
+        stamps.append(second * 10**9 + nanosecond)
         delays.append((now - stamps[-1]) * 1e-6)
         handle.is_done = (stamps[-1] - stamps[0]) * 1e-9 > seconds  # type: ignore[attr-defined]
 
-    _spin(RELAYS, handle)
+    _spin(RELAYS, style, handle)
     expected = (stamps[-1] - stamps[0]) * 1e-6 + 1
     print(
         json.dumps(
             {
                 "median": float(np.median(delays)),
                 "p99": float(np.percentile(delays, 99)),
-                "lost_percent": 100.0 * (1.0 - len(delays) / expected),
+                "lost": 100.0 * (1.0 - len(delays) / expected),
             }
         )
     )
 
 
-def source(seconds: float) -> None:
-    """Publish stamped poses at 1 kHz with absolute deadlines."""
+def source(style: str) -> None:
+    """Publish stamped poses at 1 kHz with absolute deadlines until terminated."""
     import rclpy
     from geometry_msgs.msg import PoseStamped
-    from rclpy.qos import QoSProfile, ReliabilityPolicy
 
     rclpy.init()
     node = rclpy.create_node("source")
-    qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-    publisher, message = node.create_publisher(PoseStamped, "hop0", qos), PoseStamped()
+    publisher = node.create_publisher(PoseStamped, "hop0", _quality(style))
+    message = PoseStamped()
     message.header.frame_id = "base"
     due = time.perf_counter()
-    while seconds > 0:
-        now = time.time_ns()
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, 10**9)
-        publisher.publish(message)
-        seconds -= 1e-3
+    epoch = time.time() - due
+    while True:
         due += 1e-3
         time.sleep(max(0.0, due - time.perf_counter()))
+        # The stamp is when the sample was due, as the master's is: a late wake-up counts.
+        stamp = round((epoch + due) * 1e9)
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+        publisher.publish(message)
 
 
-def live(seconds: float) -> dict[str, object]:
-    """Run the five nodes for some seconds and score the recording."""
+def live(seconds: float, *options: str) -> dict[str, float]:
+    """Run a live session for some seconds; the same numbers from its recording."""
     with tempfile.TemporaryDirectory() as folder:
-        bag, scores = Path(folder) / "bag", Path(folder) / "scores.json"
-        teleop = [sys.executable, "-m", "teleop_core.cli"]
-        arguments = ["--scenario", "coarse_box", "--duration", str(seconds), "--out", str(bag)]
-        subprocess.run([*teleop, "live", *arguments], check=True, stdout=subprocess.DEVNULL)
-        subprocess.run(
-            [*teleop, "evaluate", str(bag), "--json", str(scores)],
-            check=True, stdout=subprocess.DEVNULL,
-        )  # fmt: skip
-        result: dict[str, object] = json.loads(scores.read_text())
-        return result
+        bag = Path(folder) / "bag"
+        command = [sys.executable, "-u", "-m", "teleop_core.cli", "live", "--scenario"]
+        command += ["coarse_box", "--duration", str(seconds), "--out", str(bag), *options]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            cpu = _watch(process)
+        if process.returncode:
+            raise SystemExit("teleop live failed")
+        return {**_score(bag), "cpu": cpu}
 
 
-def busy(seconds: float) -> float:
-    """Lateness [ms], 99th percentile, of a bare sleep loop: what the machine itself can do."""
+def _watch(process: "subprocess.Popen[str]") -> float:
+    """Processor share [%] of the nodes, from the first status line to the last."""
+    samples = []
+    assert process.stdout is not None
+    for line in process.stdout:
+        if " Hz" in line:
+            nodes = psutil.Process(process.pid).children(recursive=True)
+            used = sum(sum(node.cpu_times()[:2]) for node in nodes)
+            samples.append((time.monotonic(), used))
+    (begin, first), (end, last) = samples[0], samples[-1]
+    return 100.0 * (last - first) / (end - begin)
+
+
+def _score(bag: Path) -> dict[str, float]:
+    """Delay of commands [ms], samples lost [%] and steps of the slave from a recording."""
+    from teleop_core.bags.reader import Bag
+
+    names = ("master/measured_cp", "slave/servo_jp", "slave/measured_js")
+    master, command, slave = (Bag(bag).read_many(names)[name] for name in names)
+    # Start-up is not what is measured: the nodes come up one after the other.
+    is_steady = command.stamp_ns > command.stamp_ns[0] + 2 * 10**9
+    delay = (command.log_ns - command.stamp_ns)[is_steady] * 1e-6
+    sent = (master.stamp_ns >= command.stamp_ns[is_steady][0]).sum()
+    steps = slave.stamp_ns[slave.stamp_ns > slave.stamp_ns[0] + 2 * 10**9]
+    span = (steps[-1] - steps[0]) * 1e-9
+    return {
+        "median": float(np.median(delay)), "p99": float(np.percentile(delay, 99)),
+        "lost": 100.0 * (1.0 - is_steady.sum() / sent), "steps": (len(steps) - 1) / span,
+    }  # fmt: skip
+
+
+def lateness(seconds: float) -> dict[str, float]:
+    """Lateness [ms] of a bare sleep loop with absolute deadlines: what the machine can do."""
     late, due = [], time.perf_counter()
     for _ in range(round(seconds * 1e3)):
         due += 1e-3
         time.sleep(max(0.0, due - time.perf_counter()))
         late.append((time.perf_counter() - due) * 1e3)
-    return float(np.percentile(late, 99))
+    return {"median": float(np.median(late)), "p99": float(np.percentile(late, 99))}
+
+
+def compare(seconds: float) -> None:
+    """Print everything side by side, as ratios to the raw relay chain too."""
+    print(f"\nlive, {seconds:g} s each, one after the other: master sample -> slave command")
+    print(f"{'':44}{'median':>9}{'p99':>9}{'lost':>8}{'CPU':>7}{'steps':>9}{'ratio':>14}")
+    print(f"{'':44}{'ms':>9}{'ms':>9}{'%':>8}{'%':>7}{'1/s':>9}{'median, p99':>14}")
+    raw: dict[str, float] = {}
+    spin = "while True: pass"
+    for name, run in (
+        ("bare sleep loop, lateness", lambda: lateness(min(seconds, 10.0))),
+        ("bare relay chain, typed, reliable", lambda: chain(seconds, "typed")),
+        ("bare relay chain, raw, best effort", lambda: chain(seconds, "raw")),
+        ("five nodes in five processes", lambda: live(seconds)),
+        ("five nodes composed", lambda: live(seconds, "--composed")),
+        ("five nodes composed, a busy process beside", lambda: live(seconds, "--composed")),
+    ):
+        beside = subprocess.Popen([sys.executable, "-c", spin]) if "busy" in name else None
+        found = run()
+        if beside is not None:
+            beside.kill()
+            beside.wait()
+        raw = found if "raw" in name else raw
+        columns = [f"{found['median']:9.3f}{found['p99']:9.3f}"]
+        for key, width, digits in (("lost", 8, 2), ("cpu", 7, 0), ("steps", 9, 2)):
+            columns.append(f"{found[key]:{width}.{digits}f}" if key in found else " " * width)
+        if raw:
+            ratios = found["median"] / raw["median"], found["p99"] / raw["p99"]
+            columns.append("{:8.2f}{:6.2f}".format(*ratios))
+        print(f"{name:44}{''.join(columns)}", flush=True)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--seconds", type=float, default=60.0, help="length of each part")
     parser.add_argument("--role", choices=("relay", "sink", "source"), help=argparse.SUPPRESS)
     parser.add_argument("--position", type=int, default=0, help=argparse.SUPPRESS)
+    parser.add_argument("--style", choices=("raw", "typed"), help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    roles = {
-        "relay": lambda: relay(arguments.position),
-        "sink": lambda: sink(arguments.seconds),
-        "source": lambda: source(arguments.seconds),
-    }
-    if arguments.role:
-        roles[arguments.role]()
-        return
-    print(f"\nlive, {arguments.seconds:g} s each, one after the other")
-    print(f"  bare sleep loop, lateness p99 [ms]          {busy(3.0):8.2f}")
-    bare = chain(arguments.seconds)
-    print(f"  bare relay chain, median / p99 [ms]         {bare['median']:8.2f}{bare['p99']:8.2f}")
-    print(f"  bare relay chain, lost [%]                  {bare['lost_percent']:8.2f}")
-    print(json.dumps(live(arguments.seconds), indent=1)[:2000])
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+    os.environ.setdefault("ROS_DOMAIN_ID", "87")
+    if arguments.role == "relay":
+        relay(arguments.position, arguments.style)
+    elif arguments.role == "sink":
+        sink(arguments.seconds, arguments.style)
+    elif arguments.role == "source":
+        source(arguments.style)
+    else:
+        compare(arguments.seconds)
 
 
 if __name__ == "__main__":
-    threading.stack_size(2**20)
     main()

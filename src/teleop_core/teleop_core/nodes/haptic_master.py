@@ -45,7 +45,7 @@ class HapticMasterNode(CoreNode):
 
     def work(self, tick_ns: int) -> None:
         """Take the sample of one tick [ns, monotonic]."""
-        self._servo_cf.take()
+        self._servo_cf.newest()
         if self._servo_cf.age() > self.parameters.force_timeout:
             self._force[:] = 0.0
         with self.lock:

@@ -39,12 +39,15 @@ class InverseKinematicsNode(CoreNode):
         self.work()
 
     def work(self) -> None:
-        """Answer the pose that has come, if one has."""
-        if self._setpoint.take():
+        """Answer the poses that have come, one by one."""
+        if self._setpoint.newest():
             self._signals["setpoint_stamp_ns"] = self._setpoint.stamp_ns
-        # Without knowing where the slave is, any solution could be another branch.
-        if not self._servo_cp.take() or self._setpoint.stamp_ns is None:
-            return
+        while self._servo_cp.take():
+            # Without knowing where the slave is, any solution could be another branch.
+            if self._setpoint.stamp_ns is not None:
+                self._answer()
+
+    def _answer(self) -> None:
         stamp_ns = self._servo_cp.stamp_ns
         assert stamp_ns is not None
         self._signals["stamp_ns"] = stamp_ns

@@ -45,13 +45,16 @@ class MotionScalingNode(CoreNode):
         self.work()
 
     def work(self) -> None:
-        """Answer the sample that has come, if one has."""
-        if self._setpoint.take():
+        """Answer the samples that have come, one by one."""
+        if self._setpoint.newest():
             self._signals["setpoint_stamp_ns"] = self._setpoint.stamp_ns
-        self._buttons.take()
-        # Without knowing where the slave is, any pose could move it.
-        if not self._pose.take() or self._setpoint.stamp_ns is None:
-            return
+        while self._pose.take():
+            self._buttons.newest()
+            # Without knowing where the slave is, any pose could move it.
+            if self._setpoint.stamp_ns is not None:
+                self._answer()
+
+    def _answer(self) -> None:
         stamp_ns = self._pose.stamp_ns
         assert stamp_ns is not None
         self._signals["stamp_ns"] = stamp_ns

@@ -41,7 +41,7 @@ class SlaveSimNode(CoreNode):
 
     def work(self, ticks: Iterable[int]) -> None:
         """Take the newest command and the steps of some ticks [ns, monotonic]."""
-        if self._servo_jp.take():
+        if self._servo_jp.newest():
             self._signals["servo_stamp_ns"] = self._servo_jp.stamp_ns
         before_ns = int(self._signals["setpoint_stamp_ns"])
         for tick_ns in ticks:

@@ -26,6 +26,8 @@ from teleop_core.geometry import Array
 
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""
+_WAITING = 20
+"""Messages that wait for a late reader: a stage that answers each of them loses none by 20 ms."""
 _DEPTHS = {Quality.STREAM: 1, Quality.LATCHED: 1, Quality.REPORT: 10}
 
 
@@ -140,7 +142,7 @@ class Input:
         may_repeat: bool = False,
     ) -> None:
         self.topic, self._node = topic, node
-        self.subscription: Subscription | None = Subscription(node, topic)
+        self.subscription: Subscription | None = Subscription(node, topic, _WAITING)
         self._is_new = False
         self._joint_names, self._target, self._may_repeat = joint_names, target, may_repeat
         self._layout = layout(topic, joint_names)
@@ -149,19 +151,25 @@ class Input:
         self.arrival_ns = 0
 
     def take(self) -> bool:
-        """Write the waiting message into the signals; whether there was a sound one."""
+        """Write the next sound message that waits into the signals; whether there was one."""
         if self.subscription is None:
             is_new, self._is_new = self._is_new, False
             return is_new
-        taken = self.subscription.take()
-        if taken is None:
-            return False
-        self.received += 1
-        found = self._layout.decode_one(taken[0]) or self._read(taken[0])
-        if isinstance(found, Refusal):
-            self.refused[found] += 1
-            return False
-        return self._accept(*found)
+        while (taken := self.subscription.take()) is not None:
+            self.received += 1
+            found = self._layout.decode_one(taken[0]) or self._read(taken[0])
+            if isinstance(found, Refusal):
+                self.refused[found] += 1
+            elif self._accept(*found):
+                return True
+        return False
+
+    def newest(self) -> bool:
+        """Write the newest sound message into the signals; whether there was one."""
+        is_new = False
+        while self.take():
+            is_new = True
+        return is_new
 
     def _accept(self, stamp_ns: int, values: Values) -> bool:
         now_ns, last_ns = time.monotonic_ns(), self.stamp_ns
@@ -207,7 +215,7 @@ class Input:
         if is_inside and self.subscription is not None:
             self.close()
         elif not is_inside and self.subscription is None:
-            self.subscription = Subscription(self._node, self.topic)
+            self.subscription = Subscription(self._node, self.topic, _WAITING)
 
     def give(self, stamp_ns: int, values: Values) -> None:
         """Take a sound sample from a sender in this process."""
@@ -235,6 +243,7 @@ class Output:
         sent: Number of messages.
         inputs: Readers of the topic in this process, which get the values beside the topic.
         tap: Called with the bytes of every message, in place of a subscription in this process.
+        pending: Where messages wait for :meth:`publish` of their session; None to publish at once.
     """
 
     def __init__(self, publisher: Publisher, form: Layout, source: Array) -> None:
@@ -242,11 +251,19 @@ class Output:
         self.sent = 0
         self.inputs: list[Input] = []
         self.tap: Callable[[bytes], None] | None = None
+        self.pending: list[tuple[Output, int]] | None = None
 
     def send(self, stamp_ns: int) -> None:
-        """Publish the present values under a stamp [ns]."""
+        """Hand on the present values under a stamp [ns], inside the process first."""
         for entry in self.inputs:
             entry.give(stamp_ns, self._source)
+        if self.pending is None:
+            self.publish(stamp_ns)
+        else:
+            self.pending.append((self, stamp_ns))
+
+    def publish(self, stamp_ns: int) -> None:
+        """Publish the present values under a stamp [ns]."""
         data = self._encode(stamp_ns, self._source)
         self._publish(data)
         if self.tap is not None:

@@ -18,6 +18,7 @@ from teleop_core.nodes.process import run
 from teleop_core.nodes.rate import Schedule
 from teleop_core.nodes.recorder import RecorderNode
 from teleop_core.nodes.slave_sim import SlaveSimNode
+from teleop_core.nodes.streams import Output
 
 
 class TeleopSession:
@@ -35,6 +36,7 @@ class TeleopSession:
             node.has_own_loop = False
         self._schedule = Schedule(time.monotonic_ns, time.sleep, self._slave.options.max_catch_up)
         self._at_work: tuple[bool, ...] = ()
+        self._pending: list[tuple[Output, int]] = []
         Loop("session", self._turn, self._slave.fail, self._slave.prepare)
 
     @property
@@ -70,6 +72,10 @@ class TeleopSession:
         with slave.gate:
             if slave.is_at_work:
                 slave.work((tick_ns,))
+        # What travels furthest goes first: the slave's command before the master's sample.
+        while self._pending:
+            output, stamp_ns = self._pending.pop()
+            output.publish(stamp_ns)
 
     def _link(self) -> None:
         """Lead every stage's output to its readers in here, as far as both are at work."""
@@ -81,7 +87,7 @@ class TeleopSession:
         for topic, out in outputs.items():
             out.inputs = [entry for entry in inputs if entry.topic == topic]
             channel = self._recorder.channels.get(topic)
-            out.tap = channel.give if channel else None
+            out.tap, out.pending = channel.give if channel else None, self._pending
         for entry in inputs:
             entry.join(entry.topic in outputs)
         for topic, channel in self._recorder.channels.items():
