@@ -132,6 +132,13 @@ def test_other_operators_keep_the_published_figures_too(name, seed):
     assert rotation_error_degrees(block).max() < 0.9
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_inverse_kinematics_keeps_the_tool_within_the_published_rotation_error(seed):
+    # Home is a wrist singularity: noise of the gimbal there must not send joint 4 to its limit.
+    block = session("free_motion", f"seed={seed}", "duration=20.0")
+    assert block["ik_residual"][:, 1].max() < 0.9 * DEGREE
+
+
 def test_same_configuration_gives_the_same_session_to_the_bit():
     first, second = (session("mode_switching", "duration=5.0") for _ in range(2))
     assert first.tobytes() == second.tobytes()

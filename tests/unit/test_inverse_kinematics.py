@@ -140,6 +140,20 @@ def test_further_beside_the_singularity_the_tool_lags_and_catches_up(distance):
     assert stage.row["ik_residual"].max() < 1e-9
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_of_the_gimbal_at_home_does_not_drive_joint_4_away(seed):
+    # There the tool's direction, which joint 4 turns to, is noise alone; at its limit of 170
+    # degrees joint 4 would later keep the tool off its pose.
+    rng, stage, home = np.random.default_rng(seed), Stage(), ARM.fk(ARM.home)
+    home[:3, 3] *= 0.98
+    for angles in np.clip(1e-3 * rng.standard_normal((5000, 3)), -2e-3, 2e-3):
+        turn = rotation("x", angles[0]) @ rotation("y", angles[1]) @ rotation("z", angles[2])
+        joints = stage.step(home @ transform(turn, np.zeros(3)))
+    assert abs(joints[3]) < 0.3
+    # What it lets through instead is the noise itself.
+    assert stage.row["ik_residual"][1] < 4e-3
+
+
 def test_turn_at_the_singularity_goes_to_joint_6_alone():
     stage = Stage()
     stage.settle(ARM.fk(START))
