@@ -217,7 +217,11 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
 
 @kernel
 def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
-    """Keep a branch inside limits and steps; each wrist joint makes the best of those before."""
+    """Keep a branch inside limits and steps; each wrist joint makes the best of those before.
+
+    In a path joint 4 slows down towards the wrist singularity, where noise of the pose would
+    turn it at full speed; in line with joint 6 it rests.
+    """
     for i in range(6):
         if i == 3:
             _wrist_frame(T, q[0], q[1], M)
@@ -226,7 +230,10 @@ def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
         elif i == 5:
             c5, s5 = math.cos(q[4]), math.sin(q[4])
             q[5] = _joint6(M, math.cos(q[3]), math.sin(q[3]), c5, s5)
-        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+        step = limits[2, i]
+        if i == 3 and math.isfinite(step):
+            step *= min(1.0, math.hypot(M[0, 2], M[1, 2]) / _NEAR)
+        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], step)
 
 
 @kernel
@@ -246,7 +253,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     reached = np.empty((4, 4))  # until the end its corner holds the rotation left to the wrist
     is_reachable = _choose(T, seed, limits, geometry, reached, q)
     is_reachable = is_reachable and limits[0, 2] - 1e-9 <= q[2] <= limits[1, 2] + 1e-9
-    if not is_allowed(q, seed, limits):
+    is_slowed = abs(q[4]) < _NEAR and math.isfinite(limits[2, 3])
+    if is_slowed or not is_allowed(q, seed, limits):
         _settle(T, seed, limits, reached, q)
     fk(q, geometry, reached)
     if not pose_residual(reached, T, residual):
