@@ -242,6 +242,8 @@ def test_closing_the_loop_of_the_hand_closes_that_of_the_slave(seed):
 
 # From here on: the whole graph, with its simulated hand, inverse kinematics and slave.
 seconds = st.floats(0.0, 2.9).map(lambda t: round(t, 3))
+# Presses last 0.1 s, so they come at least 0.15 s apart.
+presses = st.lists(st.integers(0, 19).map(lambda k: round(0.15 * k, 3)), max_size=4, unique=True)
 
 
 def graph_of(seed, clutch=(), fixture=(), mode=(), **settings_):
@@ -272,7 +274,7 @@ def assert_command_moves_with_the_hand(block, first):
 @given(
     st.integers(0, 1000),
     st.lists(seconds, max_size=4, unique=True).filter(lambda t: len(t) % 2 == 0),
-    st.lists(seconds, max_size=3), st.lists(seconds, max_size=3),
+    presses, presses,
 )  # fmt: skip
 @settings(max_examples=25)
 def test_buttons_in_a_running_session_never_move_the_slave(seed, clutch, fixture, mode):
