@@ -46,10 +46,13 @@ def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT
 
 
 class Listener:
-    """What came on one topic since the test listens: stamps and values."""
+    """What came on one topic since the test listens: stamps and values.
+
+    The middleware keeps no more than 5000 messages for it; take some now and then.
+    """
 
     def __init__(self, node: Node, topic: Topic) -> None:
-        self.topic, self._subscription = topic, Subscription(node, topic, 20_000)
+        self.topic, self._subscription = topic, Subscription(node, topic, 5000)
         self._layout: Any = None
         self.stamps: list[int] = []
         self.values: list[np.ndarray] = []

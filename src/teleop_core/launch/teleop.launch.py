@@ -3,11 +3,11 @@
 import tempfile
 from pathlib import Path
 
-from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from launch import LaunchContext, LaunchDescription
 from teleop_core.nodes.live import parameter_file
 from teleop_core.session.configuration import configure
 from teleop_core.session.graph import STAGES

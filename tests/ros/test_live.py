@@ -1,0 +1,146 @@
+"""Whole live sessions, as ``teleop live`` and ``teleop play`` run them."""
+
+import io
+import os
+import signal
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import psutil
+import pytest
+from rich.console import Console
+from rosbags.highlevel import AnyReader
+
+from teleop_core.bags import topics
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.topics import STREAMS
+from teleop_core.errors import ParameterError, RecordingError, SessionError
+from teleop_core.nodes.live import live
+from teleop_core.nodes.play import play
+from teleop_core.session.configuration import configure
+from teleop_core.session.graph import STAGES
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+
+
+def quick(duration):
+    return configure(
+        "coarse_box", settings=[f"teleop.duration={duration}", "path.approach_time=1.0"]
+    )
+
+
+def console():
+    return Console(file=io.StringIO(), width=200)
+
+
+def children(name=""):
+    """Processes of nodes that this test has started."""
+    found = []
+    for process in psutil.Process().children(recursive=True):
+        line = process.cmdline() if process.is_running() else []
+        if any(part.startswith(f"teleop_core.nodes.{name}") for part in line):
+            found.append(process)
+    return found
+
+
+def test_a_live_session_is_recorded_on_every_topic(tmp_path):
+    show = console()
+    live(quick(3.0), tmp_path / "bag", show)
+    text = show.file.getvalue()
+    assert all(f"{stage.name} is ready" in text for stage in STAGES)
+    assert "slave" in text
+    assert children() == []
+    bag = Bag(tmp_path / "bag")
+    assert bag.metadata["scenario"] == "coarse_box"
+    for topic in STREAMS:
+        assert bag.topics[topic.name].count > 1000, topic.name
+    measured = bag.read(topics.SLAVE_MEASURED_JS)
+    assert (np.diff(measured.stamp_ns) > 0).all()
+    seconds = (measured.stamp_ns[-1] - measured.stamp_ns[0]) * 1e-9
+    assert seconds > 2.9
+    statuses = {report.name: report for report in bag.reports(topics.DIAGNOSTICS)}
+    assert set(statuses) == {stage.name for stage in STAGES}
+    slave = statuses["slave_sim"].values
+    assert int(slave["ticks"]) + float(slave["dropped_time_ms"]) >= len(measured) > 0
+    with AnyReader([tmp_path / "bag"]) as reader:
+        counts = {connection.topic: connection.msgcount for connection in reader.connections}
+        first = next(reader.messages())
+        assert reader.deserialize(first[2], first[0].msgtype) is not None
+    assert counts["/slave/measured_js"] == len(measured)
+
+
+def test_an_existing_directory_is_refused_before_anything_starts(tmp_path):
+    with pytest.raises(RecordingError, match="exists already") as caught:
+        live(quick(3.0), tmp_path, console())
+    assert caught.value.path == tmp_path
+    assert children() == []
+
+
+def test_a_node_that_dies_is_named_and_the_recording_is_closed(tmp_path):
+    show = console()
+
+    def kill_when_running():
+        while "1/30" not in show.file.getvalue():
+            time.sleep(0.05)
+        children("inverse_kinematics")[0].kill()
+
+    killer = threading.Thread(target=kill_when_running, daemon=True)
+    killer.start()
+    with pytest.raises(SessionError, match="inverse_kinematics ended with signal SIGKILL"):
+        live(quick(30.0), tmp_path / "bag", show)
+    killer.join()
+    assert children() == []
+    assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
+
+
+def test_a_node_that_cannot_start_is_named_with_its_reason(tmp_path):
+    wrong = configure("coarse_box", settings=["path.kind=bag", "path.bag=/no/such/bag"])
+    with pytest.raises(SessionError, match=r"(?s)haptic_master ended with exit code 2.*no/such"):
+        live(wrong, tmp_path / "bag", console())
+    assert children() == []
+
+
+def test_ctrl_c_ends_a_session_with_a_closed_recording(tmp_path):
+    show = console()
+
+    def press_when_running():
+        while "1/30" not in show.file.getvalue():
+            time.sleep(0.05)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=press_when_running, daemon=True).start()
+    live(quick(30.0), tmp_path / "bag", show)
+    assert "stopped" in show.file.getvalue()
+    assert children() == []
+    assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
+
+
+def test_play_publishes_a_recording_as_it_was(peer, recording, monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", peer.domain)
+    bag = Bag(recording)
+    pose, state = peer.listen(topics.MASTER_MEASURED_CP), peer.listen(topics.MASTER_BUTTONS)
+    began = time.monotonic()
+    names = ["master/measured_cp", "/master/buttons"]
+    with ThreadPoolExecutor() as pool:
+        playing = pool.submit(play, bag, names, 4.0, console())
+        peer.wait(lambda: (pose.take(), state.take(), playing.done())[-1], "end of the recording")
+    sent = playing.result()
+    assert time.monotonic() - began >= 12 / 4
+    series = bag.read(topics.MASTER_MEASURED_CP)
+    assert sent == 2 * len(series)
+    # Best effort may lose some on a busy machine; what came is the same.
+    assert pose.take() > 0.9 * len(series)
+    assert state.take() > 0.9 * len(series)
+    where = np.searchsorted(series.stamp_ns, pose.stamps)
+    np.testing.assert_array_equal(series.stamp_ns[where], pose.stamps)
+    np.testing.assert_array_equal(series.values[where], np.array(pose.values))
+
+
+def test_play_refuses_what_is_not_there(recording):
+    with pytest.raises(RecordingError, match="lacks no/topic"):
+        play(Bag(recording), ["no/topic"], 1.0, console())
+    with pytest.raises(ParameterError) as caught:
+        play(Bag(recording), None, 0.0, console())
+    assert caught.value.name == "--rate"

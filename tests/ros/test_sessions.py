@@ -1,0 +1,328 @@
+"""Several nodes together: safe with bad input, deaths and restarts, equal to virtual time."""
+
+import signal
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import JointState
+
+from teleop_core.bags import topics
+from teleop_core.bags.messages import write_values
+from teleop_core.robots import load_robot
+from teleop_core.robots.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
+from teleop_core.session.configuration import configure
+from teleop_core.session.graph import Graph
+from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+
+pytestmark = pytest.mark.ros
+
+ROBOT = load_robot("rcrt1")
+HOME = ROBOT.home
+MS = 1_000_000
+STILL = 3e-4  # [rad or m], a few encoder steps: what counts as not moving
+# A hand without tremor and noise that goes 20 mm away and stays there.
+STEADY = {
+    "path__kind": "hold", "path__center": [0.0, 0.0, 0.02], "path__approach_time": 2.0,
+    "path__rotation": 0.0,
+    "hand__tremor_amplitude": 0.0, "device__gimbal_noise": 0.0,
+}  # fmt: skip
+
+
+def drive(peer, topic, wanted, listener, start=0):
+    """Send a value until the slave's setpoints carry its stamp; returns that stamp."""
+    stamp = start
+
+    def in_force():
+        nonlocal stamp
+        stamp += MS
+        peer.send(topic, stamp, wanted)
+        return listener.take() and listener.stamps[-1] > start
+
+    peer.wait(in_force, "command in force")
+    return stamp
+
+
+def test_slave_refuses_bad_commands_and_holds(peer):
+    setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
+    peer.start("slave_sim")
+    wanted = HOME - 0.001 * np.eye(6)[0]
+    last = drive(peer, topics.SLAVE_SERVO_JP, wanted, setpoints)
+    peer.wait(
+        lambda: setpoints.take() and np.allclose(setpoints.values[-1], wanted, atol=1e-9), "rest"
+    )
+    setpoints.forget()
+
+    def refuse(key, publish):
+        """Publish until one more is refused for this reason."""
+        name = f"refused.slave/servo_jp.{key}"
+
+        def refused():
+            nonlocal last
+            last += MS
+            publish(last)
+            status = peer.status("slave_sim")
+            return status and status.number(name) > 0 and status.level == 1
+
+        peer.wait(refused, name)
+
+    near = HOME - 0.002 * np.eye(6)[0]
+    publisher = peer.publisher(topics.SLAVE_SERVO_JP)
+
+    def typed(names, position):
+        def publish(stamp):
+            message = JointState(name=list(names), position=list(map(float, position)))
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+            publisher.publish(message)
+
+        return publish
+
+    refuse("not_finite", lambda s: peer.send(topics.SLAVE_SERVO_JP, s, near * np.nan))
+    refuse("not_finite", lambda s: peer.send(topics.SLAVE_SERVO_JP, s, near + np.inf))
+    refuse("wrong_names", typed(["a", "b", "c", "d", "e", "f"], near))
+    refuse("wrong_length", typed(ROBOT.joint_names, near[:4]))
+    setpoints.take()
+    last = max(setpoints.stamps)
+    good = drive(peer, topics.SLAVE_SERVO_JP, wanted, setpoints, last)
+
+    def backwards():
+        peer.send(topics.SLAVE_SERVO_JP, good - MS, near)
+        status = peer.status("slave_sim")
+        return status and status.number("refused.slave/servo_jp.not_newer") > 0
+
+    peer.wait(backwards, "refused stamp")
+    last = good + 10 * MS
+    refuse("jump", lambda s: peer.send(topics.SLAVE_SERVO_JP, s, HOME - 0.9 * np.eye(6)[0]))
+    setpoints.take()
+    assert np.abs(np.array(setpoints.values) - wanted).max() < 1e-7
+
+
+def test_poses_that_are_not_unit_or_not_finite_are_refused(peer):
+    answers = peer.listen(topics.SLAVE_SERVO_JP)
+    peer.start("inverse_kinematics")
+    stamp = 0
+
+    def refuse(key, pose):
+        def refused():
+            nonlocal stamp
+            stamp += MS
+            peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)
+            peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
+            status = peer.status("inverse_kinematics")
+            return status and status.number(f"refused.slave/servo_cp.{key}") > 0
+
+        peer.wait(refused, key)
+
+    refuse("not_unit", [0.4, 0.0, -0.2, 0.9, 0.0, 0.0, 0.0])
+    refuse("not_unit", [0.4, 0.0, -0.2, 0.0, 0.0, 0.0, 0.0])
+    refuse("not_finite", [np.nan, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0])
+    assert answers.take() == 0
+
+
+def test_another_frame_and_another_order_of_joints_give_the_same_motion(peer):
+    setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
+    peer.start("slave_sim", reference_filter__is_on=False)
+    publisher = peer.publisher(topics.SLAVE_SERVO_JP)
+    wanted = HOME - 1e-4 * np.arange(1, 7)
+    order = [3, 0, 5, 1, 4, 2]
+    stamp = 0
+
+    def followed():
+        nonlocal stamp
+        stamp += MS
+        message = JointState(
+            name=["other", *(ROBOT.joint_names[i] for i in order)],
+            position=[9.0, *(float(wanted[i]) for i in order)],
+            velocity=[0.0] * 7,
+        )
+        message.header.frame_id = "somewhere_else"
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+        publisher.publish(message)
+        return setpoints.take() and np.array_equal(setpoints.values[-1], wanted)
+
+    peer.wait(followed, "same setpoint")
+
+
+def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer):
+    answers = peer.listen(topics.SLAVE_SERVO_CP)
+    peer.start("motion_scaling", feedback_timeout=5.0)
+    publisher = peer.publisher(topics.MASTER_MEASURED_CP)
+    where = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0]
+    pose = np.array([0.01, -0.06, -0.08, 0.8, 0.0, 0.6, 0.0])
+    stamp = 0
+
+    def sent(is_foreign):
+        nonlocal stamp
+        stamp += MS
+        before = answers.take()
+        peer.send(topics.SLAVE_SETPOINT_CP, 1, where)
+        if is_foreign:
+            message = write_values(
+                topics.MASTER_MEASURED_CP.kind, PoseStamped(), stamp, pose, frame_id="a_real_device"
+            )
+            publisher.publish(message)
+        else:
+            peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
+        return answers.take() > before
+
+    peer.wait(lambda: sent(False), "answer to ours")
+    peer.wait(lambda: sent(False) and len(answers.stamps) > 3, "engaged")
+    ours = answers.values[-1]
+    peer.wait(lambda: sent(True), "answer to the foreign one")
+    peer.wait(lambda: answers.take() and answers.stamps[-1] > stamp - MS, "all answers")
+    np.testing.assert_allclose(answers.values[-1], ours, atol=1e-12)
+
+
+def chain(peer, master=STEADY):
+    for name in ("slave_sim", "inverse_kinematics", "motion_scaling"):
+        peer.start(name, wait="")
+    for name in ("slave_sim", "inverse_kinematics", "motion_scaling"):
+        peer.wait_state(name, "active")
+    peer.start("haptic_master", **master)
+
+
+def rest(peer, listener):
+    """Joints of the slave once it has followed the hand to its rest."""
+
+    def is_at_rest():
+        listener.take()
+        q = np.array(listener.values[-1000:])[:, :6]
+        travelled = np.abs(q[-1] - HOME).max() if len(q) else 0.0
+        return travelled > 1e-2 and len(q) == 1000 and np.ptp(q, axis=0).max() < STILL / 3
+
+    peer.wait(is_at_rest, "slave at rest, away from home")
+    return listener.values[-1][:6].copy()
+
+
+def follows(peer, setpoints):
+    """Wait until commands younger than now are in force."""
+    setpoints.forget()
+    peer.wait(setpoints.take, "setpoints")
+    old = setpoints.stamps[-1]
+    peer.wait(lambda: setpoints.take() and setpoints.stamps[-1] > old + 500 * MS, "following")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["motion_scaling", "inverse_kinematics", "haptic_master"])
+def test_restarting_a_node_does_not_move_the_slave(peer, name):
+    measured, setpoints = (
+        peer.listen(topics.SLAVE_MEASURED_JS),
+        peer.listen(topics.SLAVE_SETPOINT_JS),
+    )
+    chain(peer)
+    before = rest(peer, measured)
+    (old,) = [node for node in peer.nodes if node.name == name]
+    assert old.end(signal.SIGTERM) == 0
+    peer.wait(lambda: "holds" in peer.status("slave_sim").message, "slave holds")
+    # A new master starts in the inkwell, 20 mm away, and leaves it very slowly.
+    slow = STEADY | {"path__approach_time": 60.0}
+    peer.start(name, **(slow if name == "haptic_master" else {}))
+    follows(peer, setpoints)
+    measured.take()
+    q = np.array(measured.values)[-4000:, :6]
+    held = q[np.abs(q - before).max(axis=1).argmax()]
+    assert np.abs(held - before).max() < STILL
+    assert np.abs(np.diff(q, axis=0)).max() < STILL
+
+
+@pytest.mark.slow
+def test_slave_holds_when_the_master_dies(peer):
+    measured = peer.listen(topics.SLAVE_MEASURED_JS)
+    circle = {"path__kind": "circle", "path__approach_time": 0.5, "path__period": 4.0}
+    chain(peer, circle)
+    peer.wait(
+        lambda: measured.take() and np.abs(measured.values[-1][:6] - HOME).max() > 5e-3, "motion"
+    )
+    (master,) = [node for node in peer.nodes if node.name == "haptic_master"]
+    master.process.kill()
+    peer.wait(lambda: "holds" in peer.status("slave_sim").message, "slave holds")
+    measured.forget()
+    peer.wait(lambda: measured.take() > 1000, "samples go on")
+    assert np.ptp(np.array(measured.values)[500:, :6], axis=0).max() < STILL
+
+
+def test_a_second_publisher_of_commands_is_reported(peer):
+    peer.start("slave_sim")
+    kind = JointState
+    both = [peer.node.create_publisher(kind, topics.SLAVE_SERVO_JP.name, 10) for _ in range(2)]
+    assert len(both) == 2
+    peer.wait(lambda: "2 publishers" in peer.status("slave_sim").message, "report")
+
+
+@pytest.mark.slow
+def test_nodes_give_bit_equal_motion_to_the_core_for_the_same_commands(peer):
+    graph = Graph(configure("free_motion").groups)
+    poses = graph.run(2500)["slave_servo_cp"]
+    listeners = [
+        peer.listen(topic)
+        for topic in (topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS, topics.SLAVE_MEASURED_JS)
+    ]
+    references, setpoints, measured = listeners
+    peer.start("slave_sim", max_catch_up=10_000)
+    # Stamps from 0 on: within the feedback timeout nothing depends on when feedback came.
+    peer.start("inverse_kinematics", feedback_timeout=5.0)
+    peer.publisher(topics.SLAVE_SERVO_CP)
+    peer.wait(
+        lambda: peer.node.count_publishers(references.topic.name), "publisher of slave/servo_jp"
+    )
+    peer.wait(lambda: measured.take() > 100, "slave/measured_js")
+
+    def take_all():
+        return [listener.take() for listener in listeners][-1]
+
+    for tick, pose in enumerate(poses, start=1):
+        seen = take_all()
+        peer.send(topics.SLAVE_SERVO_CP, tick * MS, pose)
+        peer.wait(lambda seen=seen: take_all() > seen, "next tick")
+    count = take_all()
+    peer.wait(lambda: take_all() > count + 300, "the end of the motion")
+    ticks = _slave_ticks(peer, measured, setpoints)
+    references.take()
+    assert len(references.stamps) > 1000
+    assert np.ptp(references.values, axis=0).max() > 1e-2
+
+    answers = _core_answers(poses, references.stamps)
+    np.testing.assert_array_equal(answers, np.array(references.values))
+    commands = dict(zip(references.stamps, references.values, strict=True))
+    _assert_core_slave_moves_alike(ticks, commands, setpoints, measured)
+
+
+def _slave_ticks(peer, measured, setpoints):
+    """Ticks that the slave took before the first one that was seen; ends the slave."""
+    (slave,) = [node for node in peer.nodes if node.name == "slave_sim"]
+    slave.process.send_signal(signal.SIGINT)
+    assert slave.process.wait(60) == 0
+    peer.wait(lambda: peer.status("slave_sim").values["state"] == "finalized", "last report")
+    total = int(peer.status("slave_sim").number("ticks"))
+    assert peer.status("slave_sim").number("dropped_time_ms") == 0
+    measured.take()
+    setpoints.take()
+    assert (np.diff(measured.stamps) == MS).all(), "the middleware lost samples"
+    return total - len(measured.stamps)
+
+
+def _core_answers(poses, stamps):
+    stage = InverseKinematics(InverseKinematicsParameters(feedback_timeout=5.0))
+    answers = []
+    for stamp in stamps:
+        stage.signals["stamp_ns"] = stamp
+        stage.signals["slave_servo_cp"] = poses[stamp // MS - 1]
+        stage.step()
+        answers.append(stage.signals["slave_servo_jp"].copy())
+    return np.array(answers)
+
+
+def _assert_core_slave_moves_alike(unseen, commands, setpoints, measured):
+    stage = SlaveSim(SlaveSimParameters())
+    row = stage.signals
+    for tick in range(unseen):
+        stage.step(measured.stamps[0] - (unseen - tick) * MS)
+    assert len(setpoints.stamps) == len(measured.stamps), "the middleware lost samples"
+    for i, now_ns in enumerate(measured.stamps):
+        in_force = setpoints.stamps[i]
+        if in_force != row["servo_stamp_ns"]:
+            row["servo_stamp_ns"], row["slave_servo_jp"] = in_force, commands[in_force]
+        stage.step(now_ns)
+        assert row["setpoint_stamp_ns"] == in_force
+        assert (row["slave_setpoint_js"] == setpoints.values[i]).all(), i
+        assert (row["slave_measured_js"] == measured.values[i]).all(), i
