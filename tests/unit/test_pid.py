@@ -1,4 +1,4 @@
-"""PID: poles where they are claimed, no windup, no kick beyond what the drive can move."""
+"""PID: poles where they are claimed, no windup, no derivative kick."""
 
 import math
 
@@ -18,20 +18,21 @@ AXES = range(6)
 
 def run(errors, gains=(2.0, 0.0, 0.0), limit=math.inf, memory=None, feedforward=0.0):
     """Efforts for a sequence of errors, and the memory after it."""
-    memory = np.array([0.0, errors[0], 0.0]) if memory is None else memory
+    memory = np.array([0.0, -errors[0], 0.0]) if memory is None else memory
     row = np.array(gains, dtype=float)
-    return np.array([pid_step(e, row, memory, feedforward, limit, DT) for e in errors]), memory
+    efforts = [pid_step(0.0, -e, row, memory, feedforward, limit, DT) for e in errors]
+    return np.array(efforts), memory
 
 
 def loop_matrix(axis):
-    """One tick of an axis under its PID, linear: states q, dq, integral, last error, error rate."""
+    """One tick of an axis under its PID, linear: states q, dq, integral, last q, its rate."""
     inertia, viscous = DRIVES.inertia[axis], DRIVES.viscous[axis]
     plant = np.array([[0, 1, 0], [0, -viscous / inertia, 1 / inertia], [0, 0, 0]])
     one_tick = expm(plant * DT)
 
     def tick(state):
         memory = state[2:].copy()
-        effort = pid_step(-state[0], GAINS[axis], memory, 0.0, math.inf, DT)
+        effort = pid_step(0.0, state[0], GAINS[axis], memory, 0.0, math.inf, DT)
         moved = one_tick @ np.array([state[0], state[1], effort])
         return np.array([moved[0], moved[1], *memory])
 
@@ -69,13 +70,20 @@ def test_sampled_loop_of_every_axis_is_stable_and_well_damped(axis):
 
 @pytest.mark.parametrize("axis", AXES)
 def test_axis_returns_from_a_displacement_without_swinging(axis):
-    state, trace, matrix = np.array([1.0, 0, 0, -1.0, 0]), [], loop_matrix(axis)
+    state, trace, matrix = np.array([1.0, 0, 0, 1.0, 0]), [], loop_matrix(axis)
     for _ in range(1000):
         state = matrix @ state
         trace.append(state[0])
     # The integral of a step of load must pay back: one swing through zero, and only one.
     assert np.count_nonzero(np.diff(np.sign(np.array(trace)[np.abs(trace) > 1e-3]))) == 1
     assert abs(trace[-1]) < 1e-9
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_a_step_of_the_setpoint_gives_the_derivative_no_kick(axis):
+    memory, gains = np.zeros(3), GAINS[axis].copy()
+    gains[:2] = 0.0
+    assert pid_step(1.0, 0.0, gains, memory, 0.0, math.inf, DT) == 0.0
 
 
 def test_proportional_part_is_immediate():
@@ -116,7 +124,7 @@ def test_effort_never_exceeds_the_limit(errors, gains):
 def test_integral_never_grows_beyond_what_the_drive_can_give(errors, axis):
     limit, memory = DRIVES.effort_limit[axis], np.zeros(3)
     for error in np.repeat(errors, 3):
-        pid_step(error, GAINS[axis], memory, 0.0, limit, DT)
+        pid_step(0.0, -error, GAINS[axis], memory, 0.0, limit, DT)
         # It grows only while the whole effort is inside the limit, so the other parts, of at
         # most this size, may hold it at limit plus themselves.
         rest = GAINS[axis, 0] * 1.0 + GAINS[axis, 2] * 2.0 / DT
@@ -147,6 +155,6 @@ def test_without_the_hold_the_integral_would_wind_up():
 
 
 def test_integral_may_shrink_while_the_drive_is_saturated():
-    memory = np.array([100.0, -0.1, 0.0])
-    pid_step(-0.1, np.array([1.0, 50.0, 0.0]), memory, 0.0, 5.9, DT)
+    memory = np.array([100.0, 0.1, 0.0])
+    pid_step(0.0, 0.1, np.array([1.0, 50.0, 0.0]), memory, 0.0, 5.9, DT)
     assert memory[0] < 100.0

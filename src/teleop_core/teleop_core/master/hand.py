@@ -36,7 +36,8 @@ def tremble(p: Any, s: Any, noise: Array, tremor: Array) -> None:
     for i in range(3):
         # Ornstein-Uhlenbeck process of unit variance and half a second of memory.
         s.wander[i] += -s.wander[i] * (1e-3 / 0.5) + noise[i] * math.sqrt(2.0 * 1e-3 / 0.5)
-        s.phase[i] += 2.0 * math.pi * 1e-3 * (p.frequency + 2.0 * math.tanh(s.wander[i]))
+        width = min(2.0, p.frequency - 8.0, 12.0 - p.frequency)
+        s.phase[i] += 2.0 * math.pi * 1e-3 * (p.frequency + width * math.tanh(s.wander[i]))
         tremor[i] = p.tremor * math.sin(s.phase[i])
 
 

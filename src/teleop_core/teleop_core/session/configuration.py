@@ -139,7 +139,10 @@ def parse_setting(text: str) -> Layer:
     key = key.strip()
     hits = [entry for full, entry in declared.items() if key in {full, entry[1].name}]
     if not hits:
-        hits = [entry for full, entry in declared.items() if full.endswith("." + key)]
+        ends = {full: entry for full, entry in declared.items() if full.endswith("." + key)}
+        if len({spec.name for _, spec in ends.values()}) > 1:
+            raise UnknownNameError("key", key, ends)  # several parameters end so
+        hits = list(ends.values())
     if not hits:
         near = difflib.get_close_matches(key, [*declared, *(s.name for _, s in declared.values())])
         raise UnknownNameError("key", key, near or declared)

@@ -28,18 +28,25 @@ def critically_damped_gains(
 
 @kernel
 def pid_step(
-    error: float, gains: Array, memory: Array, feedforward: float, limit: float, dt: float
+    setpoint: float,
+    measured: float,
+    gains: Array,
+    memory: Array,
+    feedforward: float,
+    limit: float,
+    dt: float,
 ) -> float:
     """Drive effort for one tick, within ±limit; updates the memory.
 
     The integral is held while the drive is saturated and the error would push it further
-    (conditional integration). The derivative acts on the error through a first-order filter of
-    two ticks; it has no kick, because the slave's setpoint never moves faster than its drive.
+    (conditional integration). The derivative acts on the measured position alone, through a
+    first-order filter of two ticks: a step of the setpoint gives it no kick.
 
     Args:
-        error: Setpoint less measured position [rad or m].
+        setpoint: Wanted position [rad or m].
+        measured: Measured position [rad or m].
         gains: Kp, Ki, Kd.
-        memory: Integral effort, last error, filtered error rate (3,); written.
+        memory: Integral effort, last measured position, filtered speed (3,); written.
         feedforward: Effort added before the limit.
         limit: Largest effort of the drive.
         dt: Tick [s], > 0.
@@ -47,9 +54,10 @@ def pid_step(
     Returns:
         Effort [N·m or N].
     """
-    memory[2] += ((error - memory[1]) / dt - memory[2]) / 2.0
-    memory[1] = error
-    free = gains[0] * error + gains[2] * memory[2] + feedforward
+    memory[2] += ((measured - memory[1]) / dt - memory[2]) / 2.0
+    memory[1] = measured
+    error = setpoint - measured
+    free = gains[0] * error - gains[2] * memory[2] + feedforward
     integral = memory[0] + gains[1] * error * dt
     effort = free + integral
     if abs(effort) <= limit or effort * error < 0.0:

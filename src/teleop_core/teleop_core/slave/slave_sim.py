@@ -99,6 +99,10 @@ def _slave_dtypes(n: int) -> tuple[np.dtype[Any], np.dtype[Any]]:
     )
 
 
+# Stamps this far ahead of the slave's clock are an error, not a clock that is a little ahead.
+_FUTURE_NS = 1_000_000_000
+
+
 @kernel
 def _take_command(p: Any, s: Any, row: Any) -> int:
     """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
@@ -107,6 +111,9 @@ def _take_command(p: Any, s: Any, row: Any) -> int:
     no stream within its timeout can be that far.
     """
     stamp, now_ns = row.servo_stamp_ns, row.now_ns
+    if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
+        s.refused += 1
+        return 2
     if stamp > s.seen_ns:
         s.seen_ns = stamp
         far = p.timeout_ns * 1e-9
@@ -151,7 +158,7 @@ def _control(p: Any, s: Any, work: Any, gravity: Any, dynamics: Array, dt: float
     for i in range(q.shape[0]):
         # The motor gives no drive beyond its rated speed, fading out over the next tenth.
         effort[i] = pid_step(
-            s.setpoint[i] - s.measured[i], p.gains[i], memory[i],
+            s.setpoint[i], s.measured[i], p.gains[i], memory[i],
             scratch_row[i] * p.compensated[i], p.effort_limit[i], dt,
         )  # fmt: skip
         over = abs(dq[i]) / p.speed_limit[i] - 1.0
@@ -240,7 +247,7 @@ class SlaveSim:
         assert self.robot.dynamics is not None
         self.robot.dynamics.gravity(q, self.dynamics, gravity)
         memory[:, 0] = gravity * (1.0 - self.parameters["compensated"])
-        memory[:, 1] = s["setpoint"] - s["measured"]
+        memory[:, 1] = s["measured"]
         row, transform = self.signals, np.empty((4, 4))
         row["slave_setpoint_js"], row["setpoint_stamp_ns"] = home, 0
         self.robot.kernels.fk(q, self.robot.geometry_row, transform)

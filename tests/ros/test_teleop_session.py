@@ -1,0 +1,150 @@
+"""The composed session: all nodes in one process, and others in the place of some."""
+
+import io
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import yaml
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rich.console import Console
+
+from teleop_core.bags import topics
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.topics import STREAMS
+from teleop_core.nodes.children import environment
+from teleop_core.nodes.live import live
+from teleop_core.nodes.real_time import apply_options
+from teleop_core.session.configuration import RealTimeParameters, configure
+from teleop_core.session.graph import STAGES, Graph
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+NODES = [stage.name for stage in STAGES]
+MS = 1_000_000
+
+
+@pytest.fixture
+def session(peer, tmp_path):
+    """Process of the composed session, all its nodes active."""
+    parameters = {
+        "recorder": {"out": str(tmp_path / "bag")},
+        "haptic_master": {"path": {"approach_time": 1.0}},
+    }
+    file = tmp_path / "session.yaml"
+    file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))
+    command = [sys.executable, "-m", "teleop_core.nodes.teleop_session", "--ros-args"]
+    process = subprocess.Popen(
+        [*command, "--params-file", str(file)], env=environment() | {"ROS_DOMAIN_ID": peer.domain}
+    )
+    try:
+        for name in NODES:
+            peer.wait_state(name, "active")
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+
+
+def change(peer, name, transition):
+    request = ChangeState.Request(transition=Transition(id=transition))
+    assert peer.call(ChangeState, f"/{name}/change_state", request).success
+
+
+def test_outside_subscribers_see_every_topic(peer, session):
+    listeners = [peer.listen(topic) for topic in STREAMS]
+    for listener in listeners:
+        peer.wait(lambda listener=listener: listener.take() > 500, listener.topic.name)
+
+
+def test_a_composed_session_loses_no_sample_between_its_stages(peer, session, tmp_path):
+    peer.wait_value("slave_sim", "ticks", lambda ticks: ticks > 3000)
+    session.send_signal(signal.SIGINT)
+    assert session.wait(30) == 0
+    bag = Bag(tmp_path / "bag")
+    sample, pose, joints = (
+        bag.read(t).stamp_ns
+        for t in (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP)
+    )
+    assert np.array_equal(sample, pose)
+    assert np.array_equal(sample, joints)
+    assert (np.diff(sample) == MS).all()
+    assert (np.diff(bag.read(topics.SLAVE_MEASURED_JS).stamp_ns) == MS).all()
+
+
+def test_a_composed_session_computes_what_virtual_time_computes(peer, session, tmp_path):
+    peer.wait_value("slave_sim", "ticks", lambda ticks: ticks > 2000)
+    session.send_signal(signal.SIGTERM)
+    assert session.wait(30) == 0
+    bag = Bag(tmp_path / "bag")
+    live_poses = bag.read(topics.MASTER_MEASURED_CP).values
+    settings = ["path.approach_time=1.0"]
+    virtual = Graph(configure(settings=settings).groups).run(len(live_poses))
+    # No force acts without a box, so the hand moves alike; its sample is the same, bit for bit.
+    assert np.array_equal(live_poses, virtual["master_measured_cp"])
+
+
+def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer, session):
+    change(peer, "haptic_master", Transition.TRANSITION_DEACTIVATE)
+    peer.wait_state("haptic_master", "inactive")
+    commands = peer.listen(topics.SLAVE_SERVO_CP)
+    rest = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    clock = peer.node.get_clock()
+    publisher = peer.publisher(topics.MASTER_MEASURED_CP, readers=2)  # scaling and recorder
+
+    def moved():
+        moved.step += 1
+        now = clock.now().nanoseconds
+        pose = rest + np.array([0.0, 1e-5 * moved.step, 0.0, 0, 0, 0, 0])
+        peer.send(topics.MASTER_MEASURED_CP, now, pose)
+        return commands.take() > 200 and np.ptp(np.array(commands.values)[:, 2]) > 1e-3
+
+    moved.step = 0
+    assert publisher.get_subscription_count() >= 2
+    peer.wait(moved, "slave commands that follow the outside master")
+
+
+def test_the_inside_master_comes_back_without_a_jump(peer, session):
+    measured = peer.listen(topics.SLAVE_MEASURED_JS)
+    change(peer, "haptic_master", Transition.TRANSITION_DEACTIVATE)
+    peer.wait_state("haptic_master", "inactive")
+    peer.wait(lambda: "holds" in peer.status("slave_sim").message, "slave holds")
+    change(peer, "haptic_master", Transition.TRANSITION_ACTIVATE)
+    peer.wait_state("haptic_master", "active")
+    count = measured.take()
+    peer.wait(lambda: measured.take() > count + 1000, "samples")
+    # A millisecond of the fastest hand motion here is far below this step [rad, m].
+    assert np.abs(np.diff(np.array(measured.values)[:, :6], axis=0)).max() < 0.01
+
+
+def test_parameters_of_a_composed_node_change_at_run_time(peer, session):
+    (result,) = peer.set("motion_scaling", fine_gain=0.2)
+    assert result.successful
+    (refused,) = peer.set("motion_scaling", fine_gain=20.0)
+    assert not refused.successful
+    assert "fine_gain" in refused.reason
+
+
+def test_live_composed_records_a_session(tmp_path):
+    show = Console(file=io.StringIO(), width=200)
+    configuration = configure("coarse_box", settings=["teleop.duration=3.0"])
+    live(configuration, tmp_path / "bag", show, is_composed=True)
+    text = show.file.getvalue()
+    assert all(f"{name} is ready" in text for name in NODES)
+    for topic in STREAMS:
+        assert Bag(tmp_path / "bag").topics[topic.name].count > 1500, topic.name
+
+
+def test_real_time_options_are_taken_or_refused_in_one_line():
+    allowed = os.sched_getaffinity(0)
+    try:
+        (refusal,) = apply_options(RealTimeParameters(cpus=(4096,), freeze_gc=False))
+        assert "real_time.cpus" in refusal
+        assert str(sorted(allowed)) in refusal
+        assert apply_options(RealTimeParameters(cpus=tuple(allowed), freeze_gc=False)) == []
+    finally:
+        os.sched_setaffinity(0, allowed)
