@@ -181,6 +181,18 @@ def chain(peer, master=STEADY):
     peer.start("haptic_master", **master)
 
 
+def test_the_hand_rests_until_the_slave_follows(peer):
+    poses = peer.listen(topics.MASTER_MEASURED_CP)
+    peer.start("haptic_master", patience=3600.0, **STEADY)
+    peer.wait(lambda: poses.take() > 1000, "samples")
+    assert np.ptp(poses.values, axis=0).max() == 0.0
+    assert "waits" in peer.status("haptic_master").message
+    for name in ("slave_sim", "inverse_kinematics", "motion_scaling"):
+        peer.start(name, wait="")
+    peer.wait(lambda: poses.take() and np.ptp(poses.values[-1000:], axis=0).max() > 1e-3, "motion")
+    peer.wait_value("haptic_master", "has_begun", lambda n: n == 1)
+
+
 def rest(peer, listener):
     """Joints of the slave once it has followed the hand to its rest."""
 

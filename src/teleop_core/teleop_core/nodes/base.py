@@ -323,3 +323,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         values |= recent_values("lateness", self.schedule.lateness)
         values |= recent_values("delay", self.delay) | (self.values() if is_active else {})
         self._reporter.send(concerns, self._word, values)
+
+    def flush(self) -> None:
+        """Wait a moment until the last report has arrived."""
+        self._reporter.flush()

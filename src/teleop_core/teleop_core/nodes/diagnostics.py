@@ -4,6 +4,7 @@ import time
 from collections.abc import Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.duration import Duration
 from rclpy.node import Node
 
 from teleop_core.bags.topics import DIAGNOSTICS
@@ -25,6 +26,10 @@ class Reporter:
         )
         self._last_time, self._last_ticks = time.monotonic(), 0
         self._last_refused: dict[str, int] = {}
+
+    def flush(self) -> None:
+        """Wait a moment until the last report has arrived."""
+        self._publisher.wait_for_all_acked(Duration(nanoseconds=300_000_000))
 
     def rate(self, ticks: int) -> float:
         """Ticks per second since the last call."""

@@ -2,24 +2,45 @@
 
 import sys
 import time
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from teleop_core.bags import topics
+from teleop_core.bags.reports import read_reports
 from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.process import run
+from teleop_core.nodes.streams import Subscription
+from teleop_core.parameters import parameter
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.graph import STAGE
-from teleop_core.session.runner import recorded_path
+from teleop_core.session.runner import recorded_path, state_report
+from teleop_core.signals import STATE_FIELDS
+
+
+@dataclass(frozen=True, kw_only=True)
+class HapticMasterNodeParameters(HapticMasterParameters):
+    """Parameters of the master as a node."""
+
+    patience: float = parameter(
+        5.0, unit="s", lower=0.0, upper=3600.0, fixed=True,
+        doc="the operator begins when teleop/state says that the slave follows, or after this",
+    )  # fmt: skip
 
 
 class HapticMasterNode(CoreNode):
-    """One sample of the device per millisecond, stamped with its nominal time."""
+    """One sample of the device per millisecond, stamped with its nominal time.
+
+    Nodes find each other within seconds. Until the slave follows, the hand rests, as an operator's
+    would: no part of its motion is lost.
+    """
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(STAGE["haptic_master"], **options)
+        super().__init__(STAGE["haptic_master"], HapticMasterNodeParameters, **options)
 
-    def setup(self, parameters: HapticMasterParameters) -> None:
+    def setup(self, parameters: HapticMasterNodeParameters) -> None:
         """Make the device and open its topics."""
         recorded = recorded_path(Configuration({"haptic_master": parameters}, ""))
         self.stage = HapticMaster(parameters, recorded=recorded)
@@ -29,6 +50,9 @@ class HapticMasterNode(CoreNode):
         self._servo_cf = self.input(topics.MASTER_SERVO_CF)
         self._samples = [self.output(topic) for topic in STAGE["haptic_master"].writes]
         self._force = self.stage.signals[topics.MASTER_SERVO_CF.field]
+        self._has_begun, self._first_ns = False, 0
+        read_reports(state_report(0, np.zeros(len(STATE_FIELDS))))  # loads the message types
+        self._state = Subscription(self, topics.TELEOP_STATE)
 
     def start(self) -> None:
         """Relate the monotonic time of the loop to the stamps."""
@@ -37,6 +61,10 @@ class HapticMasterNode(CoreNode):
     def stop(self) -> None:
         """Forget the force: the next activation starts without one."""
         self._force[:] = 0.0
+
+    def teardown(self) -> None:
+        """Stop listening to the state."""
+        self._state.close()
 
     def turn(self) -> None:
         """Take all samples that are due."""
@@ -48,10 +76,32 @@ class HapticMasterNode(CoreNode):
         self._servo_cf.newest()
         if self._servo_cf.age() > self.parameters.force_timeout:
             self._force[:] = 0.0
-        with self.lock:
-            self.stage.step()
+        stamp_ns = tick_ns + self._epoch_ns
+        if self._has_begun or self._begins(stamp_ns):
+            with self.lock:
+                self.stage.step()
         for sample in self._samples:
-            sample.send(tick_ns + self._epoch_ns)
+            sample.send(stamp_ns)
+
+    def _begins(self, stamp_ns: int) -> bool:
+        """Whether the operator begins with this sample."""
+        self._first_ns = self._first_ns or stamp_ns
+        self._has_begun = (stamp_ns - self._first_ns) * 1e-9 >= self.parameters.patience
+        while (taken := self._state.take()) is not None:
+            for report in read_reports(taken[0]):
+                # A report older than our samples is about another master.
+                is_about_us = report.stamp_ns >= self._first_ns
+                follows = report.values.get("is_following") == "1.0"
+                self._has_begun |= is_about_us and follows
+        return self._has_begun
+
+    def concerns(self) -> list[str]:
+        """An operator who waits for the slave."""
+        return [] if self._has_begun else ["waits until teleop/state says that the slave follows"]
+
+    def values(self) -> dict[str, str]:
+        """Whether the operator moves yet."""
+        return {"has_begun": str(int(self._has_begun))}
 
 
 def main() -> int:

@@ -99,6 +99,7 @@ class _Session:
         try:
             for crew in self.crews:
                 self._start(crew)
+            self._await_operator()
             is_begun = True
             self._watch()
         except KeyboardInterrupt:
@@ -124,6 +125,12 @@ class _Session:
                 child = self._children[home[waiting[0]]]
                 reason = f"{waiting[0]} was not ready within {START_TIMEOUT:g} s"
                 raise SessionError(reason + child.last_words())
+
+    def _await_operator(self) -> None:
+        """Wait until the hand moves; it does after a while even if nothing follows it."""
+        while not self._observer.statuses["haptic_master"].number("has_begun"):
+            self._observer.listen(0.1)
+            self._check()
 
     def _watch(self) -> None:
         begin = time.monotonic()

@@ -1,0 +1,63 @@
+"""The colcon workspace, built with the real tools, as a ROS user builds it."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from teleop_core.bags import topics
+from teleop_core.nodes.children import environment
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+
+ROOT = Path(__file__).resolve().parents[2]
+COLCON = Path(sys.executable).with_name("colcon")
+NODES = {"haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "recorder"}
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory):
+    """Copy of the repository's workspace, links as links."""
+    root = tmp_path_factory.mktemp("workspace")
+    ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", "build", "install", "log")
+    for folder in ("src", "config", "ros_ws"):
+        shutil.copytree(ROOT / folder, root / folder, symlinks=True, ignore=ignored)
+    return root / "ros_ws"
+
+
+def colcon(workspace, *arguments):
+    path = f"{COLCON.parent}:{os.environ['PATH']}"
+    done = subprocess.run(
+        [COLCON, *arguments], cwd=workspace, capture_output=True, text=True, timeout=300,
+        env=environment() | {"PATH": path}, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_the_workspace_builds_and_a_built_node_answers(workspace, peer):
+    assert "(ros.ament_python)" in colcon(workspace, "list")
+    colcon(workspace, "build")
+    installed = workspace / "install" / "teleop_core"
+    executables = installed / "lib" / "teleop_core"
+    assert {file.name for file in executables.iterdir()} >= NODES
+    share = installed / "share" / "teleop_core"
+    assert (share / "config" / "coarse_box.yaml").exists()
+    assert (share / "launch" / "teleop.launch.py").exists()
+    assert (share / "hook").is_dir()  # the hooks that let `ros2 run` find the package
+
+    listener = peer.listen(topics.SLAVE_MEASURED_JS)
+    package = next(installed.glob("lib/python*/site-packages"))
+    env = environment() | {"ROS_DOMAIN_ID": peer.domain, "PYTHONPATH": str(package)}
+    node = subprocess.Popen([executables / "slave_sim"], env=env)
+    try:
+        peer.wait(lambda: listener.take() > 100, "slave/measured_js")
+        node.send_signal(signal.SIGTERM)
+        assert node.wait(60) == 0
+    finally:
+        node.kill()
+        node.wait()
