@@ -20,6 +20,7 @@ import numpy as np
 import psutil
 
 RELAYS = 2
+_FIFO = ("--set", "real_time.priority=50")
 
 
 def chain(seconds: float, style: str) -> dict[str, float]:
@@ -194,7 +195,9 @@ def compare(seconds: float) -> None:
         ("bare relay chain, typed, reliable", lambda: chain(seconds, "typed")),
         ("bare relay chain, raw, best effort", lambda: chain(seconds, "raw")),
         ("five nodes in five processes", lambda: live(seconds)),
+        ("the same, real_time.priority=50", lambda: live(seconds, *_FIFO)),
         ("five nodes composed", lambda: live(seconds, "--composed")),
+        ("the same, real_time.priority=50", lambda: live(seconds, "--composed", *_FIFO)),
         ("five nodes composed, a busy process beside", lambda: live(seconds, "--composed")),
     ):
         beside = subprocess.Popen([sys.executable, "-c", spin]) if "busy" in name else None
