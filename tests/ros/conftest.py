@@ -114,14 +114,20 @@ class Peer:
         self._publishers: dict[str, Any] = {}
 
     def close(self) -> None:
-        for node in self.nodes:
-            if node.process.poll() is None:
-                node.process.kill()
-                node.process.wait()
+        """Leave, then end the nodes: a process that is killed leaves shared memory behind."""
         self.observer.__exit__()
         self._executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
+        running = [node.process for node in self.nodes if node.process.poll() is None]
+        for process in running:
+            process.terminate()
+        for process in running:
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
     # -- nodes -----------------------------------------------------------------------------------
 

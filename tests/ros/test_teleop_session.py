@@ -32,7 +32,7 @@ def session(peer, tmp_path):
     """Process of the composed session, all its nodes active."""
     parameters = {
         "recorder": {"out": str(tmp_path / "bag")},
-        "haptic_master": {"path": {"approach_time": 1.0}},
+        "haptic_master": {"path": {"approach_time": 1.0}, "patience": 0.0},
     }
     file = tmp_path / "session.yaml"
     file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))
