@@ -51,6 +51,7 @@ setup(
             "mypy",
             "types-PyYAML",
             "psutil",
+            "sympy",
             "colcon-common-extensions",
             "colcon-ros",
         ],
