@@ -111,6 +111,7 @@ def _serve(nodes: tuple[CoreNode, ...]) -> int:
         executor.spin_until_future_complete(nodes[0].ended)
     for node in reversed(nodes):  # the one that was started first sees all others end
         node.trigger_shutdown()
+    for node in nodes:  # which blocks all threads of the process
         node.flush()
     executor.shutdown()
     return max(code, *(node.exit_code for node in nodes), 0)
