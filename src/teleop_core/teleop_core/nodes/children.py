@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from teleop_core.errors import SessionError
+from teleop_core.nodes.discovery import announce_often
 
 _PATIENCE = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
 
@@ -21,6 +22,7 @@ def environment() -> dict[str, str]:
     """
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    announce_often()
     return dict(os.environ) | {"ROS_DOMAIN_ID": os.environ.get("ROS_DOMAIN_ID") or free_domain()}
 
 

@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.topics import BY_NAME, Quality
 from teleop_core.errors import ParameterError, RecordingError
+from teleop_core.nodes.discovery import announce_often
 from teleop_core.nodes.streams import message_type, profile
 
 DISCOVERY_TIME = 1.0
@@ -77,6 +78,7 @@ def _paced(bag: Bag, names: list[str], rate: float) -> Iterator[tuple[str, int, 
 def _publishers(bag: Bag, names: list[str]) -> Iterator[dict[str, Any]]:
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    announce_often()
     types = {name: _type_in(bag, name) for name in names}
     context = Context()
     context.init(args=[])

@@ -18,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from teleop_core.errors import TeleopError
 from teleop_core.nodes.base import SUCCESS, CoreNode
+from teleop_core.nodes.discovery import announce_often
 
 _BAD_ARGUMENTS = (
     rclpy_implementation.RCLError,
@@ -47,6 +48,7 @@ def run(make_crew: Callable[[], Crew]) -> int:
     signals = _signal_pipe()
     try:
         _check_files(sys.argv)
+        announce_often()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         nodes = make_crew().nodes
     except TeleopError as error:
@@ -102,11 +104,10 @@ def _await_signal(signals: int, node: CoreNode) -> None:
 
 def _serve(nodes: tuple[CoreNode, ...]) -> int:
     executor = SingleThreadedExecutor()
-    code = 0
     for node in nodes:
         executor.add_node(node)
         node.ended = nodes[0].ended
-        code = code or _autostart(node)
+    code = _autostart(nodes)
     if not code:
         executor.spin_until_future_complete(nodes[0].ended)
     for node in reversed(nodes):  # the one that was started first sees all others end
@@ -117,12 +118,12 @@ def _serve(nodes: tuple[CoreNode, ...]) -> int:
     return max(code, *(node.exit_code for node in nodes), 0)
 
 
-def _autostart(node: CoreNode) -> int:
-    if not node.options.autostart:
-        return 0
-    if node.trigger_configure() is not SUCCESS:
+def _autostart(nodes: tuple[CoreNode, ...]) -> int:
+    """Configure all, which takes long, before any is at work; returns the exit code so far."""
+    willing = [node for node in nodes if node.options.autostart]
+    if any(node.trigger_configure() is not SUCCESS for node in willing):
         return 2
-    return 0 if node.trigger_activate() is SUCCESS else 1
+    return 1 if any(node.trigger_activate() is not SUCCESS for node in willing) else 0
 
 
 def _finish(code: int) -> int:
