@@ -42,7 +42,7 @@ class NodeParameters:
         True, fixed=True, doc="node configures and activates itself; false: a supervisor does"
     )
     max_catch_up: int = parameter(
-        100, unit="ticks", lower=0, upper=10_000, fixed=True,
+        1000, unit="ticks", lower=0, upper=10_000, fixed=True,
         doc="missed ticks that one late wake-up makes up for; beyond them time is dropped",
     )  # fmt: skip
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
