@@ -39,8 +39,13 @@ def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer):
     answers = peer.listen(topics.SLAVE_SERVO_CP)
     forces = peer.listen(topics.MASTER_SERVO_CF)
     peer.start("motion_scaling")
-    peer.send(topics.MASTER_MEASURED_CP, 1 * MS, REST)
-    peer.wait_value("motion_scaling", "received.master/measured_cp", lambda n: n == 1)
+
+    def received():
+        peer.send(topics.MASTER_MEASURED_CP, 1 * MS, REST)
+        status = peer.status("motion_scaling")
+        return status and status.number("received.master/measured_cp") > 0
+
+    peer.wait(received, "samples at motion_scaling")
     assert answers.take() == 0
 
     where = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0]
@@ -63,7 +68,6 @@ def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer):
     robot = load_robot("rcrt1")
     answers = peer.listen(topics.SLAVE_SERVO_JP)
     peer.start("inverse_kinematics")
-    peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)
     goal = robot.fk(HOME)
     goal[0, 3] -= 1e-5  # within one tick's reach
     pose = np.array([*goal[:3, 3], *_quaternion(goal)])
@@ -72,6 +76,7 @@ def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer):
     def answered():
         nonlocal stamp
         stamp += MS
+        peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)
         peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
         return answers.take()
 

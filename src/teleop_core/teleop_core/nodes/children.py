@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+from collections import deque
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -26,18 +27,28 @@ def environment() -> dict[str, str]:
     return dict(os.environ) | {"ROS_DOMAIN_ID": os.environ.get("ROS_DOMAIN_ID") or free_domain()}
 
 
+_reserved: deque[socket.socket] = deque(maxlen=8)
+
+
 def free_domain() -> str:
     """Number of a DDS domain in which nobody takes part on this machine.
 
     The first participant of domain d listens on UDP port 7410 + 250 d (DDSI-RTPS 2.5, 9.6.1.1).
+    Until it does, a TCP socket on the same number keeps other sessions away.
     """
-    domains = random.SystemRandom().sample(range(1, 102), 101)
-    for domain in domains:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(("", 7410 + 250 * domain))
-            except OSError:
-                continue
+    for domain in random.SystemRandom().sample(range(1, 102), 101):
+        port = 7410 + 250 * domain
+        mark = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            mark.bind(("127.0.0.1", port))
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+                probe.bind(("", port))
+        except OSError:
+            mark.close()
+            continue
+        if len(_reserved) == _reserved.maxlen:
+            _reserved.popleft().close()
+        _reserved.append(mark)
         return str(domain)
     raise SessionError("all ROS domains of this machine are in use; set ROS_DOMAIN_ID")
 

@@ -1,5 +1,6 @@
 """Process: the only main loop of the nodes, from the command line to a clean end."""
 
+import atexit
 import os
 import signal
 import sys
@@ -61,6 +62,8 @@ def run(make_crew: Callable[[], Crew]) -> int:
     sys.setswitchinterval(2e-4)
     threading.Thread(target=_await_signal, args=(signals, nodes[0]), daemon=True).start()
     code = _serve(nodes)
+    if code:
+        _leave(code)
     for node in nodes:
         node.destroy_node()
     return _finish(code)
@@ -129,3 +132,15 @@ def _autostart(nodes: tuple[CoreNode, ...]) -> int:
 def _finish(code: int) -> int:
     rclpy.utilities.try_shutdown()
     return code
+
+
+def _leave(code: int) -> None:
+    """End the process without closing its topics one by one.
+
+    Fast DDS 2.14 crashes now and then (StatefulWriter::matched_reader_add) when a writer goes
+    while others are being discovered, as in a node that fails right after its start; its exit
+    code would be lost.
+    """
+    sys.stderr.flush()
+    atexit._run_exitfuncs()
+    os._exit(code)
