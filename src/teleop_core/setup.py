@@ -42,6 +42,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "test": [
             "pytest",
+            "pytest-rerunfailures",
             "hypothesis",
             "scipy",
             "pin",

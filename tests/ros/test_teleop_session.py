@@ -150,3 +150,26 @@ def test_real_time_options_are_taken_or_refused_in_one_line():
         assert apply_options(RealTimeParameters(cpus=tuple(allowed), freeze_gc=False)) == []
     finally:
         os.sched_setaffinity(0, allowed)
+
+
+def test_a_subscriber_that_never_reads_does_not_slow_the_session(peer, session):
+    deaf = [peer.listen(topic) for topic in STREAMS]
+    before = peer.wait_value("slave_sim", "ticks", lambda ticks: ticks > 0)
+    after = peer.wait_value("slave_sim", "ticks", lambda ticks: ticks > before + 3000)
+    assert len(deaf) == len(STREAMS)
+    assert after > before
+    assert float(peer.status("slave_sim").values["dropped_time_ms"]) == 0.0
+
+
+def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(peer, session):
+    change(peer, "inverse_kinematics", Transition.TRANSITION_DEACTIVATE)
+    peer.wait_state("inverse_kinematics", "inactive")
+    measured = peer.listen(topics.SLAVE_MEASURED_JS)
+    home, clock = peer.wait(lambda: measured.take() and measured.values[-1][:6], "joints"), 0
+    for _ in range(5000):
+        clock = max(clock + 1, peer.node.get_clock().now().nanoseconds)
+        peer.send(topics.SLAVE_SERVO_JP, clock, home)
+    peer.wait_value("slave_sim", "received.slave/servo_jp", lambda count: count > 1000)
+    assert float(peer.status("slave_sim").values["dropped_time_ms"]) == 0.0
+    measured.take()
+    assert np.ptp(np.array(measured.values)[-500:, :6], axis=0).max() < 1e-3
