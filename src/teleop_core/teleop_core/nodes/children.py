@@ -1,5 +1,6 @@
 """Children: the processes of a live session, each one node, from start to end."""
 
+import atexit
 import os
 import random
 import signal
@@ -28,6 +29,12 @@ def environment() -> dict[str, str]:
 
 
 _reserved: deque[socket.socket] = deque(maxlen=8)
+
+
+@atexit.register
+def _release() -> None:
+    while _reserved:
+        _reserved.pop().close()
 
 
 def free_domain() -> str:
