@@ -1,5 +1,6 @@
 """Every node, as a real process, answers on its topics, takes parameters and ends cleanly."""
 
+import resource
 import signal
 import subprocess
 import sys
@@ -144,6 +145,18 @@ def test_what_arrived_just_before_the_signal_is_recorded(peer, tmp_path):
     assert stamps[-1] == 1000 * MS
     assert (np.diff(stamps) > 0).all()
     assert len(stamps) > 500
+
+
+def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer, tmp_path):
+    recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    peer.start("haptic_master")
+    # As on a full disk, no file of the recorder can grow beyond this.
+    resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (300_000, 300_000))
+    assert recorder.process.wait(60) == 1
+    (line,) = recorder.stderr.read_text().strip().splitlines()
+    assert "cannot be written any further" in line
+    assert "are safe" in line
+    assert Bag(tmp_path / "bag").topics["master/measured_cp"].count > 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -13,6 +13,7 @@ from teleop_core.bags import topics
 from teleop_core.bags.recording import RecordingParameters
 from teleop_core.bags.topics import Quality, Topic
 from teleop_core.bags.writer import BagWriter
+from teleop_core.errors import RecordingError
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.process import run
 from teleop_core.nodes.streams import Subscription
@@ -115,7 +116,7 @@ class RecorderNode(CoreNode):
             Path(name), topics.ALL, (), parameters=parameters, metadata=_metadata(parameters),
             start_ns=time.time_ns(),
         )  # fmt: skip
-        self.stage = self._writer
+        self.stage, self._is_broken = self._writer, False
         every = parameters.every_nth(topics.ALL)
         self._recorded = [topic for topic in topics.ALL if every[topic.name]]
 
@@ -131,21 +132,29 @@ class RecorderNode(CoreNode):
 
     def stop(self) -> None:
         """Record what came last, and close the topics."""
-        self._drain()
-        for channel in self.channels.values():
-            channel.close()
+        try:
+            if not self._is_broken:
+                self._drain()
+        finally:
+            for channel in self.channels.values():
+                channel.close()
 
     def teardown(self) -> None:
         """Finish the recording."""
-        self._writer.close()
+        if not self._is_broken:
+            self._writer.close()
 
     def _drain(self) -> None:
         came: list[Arrival] = []
         for channel in self.channels.values():
             channel.drain(came)
         came.sort(key=lambda message: message[0])
-        for received_ns, topic, data, sent_ns in came:
-            self._writer.write(topic, received_ns, data, sent_ns)
+        try:
+            for received_ns, topic, data, sent_ns in came:
+                self._writer.write(topic, received_ns, data, sent_ns)
+        except RecordingError:
+            self._is_broken = True  # said once; what is safe has been closed
+            raise
 
     def concerns(self) -> list[str]:
         """Topics of which messages were lost before they came here."""
