@@ -198,6 +198,7 @@ def compare(seconds: float) -> None:
         ("the same, real_time.priority=50", lambda: live(seconds, *_FIFO)),
         ("five nodes composed", lambda: live(seconds, "--composed")),
         ("the same, real_time.priority=50", lambda: live(seconds, "--composed", *_FIFO)),
+        ("five processes, a busy process beside", lambda: live(seconds)),
         ("five nodes composed, a busy process beside", lambda: live(seconds, "--composed")),
     ):
         beside = subprocess.Popen([sys.executable, "-c", spin]) if "busy" in name else None
