@@ -108,3 +108,24 @@ def test_kernel_bound_to_its_arguments_does_the_same():
     a[:] = (1.0, 0.0, 0.0, 0.0)
     step()
     assert np.array_equal(through, b)
+
+
+@compiled.inner
+def power(x, n):
+    return x**n
+
+
+@compiled.kernel
+def polynomial(x):
+    return power(x, 2) + power(x, 3)
+
+
+def test_inner_kernel_refuses_a_call_from_python_and_serves_kernels():
+    assert polynomial(2.0) == 12.0
+    with pytest.raises(TypeError, match="power is called by kernels only"):
+        power(2.0, 3)
+
+
+def test_numbers_written_in_a_call_share_one_compilation():
+    polynomial(2.0)
+    assert len(power.overloads) == 1

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from teleop_core.geometry import rotation, rotation_angle_between, transform
+from teleop_core.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import load_table, parse_table
 from teleop_core.robots.five_axis import pitch_and_roll
@@ -94,7 +95,7 @@ def test_no_other_attitude_of_the_arm_is_nearer_than_the_one_it_takes():
 
         def miss(pitch, roll, q1=q1, wanted=wanted):
             pose = ARM.fk(np.array([q1, 0.0, 0.0, pitch, roll]))
-            return rotation_angle_between(pose[:3, :3].copy(), wanted.copy())
+            return Rotation.from_matrix(pose[:3, :3].T @ wanted).magnitude()
 
         best = miss(psi, q5)
         grid = np.linspace(-math.pi, math.pi, 61)

@@ -5,6 +5,7 @@ a kernel that it calls changes; a stale caller would silently go on with old for
 stamp of a cached kernel therefore covers the files of all kernels it calls.
 """
 
+import gc
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -12,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import types
 from numba.core.caching import NullCache
 from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
 # Function pointers as arguments are what lets one compiled graph run any robot.
@@ -23,13 +26,58 @@ warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatu
 # Division by zero gives infinity or NaN as in NumPy, not an exception in the middle of a loop;
 # pointers (below) make their own C wrapper, so kernels compile faster without one.
 _ERRORS: dict[str, Any] = {"error_model": "numpy"}
-_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "no_cfunc_wrapper": True, **_ERRORS}
+_OPTIONS = {"nopython": True, "nogil": True, "no_cfunc_wrapper": True, **_ERRORS}
 
 _sources: dict[Any, frozenset[str]] = {}
 
 
-def _stamped(compiled: Any, function: Callable[..., Any]) -> Any:
-    """Let the disk cache of a compiled function depend on every file its kernels come from."""
+def _roomy(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Function whose frame is so large that all it calls finds room beside it.
+
+    CPython keeps frames in chunks of 16 KiB. A deep compiler crosses the end of a chunk thousands
+    of times, each time with a system call: a quarter of its time. A large frame gets a large
+    chunk, the rest of which serves the frames after it.
+    """
+    function.__code__ = function.__code__.replace(co_stacksize=70_000)  # 560 KB of 1 MiB
+    return function
+
+
+class _Kernel(CPUDispatcher):
+    """Compiles a kernel once, in as little time as numba lets it.
+
+    Numbers that are written in a call count as any number of their type, where numba would
+    compile again for each of their values.
+    """
+
+    @_roomy
+    def compile(self, sig: Any) -> Any:
+        # Millions of objects are made and kept: looking through them for garbage is for nothing.
+        is_enabled = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile(sig)
+        finally:
+            if is_enabled:
+                gc.enable()
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        plain = [types.unliteral(kind) for kind in args]
+        return super().get_call_template(
+            plain, {name: types.unliteral(kind) for name, kind in kws.items()}
+        )
+
+
+class _InnerKernel(_Kernel):
+    """Has no way in from Python; numba would crash where this raises."""
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        raise TypeError(f"{self.py_func.__name__} is called by kernels only: decorate it with kernel")
+
+
+def _compiled(kind: Any, function: Callable[..., Any], **options: bool) -> Any:
+    """Lazily compiled function, whose cache depends on every file its kernels come from."""
+    compiled = kind(function, targetoptions={**_OPTIONS, **options})
+    compiled.enable_caching()
     code, names = function.__code__, function.__globals__
     called: list[Any] = [names.get(name) for name in code.co_names]
     inner = [_sources[value.py_func] for value in called if _is_kernel(value)]
@@ -57,7 +105,15 @@ def kernel(function: Callable[..., Any]) -> Any:
     releases the interpreter lock, so that other threads run beside it. Arrays must be writable:
     numba compiles a second time for read-only ones.
     """
-    return _stamped(numba.njit(**_OPTIONS)(function), function)
+    return _compiled(_Kernel, function)
+
+
+def inner(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that only other kernels call: a third less work than :func:`kernel`.
+
+    A call from Python raises TypeError.
+    """
+    return _compiled(_InnerKernel, function, no_cpython_wrapper=True)
 
 
 def pointer(compiled: Any, signature: Any) -> Any:

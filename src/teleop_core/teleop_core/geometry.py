@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError, ShapeError
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ def pose_from_transform(transform: Array, pose: Array) -> None:
     quaternion_from_rotation(transform, pose[3:7])
 
 
-@kernel
+@inner
 def compose(a: Array, b: Array, product: Array) -> None:
     """Write the transform ``a @ b`` (4, 4) into ``product``, which is neither of them."""
     for i in range(3):
@@ -106,19 +106,18 @@ def compose(a: Array, b: Array, product: Array) -> None:
     product[3, 3] = 1.0
 
 
-@kernel
+@inner
 def rotation_angle_between(a: Array, b: Array) -> float:
     """Angle [rad] of the rotation between two matrices; exact for small and for large angles."""
-    trace = 0.0
+    trace, square = 0.0, 0.0
     for i in range(3):
-        for j in range(3):
-            trace += a[j, i] * b[j, i]
-    x, y, z = 0.0, 0.0, 0.0
-    for j in range(3):
-        x += a[j, 2] * b[j, 1] - a[j, 1] * b[j, 2]
-        y += a[j, 0] * b[j, 2] - a[j, 2] * b[j, 0]
-        z += a[j, 1] * b[j, 0] - a[j, 0] * b[j, 1]
-    return math.atan2(0.5 * math.sqrt(x * x + y * y + z * z), 0.5 * (trace - 1.0))
+        j, k = (i + 1) % 3, (i + 2) % 3
+        twice_sine = 0.0  # part about axis i, from the skew part of aᵀ b
+        for row in range(3):
+            trace += a[row, i] * b[row, i]
+            twice_sine += a[row, k] * b[row, j] - a[row, j] * b[row, k]
+        square += twice_sine * twice_sine
+    return math.atan2(0.5 * math.sqrt(square), 0.5 * (trace - 1.0))
 
 
 @kernel
@@ -128,17 +127,19 @@ def is_rigid(transform: Array) -> bool:
     Two unit columns at right angles and their cross product as the third say it all; a NaN or
     infinity anywhere makes a comparison fail.
     """
-    t = transform
-    first = t[0, 0] * t[0, 0] + t[1, 0] * t[1, 0] + t[2, 0] * t[2, 0] - 1.0
-    second = t[0, 1] * t[0, 1] + t[1, 1] * t[1, 1] + t[2, 1] * t[2, 1] - 1.0
-    cosine = t[0, 0] * t[0, 1] + t[1, 0] * t[1, 1] + t[2, 0] * t[2, 1]
-    x = t[1, 0] * t[2, 1] - t[2, 0] * t[1, 1] - t[0, 2]
-    y = t[2, 0] * t[0, 1] - t[0, 0] * t[2, 1] - t[1, 2]
-    z = t[0, 0] * t[1, 1] - t[1, 0] * t[0, 1] - t[2, 2]
-    off = first * first + second * second + cosine * cosine + x * x + y * y + z * z
-    is_last = t[3, 0] == 0.0 and t[3, 1] == 0.0 and t[3, 2] == 0.0 and t[3, 3] == 1.0
-    is_place = math.isfinite(t[0, 3]) and math.isfinite(t[1, 3]) and math.isfinite(t[2, 3])
-    return off <= 2e-12 and is_last and is_place
+    first, second, cosine, third = -1.0, -1.0, 0.0, 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        x, y = transform[i, 0], transform[i, 1]
+        first += x * x
+        second += y * y
+        cosine += x * y
+        cross = transform[j, 0] * transform[k, 1] - transform[k, 0] * transform[j, 1]
+        third += (cross - transform[i, 2]) ** 2
+        if not math.isfinite(transform[i, 3]) or transform[3, i] != 0.0:
+            return False
+    off = first * first + second * second + cosine * cosine + third
+    return off <= 2e-12 and transform[3, 3] == 1.0
 
 
 def rotation(axis: str, angle: float) -> Array:

@@ -5,7 +5,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from teleop_core.bags.layouts import Bytes, Stamps
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 
 Rows = NDArray[np.int64]
 _MESSAGE = int(Opcode.MESSAGE)
@@ -13,7 +13,7 @@ _MESSAGE_HEAD = 22
 OPCODE, BEGIN, SIZE, CHANNEL, LOG = range(5)
 
 
-@kernel
+@inner
 def _little_endian(data, at, count):  # type: ignore[no-untyped-def]
     """Unsigned number of ``count`` bytes; of eight bytes as a signed one."""
     number = np.int64(0)

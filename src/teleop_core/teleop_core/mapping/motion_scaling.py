@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import bound, kernel
+from teleop_core.compiled import bound, inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import (
     Array,
@@ -100,14 +100,14 @@ def mapped_orientation(p: Any, stylus: Array, tool: Array) -> None:
     multiply_quaternions(tool, p.stylus_tool, tool)
 
 
-@kernel
+@inner
 def _toggle_mode(s: Any, buttons: Array) -> None:
     """Change the mode at the rising edge of its button."""
     if buttons[2] > s.buttons[2]:
         s.is_fine = 1 - s.is_fine
 
 
-@kernel
+@inner
 def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
     """Put the box around the present position, or take it away, at the rising edge."""
     if buttons[1] > s.buttons[1]:
@@ -116,7 +116,7 @@ def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
             s.center[i] = position[i]
 
 
-@kernel
+@inner
 def _latch(s: Any, position: Array, tool: Array) -> None:
     """Hold the command and measure further motion from here: no step, whatever happened before.
 
@@ -132,7 +132,7 @@ def _latch(s: Any, position: Array, tool: Array) -> None:
     multiply_quaternions(s.command[3:7], inverse, s.alignment)
 
 
-@kernel
+@inner
 def _move(s: Any, gain: float, position: Array, tool: Array) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = np.empty(3)
@@ -150,7 +150,7 @@ def _move(s: Any, gain: float, position: Array, tool: Array) -> None:
         s.command[i] *= 1.5 - 0.5 * square
 
 
-@kernel
+@inner
 def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
     """Write teleop_state; the box in the slave's base, where it is what the slave is held in."""
     state = row.teleop_state

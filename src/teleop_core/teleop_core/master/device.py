@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import (
     Array,
     compose,
@@ -84,7 +84,7 @@ def read_handle(handle: Any, position: Array, attitude: Array, pose: Array) -> N
     pose_from_transform(T, pose)
 
 
-@kernel
+@inner
 def measure_twist(s: Any, pose: Array, twist: Array) -> None:
     """Write the twist (6,) from the readings of two samples through a 5 ms low-pass."""
     share = 1e-3 / (1e-3 + 5e-3)

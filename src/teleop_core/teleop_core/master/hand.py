@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner
 from teleop_core.geometry import Array
 from teleop_core.parameters import parameter
 
@@ -30,7 +30,7 @@ class HandParameters:
     )
 
 
-@kernel
+@inner
 def tremble(p: Any, s: Any, noise: Array, tremor: Array) -> None:
     """Write the wanted tremor (3,) [m]: one line per axis whose frequency wanders in its band."""
     for i in range(3):
@@ -41,7 +41,7 @@ def tremble(p: Any, s: Any, noise: Array, tremor: Array) -> None:
         tremor[i] = p.tremor * math.sin(s.phase[i])
 
 
-@kernel
+@inner
 def move_hand(p: Any, s: Any, wanted: Array, force: Array) -> None:
     """Move tip and hand on by one tick under the device's force (3,) [N].
 

@@ -2,7 +2,7 @@
 
 import math
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner
 from teleop_core.geometry import Array
 
 # Rounding that a joint on its limit may show [rad or m].
@@ -11,7 +11,7 @@ _SLACK = 1e-12
 OUTSIDE = 100.0
 
 
-@kernel
+@inner
 def wrapped(angle: float) -> float:
     """Same angle [rad] in (-pi, pi]."""
     if -math.pi < angle <= math.pi:
@@ -19,14 +19,14 @@ def wrapped(angle: float) -> float:
     return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
 
 
-@kernel
+@inner
 def bounded(wanted: float, seed: float, lower: float, upper: float, step: float) -> float:
     """Nearest value to ``wanted`` within a step of the seed and inside the limits."""
     near = min(max(wanted, seed - step), seed + step)
     return min(max(near, lower), upper)
 
 
-@kernel
+@inner
 def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
     """Write ``q`` on the straight way from the seed to ``wanted``; whether it got there.
 
@@ -53,7 +53,7 @@ def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
     return is_there
 
 
-@kernel
+@inner
 def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool) -> float:
     """Same angle by whole turns [rad]: next to the seed, inside the limits where one is.
 
@@ -71,7 +71,7 @@ def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool)
     return angle
 
 
-@kernel
+@inner
 def move_cost(q: Array, seed: Array, limits: Array, first: int, last: int) -> float:
     """Largest move of joints first..last-1 from the seed, the metric that orders branches.
 
@@ -86,7 +86,7 @@ def move_cost(q: Array, seed: Array, limits: Array, first: int, last: int) -> fl
     return worst if is_path or outside <= _SLACK else OUTSIDE + worst
 
 
-@kernel
+@inner
 def is_allowed(q: Array, seed: Array, limits: Array) -> bool:
     """Whether every joint is inside its limits and within its step of the seed."""
     for i in range(q.shape[0]):
@@ -95,7 +95,7 @@ def is_allowed(q: Array, seed: Array, limits: Array) -> bool:
     return True
 
 
-@kernel
+@inner
 def cheapest(costs: Array) -> int:
     """Index of the smallest cost, the first of equal ones."""
     best = 0

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 
 # Squared weighted error that counts as zero: 1e-12 m at a length of 0.1 m, 1e-11 rad.
@@ -23,14 +23,14 @@ _FLOOR = 1e-12
 
 
 # Loops instead of slices and numpy calls: the same speed, a fraction of the compile time.
-@kernel
+@inner
 def assign(target: Array, source: Array) -> None:
     """Write the values of ``source`` (m,) into ``target``."""
     for i in range(target.shape[0]):
         target[i] = source[i]
 
 
-@kernel
+@inner
 def weigh(J: Array, length: float) -> None:
     """Divide the linear rows of a Jacobian (6, n) by a length [m]."""
     for r in range(3):
@@ -67,7 +67,7 @@ def pose_error(reached: Array, wanted: Array, length: float, error: Array) -> fl
     return square
 
 
-@kernel
+@inner
 def factorise(A: Array) -> None:
     """Replace the lower triangle of a positive definite A (m, m) by its Cholesky factor."""
     for j in range(A.shape[0]):
@@ -96,7 +96,7 @@ def solve(L: Array, b: Array) -> None:
         b[i] /= L[i, i]
 
 
-@kernel
+@inner
 def gram(J: Array, is_free: Array, damping: float, A: Array) -> None:
     """Write J Jᵀ + damping I, (6, 6), over the columns of J (6, n) that are free (1.0 or 0.0)."""
     for r in range(6):
@@ -107,7 +107,7 @@ def gram(J: Array, is_free: Array, damping: float, A: Array) -> None:
             A[r, s] = A[s, r] = value
 
 
-@kernel
+@inner
 def free_joints(J: Array, error: Array, q: Array, box: Array, is_free: Array) -> float:
     """Write 1.0 for joints that the error does not push out of the box (2, n), else 0.0.
 
@@ -125,7 +125,7 @@ def free_joints(J: Array, error: Array, q: Array, box: Array, is_free: Array) ->
     return math.sqrt(square)
 
 
-@kernel
+@inner
 def damped_move(
     J: Array, error: Array, damping: float, is_free: Array, box: Array, q: Array, moved: Array
 ) -> None:

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 from teleop_core.robots.damped import ZERO, damped_move, factorise, free_joints, gram, pose_error
 from teleop_core.robots.robot import REACHED, IkStatus, is_askable, pose_residual
@@ -25,7 +25,7 @@ _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
-@kernel
+@inner
 def _append(geometry: Array, n: int, index: int, T: Array) -> None:
     """Replace T by T times constant transform ``index``."""
     at = n + 7 + 12 * index
@@ -40,7 +40,7 @@ def _append(geometry: Array, n: int, index: int, T: Array) -> None:
             )
 
 
-@kernel
+@inner
 def _move(kind: float, q: float, T: Array) -> None:
     """Replace T by T times the turn or slide of one joint."""
     if abs(kind) > 1.5:
@@ -91,7 +91,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
             J[0, j], J[1, j], J[2, j] = b * z - c * y, c * x - a * z, a * y - b * x
 
 
-@kernel
+@inner
 def _masked_error(reached: Array, T: Array, geometry: Array, n: int, error: Array) -> float:
     """Write the weighted error (6,) in the controlled directions; its squared norm."""
     pose_error(reached, T, geometry[n], error)
@@ -102,7 +102,7 @@ def _masked_error(reached: Array, T: Array, geometry: Array, n: int, error: Arra
     return square
 
 
-@kernel
+@inner
 def _weighted_jacobian(q: Array, geometry: Array, J: Array) -> None:
     """Write the Jacobian (6, n) with linear rows over the reach and uncontrolled rows zero."""
     n = q.shape[0]
@@ -113,7 +113,7 @@ def _weighted_jacobian(q: Array, geometry: Array, J: Array) -> None:
             J[r, j] *= weight
 
 
-@kernel
+@inner
 def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
     """Lower the error from ``q`` (n,), inside a box (2, n), until it is zero or least.
 
@@ -161,7 +161,7 @@ def _start(number: int, box: Array, q: Array) -> None:
         q[i] = box[0, i] + share * (box[1, i] - box[0, i])
 
 
-@kernel
+@inner
 def _distance(a: Array, b: Array) -> float:
     """Largest difference of two joint vectors."""
     worst = 0.0
@@ -170,7 +170,7 @@ def _distance(a: Array, b: Array) -> float:
     return worst
 
 
-@kernel
+@inner
 def _search(T: Array, seed: Array, box: Array, geometry: Array, q: Array) -> None:
     """Look from all over the box; replace ``q`` by the reached pose nearest to the seed."""
     trial, nearest = np.empty(q.shape[0]), math.inf
@@ -185,7 +185,7 @@ def _search(T: Array, seed: Array, box: Array, geometry: Array, q: Array) -> Non
                 q[i] = trial[i]
 
 
-@kernel
+@inner
 def _status(q: Array, T: Array, box: Array, geometry: Array, residual: Array) -> int:
     """Write the residual (2,) and say how well ``q`` does what T asks."""
     n, reached, error = q.shape[0], np.empty((4, 4)), np.empty(6)

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array, quaternion_from_rotation
 from teleop_core.robots.branches import OUTSIDE, bounded, is_allowed, move_cost, turned, wrapped
@@ -151,7 +151,7 @@ def _solve(T: Array, geometry: Array, is_back: bool, seed: Array, rows: Array) -
     return is_reachable
 
 
-@kernel
+@inner
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
     d1, a2, d5 = geometry[0], geometry[1], geometry[3]
@@ -170,7 +170,7 @@ def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> 
         q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
 
 
-@kernel
+@inner
 def _is_met(q: Array, T: Array) -> bool:
     """Whether pitch and roll are the wanted ones."""
     psi = q[1] + q[2] + q[3]

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots.assumed_drives import geared_motors
@@ -45,7 +45,7 @@ _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
-@kernel
+@inner
 def _angles(theta1: float, g: Array) -> tuple[float, float]:
     """Rocker and coupler angle [rad] in the robot's mode; of the smallest gap when open."""
     l0, l1, l2, l3 = g[0], g[1], g[2], g[3]
@@ -87,7 +87,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
     J[5, 0] = turn
 
 
-@kernel
+@inner
 def _distance(theta1: float, x: float, y: float, g: Array) -> float:
     """Distance [m] of the coupler point from (x, y)."""
     _, coupler = _angles(theta1, g)
@@ -96,7 +96,7 @@ def _distance(theta1: float, x: float, y: float, g: Array) -> float:
     return math.hypot(dx, dy)
 
 
-@kernel
+@inner
 def _refined(theta1: float, lower: float, upper: float, T: Array, g: Array) -> float:
     """Crank angle in [lower, upper] whose coupler point is, going down, nearest to T's."""
     q, J, reached = np.empty(1), np.empty((6, 1)), np.empty((4, 4))
@@ -123,7 +123,7 @@ def _refined(theta1: float, lower: float, upper: float, T: Array, g: Array) -> f
     return theta1
 
 
-@kernel
+@inner
 def _candidate(k: int, T: Array, g: Array) -> float:
     """One of the two crank angles whose end is ``a`` away from T's point."""
     x, y, l1, a = T[0, 3], T[1, 3], g[1], g[4]

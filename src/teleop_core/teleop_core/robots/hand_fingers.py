@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 from teleop_core.robots.branches import bounded, turned, wrapped
 
@@ -31,7 +31,7 @@ def finger_point(q: Array, links: Array, p: Array) -> None:
     p[2] = links[1] * math.sin(q[1]) + links[2] * math.sin(outer)
 
 
-@kernel
+@inner
 def finger_jacobian(q: Array, links: Array, J: Array) -> None:
     """Write the slopes (3, 3) of the contact point in F along theta, psi, phi [m/rad]."""
     c, s, outer = math.cos(q[0]), math.sin(q[0]), q[1] + q[2]
@@ -44,7 +44,7 @@ def finger_jacobian(q: Array, links: Array, J: Array) -> None:
     J[2, 1] = J[2, 2] + links[1] * math.cos(q[1])
 
 
-@kernel
+@inner
 def _bent(r: float, z: float, links: Array, is_positive: bool, q: Array) -> bool:
     """Write psi and phi of q (3,) for a point r ahead of, z above joint 2; whether it reaches."""
     l2, l3 = links[1], links[2]
@@ -70,14 +70,14 @@ def finger_branch(p: Array, links: Array, branch: int, seed: float, q: Array) ->
     return bool(_bent(r, p[2], links, branch % 2 == 0, q))
 
 
-@kernel
+@inner
 def _branch_of(seed: Array, links: Array) -> int:
     """Branch that a finger is on."""
     reach = links[0] + links[1] * math.cos(seed[1]) + links[2] * math.cos(seed[1] + seed[2])
     return (2 if reach < 0.0 else 0) + (0 if math.sin(seed[2]) >= 0.0 else 1)
 
 
-@kernel
+@inner
 def _nearest_branch(p: Array, links: Array, seed: Array, limits: Array) -> int:
     """Branch nearest to the seed by the largest joint move, inside the limits if one is."""
     q, best, least = np.empty(3), 0, math.inf
@@ -94,7 +94,7 @@ def _nearest_branch(p: Array, links: Array, seed: Array, limits: Array) -> int:
     return best
 
 
-@kernel
+@inner
 def finger_joints(p: Array, links: Array, seed: Array, limits: Array, q: Array) -> bool:
     """Write theta, psi, phi (3,) for a contact point; whether the finger reaches it at all.
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.geometry import Array, checked_array, is_rigid
 from teleop_core.robots.hand_fingers import finger_branch, finger_jacobian, finger_point
@@ -68,7 +68,7 @@ def wanted_contact(i: int, T: Array, g: Array, p: Array) -> None:
         p[r] = T[r, 3] + T[r, 0] * x + T[r, 1] * y
 
 
-@kernel
+@inner
 def local_contact(i: int, T: Array, g: Array, p: Array) -> None:
     """Write where contact i of the object at T is, (3,) [m], in finger frame F_i."""
     wanted_contact(i, T, g, p)

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 from teleop_core.robots.mma_forward import groups
 
@@ -19,7 +19,7 @@ BRANCHES = 8
 _ROUNDING = 1e-12  # a point this far out of reach [m] still counts as on the edge
 
 
-@kernel
+@inner
 def _wrist_centre(T: Array, turn: float, geometry: Array, out: Array) -> None:
     """Write rows (4, 3): where axes 6 and 8 meet [m], K, column 1 and X, for θ10 = ``turn``."""
     _, S, F, G = groups(geometry)
@@ -34,7 +34,7 @@ def _wrist_centre(T: Array, turn: float, geometry: Array, out: Array) -> None:
         out[3, i] = c10 * T[i, 2] - s10 * column2
 
 
-@kernel
+@inner
 def _shoulder(wrist: Array, is_back: bool, geometry: Array, seed: Array, q: Array) -> float:
     """Write θ1; the radius of the arm in its plane [m], NaN when axis 6 cannot pass the centre.
 
@@ -53,7 +53,7 @@ def _shoulder(wrist: Array, is_back: bool, geometry: Array, seed: Array, q: Arra
     return float(radius)
 
 
-@kernel
+@inner
 def _wrist(wrist: Array, is_flipped: bool, seed: Array, q: Array) -> float:
     """Write θ6 and θ8 for a given θ1; returns θ23.
 
@@ -75,7 +75,7 @@ def _wrist(wrist: Array, is_flipped: bool, seed: Array, q: Array) -> float:
     return float(pitch)
 
 
-@kernel
+@inner
 def _miss(radius: float, height: float, geometry: Array) -> float:
     """How far a point in the plane of the arm is out of reach of the two long links [m]."""
     a2, a3 = geometry[1], geometry[2]
@@ -84,7 +84,7 @@ def _miss(radius: float, height: float, geometry: Array) -> float:
     return float(miss) if miss > _ROUNDING else 0.0
 
 
-@kernel
+@inner
 def _elbow(
     radius: float, height: float, is_other: bool, geometry: Array, seed: Array, q: Array
 ) -> None:
@@ -158,7 +158,7 @@ def unwrapped(q: Array, seed: Array, limits: Array) -> float:
     return float(worst)
 
 
-@kernel
+@inner
 def nearest_branch(
     T: Array, turn: float, seed: Array, limits: Array, geometry: Array, best: float, found: Array
 ) -> float:
@@ -189,7 +189,7 @@ def nearest_branch(
     return float(best)
 
 
-@kernel
+@inner
 def least_miss(
     T: Array, turn: float, seed: Array, geometry: Array, least: float, found: Array
 ) -> float:

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 
 # Lengths [m] in the symbols of table 4.4; magnitudes, so d7 and d9 enter tables with a minus.
@@ -34,7 +34,7 @@ def groups(geometry: Array) -> tuple[float, float, float, float]:
     return g[3] + g[6], g[5] + g[8], g[7] + g[9], g[10] + g[11]
 
 
-@kernel
+@inner
 def wrist_axes(q: Array, axes: Array) -> None:
     """Write columns of ``axes`` (3 or more rows and columns): col1, K, X in base axes.
 

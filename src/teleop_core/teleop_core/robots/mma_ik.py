@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 from teleop_core.robots.branches import bounded
 from teleop_core.robots.damped import (
@@ -41,7 +41,7 @@ _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
-@kernel
+@inner
 def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
     """Lower the pose error from ``q`` (7,), inside a box, until it is zero or least.
 
@@ -81,7 +81,7 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
     return float(square)
 
 
-@kernel
+@inner
 def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
     """Move ``q`` (7,) inside a box to the pose T, or as near as a neighbourhood allows.
 
@@ -106,7 +106,7 @@ def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> f
     return float(square)
 
 
-@kernel
+@inner
 def _cost(
     T: Array, turn: float, choice: int, seed: Array, limits: Array, geometry: Array, q: Array
 ) -> float:
@@ -136,7 +136,7 @@ def _scan(
     return float(best)
 
 
-@kernel
+@inner
 def _refine(T: Array, seed: Array, limits: Array, geometry: Array, found: Array, q: Array) -> float:
     """Write the joints at the θ10 within one step where the largest joint move is least."""
     choice, turn, width = int(found[1]), found[0], 0.5 * _STEP
@@ -154,7 +154,7 @@ def _refine(T: Array, seed: Array, limits: Array, geometry: Array, found: Array,
     return float(best)
 
 
-@kernel
+@inner
 def _nearest_miss(T: Array, seed: Array, geometry: Array, q: Array) -> float:
     """Write the branch whose wrist stays away least over a full turn of θ10; that distance [m]."""
     found, least, width = np.empty(2), math.inf, 2.0 * _STEP
@@ -172,7 +172,7 @@ def _nearest_miss(T: Array, seed: Array, geometry: Array, q: Array) -> float:
     return float(least)
 
 
-@kernel
+@inner
 def _can_reach(T: Array, q: Array, geometry: Array) -> bool:
     """Whether any joint vector reaches a pose, limits or not, searched from θ10 of ``q``."""
     H, S, F, G = groups(geometry)
@@ -183,7 +183,7 @@ def _can_reach(T: Array, q: Array, geometry: Array) -> bool:
     return bool(_nearest_miss(T, q, geometry, np.empty(7)) == 0.0)
 
 
-@kernel
+@inner
 def _search_branches(
     T: Array, seed: Array, limits: Array, geometry: Array, left: float, q: Array
 ) -> None:

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots.branches import bounded, is_allowed, move_cost, turned, wrapped
@@ -52,13 +52,13 @@ _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
-@kernel
+@inner
 def pointing(x: float, y: float, seed: float) -> float:
     """Direction [rad] of a point from an axis; the seed if it lies on the axis."""
     return math.atan2(y, x) if x * x + y * y > ON_AXIS * ON_AXIS else seed
 
 
-@kernel
+@inner
 def elbow_angle(x: float, y: float, a: float, b: float) -> tuple[float, bool]:
     """Angle in [0, pi] between links a and b that puts their end at the distance of (x, y).
 
@@ -72,7 +72,7 @@ def elbow_angle(x: float, y: float, a: float, b: float) -> tuple[float, bool]:
     return math.atan2(root, k), abs(k) <= 1.0 + ON_AXIS
 
 
-@kernel
+@inner
 def first_angle(x: float, y: float, a: float, b: float, elbow: float, seed: float) -> float:
     """Angle [rad] of link a that points links a and b, bent by the elbow, at (x, y).
 
@@ -84,7 +84,7 @@ def first_angle(x: float, y: float, a: float, b: float, elbow: float, seed: floa
     return pointing(x, y, seed + math.atan2(across, along)) - math.atan2(across, along)
 
 
-@kernel
+@inner
 def second_angle(x: float, y: float, a: float, q1: float, seed: float) -> float:
     """Angle [rad] between the links that points link b at (x, y) from where link a really is."""
     elbow_x, elbow_y = a * math.cos(q1), a * math.sin(q1)
@@ -142,7 +142,7 @@ def _solve(T: Array, geometry: Array, is_other: bool, seed: Array, q: Array) -> 
     return is_reachable
 
 
-@kernel
+@inner
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
     turn, is_path = heading(T), math.isfinite(limits[2, 0])

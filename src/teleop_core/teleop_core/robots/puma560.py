@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots.branches import bounded, cheapest, is_allowed, move_cost, turned, wrapped
@@ -72,17 +72,15 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     c5, s5 = math.cos(q[4]), math.sin(q[4])
     c6, s6 = math.cos(q[5]), math.sin(q[5])
     # Columns of 3_6T, turned into the base one by one.
+    u, v, w = c6, s6, 0.0
     for column in range(3):
-        if column == 0:
-            x, y, z = c4 * c5 * c6 - s4 * s6, s5 * c6, -s4 * c5 * c6 - c4 * s6
-        elif column == 1:
-            x, y, z = -c4 * c5 * s6 - s4 * c6, -s5 * s6, s4 * c5 * s6 - c4 * c6
-        else:
-            x, y, z = -c4 * s5, c5, s4 * s5
+        f, y = c5 * u - s5 * w, s5 * u + c5 * w
+        x, z = c4 * f - s4 * v, -s4 * f - c4 * v
         h = c23 * x - s23 * y
         T[0, column] = c1 * h - s1 * z
         T[1, column] = s1 * h + c1 * z
         T[2, column] = -s23 * x - c23 * y
+        u, v, w = (-s6, c6, 0.0) if column == 0 else (0.0, 0.0, 1.0)
     u = a2 * math.cos(q[1]) + a3 * c23 - d4 * s23
     T[0, 3] = c1 * u - s1 * d3
     T[1, 3] = s1 * u + c1 * d3
@@ -116,7 +114,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
     J[3, 5], J[4, 5], J[5, 5] = T[0, 2], T[1, 2], T[2, 2]
 
 
-@kernel
+@inner
 def _bend(u: float, z: float, geometry: Array) -> tuple[float, bool]:
     """Bend of the elbow that puts the wrist at its distance from axis 2, and whether one does.
 
@@ -129,7 +127,7 @@ def _bend(u: float, z: float, geometry: Array) -> tuple[float, bool]:
     return math.atan2(K, math.sqrt(max(square, 0.0))), square >= -_ON_AXIS
 
 
-@kernel
+@inner
 def _upper_arm(u: float, z: float, q3: float, geometry: Array, seed: float) -> float:
     """Joint 2 that points the arm, bent by joint 3, at the wrist; the seed if that is on axis 2."""
     a2, a3, d4 = geometry[0], geometry[1], geometry[3]
@@ -139,7 +137,7 @@ def _upper_arm(u: float, z: float, q3: float, geometry: Array, seed: float) -> f
     return math.atan2(-x * z - u * y, x * u - y * z) - q3
 
 
-@kernel
+@inner
 def _arms(T: Array, geometry: Array, seed: Array, arms: Array) -> bool:
     """Write joints 1 to 3 of the branches into four rows: front up, front down, back up, back down.
 
@@ -164,7 +162,7 @@ def _arms(T: Array, geometry: Array, seed: Array, arms: Array) -> bool:
     return square >= -_ON_AXIS and is_near
 
 
-@kernel
+@inner
 def _wrist_rotation(T: Array, q1: float, q23: float, M: Array) -> None:
     """Write R03ᵀ R, the rotation that is left to the wrist, into the 3x3 corner of M."""
     c1, s1, c23, s23 = math.cos(q1), math.sin(q1), math.cos(q23), math.sin(q23)
@@ -175,13 +173,13 @@ def _wrist_rotation(T: Array, q1: float, q23: float, M: Array) -> None:
         M[2, j] = -s1 * T[0, j] + c1 * T[1, j]
 
 
-@kernel
+@inner
 def _joint5(M: Array, c4: float, s4: float) -> float:
     """Joint 5 that brings the tool axis next to its wanted direction, given joint 4."""
     return math.atan2(s4 * M[2, 2] - c4 * M[0, 2], M[1, 2])
 
 
-@kernel
+@inner
 def _joint6(M: Array, c4: float, s4: float, c5: float, s5: float) -> float:
     """Joint 6 that turns the tool next to its wanted attitude, given joints 4 and 5."""
     h0, h1 = c4 * M[0, 0] - s4 * M[2, 0], c4 * M[0, 1] - s4 * M[2, 1]
@@ -190,7 +188,7 @@ def _joint6(M: Array, c4: float, s4: float, c5: float, s5: float) -> float:
     return math.atan2(y0 - x1, x0 + y1)
 
 
-@kernel
+@inner
 def _wrist(M: Array, seed: float, q: Array) -> None:
     """Write joints 4 to 6 of the branch with sin(q5) >= 0; joint 4 is the seed if it is zero."""
     s5 = math.sqrt(M[0, 2] * M[0, 2] + M[2, 2] * M[2, 2])
@@ -202,15 +200,16 @@ def _wrist(M: Array, seed: float, q: Array) -> None:
     q[5] = _joint6(M, c4, s4, M[1, 2], s5)
 
 
-@kernel
-def _turn(q: Array, seed: Array, limits: Array, first: int, last: int) -> None:
-    """Bring joints first..last-1 next to the seed, or into their limits, by whole turns."""
+@inner
+def _turned_cost(q: Array, seed: Array, limits: Array, first: int, last: int) -> float:
+    """Bring joints first..last-1 next to the seed, or into their limits; the cost of the move."""
     is_path = math.isfinite(limits[2, 0])
     for i in range(first, last):
         q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
+    return move_cost(q, seed, limits, first, last)
 
 
-@kernel
+@inner
 def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
     """Write the best of the eight branches; whether the wrist centre can be reached at all.
 
@@ -219,8 +218,7 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
     arms, costs = np.empty((4, 6)), np.empty(4)
     is_reachable, best = _arms(T, geometry, seed, arms), math.inf
     for branch in range(4):
-        _turn(arms[branch], seed, limits, 0, 3)
-        costs[branch] = move_cost(arms[branch], seed, limits, 0, 3)
+        costs[branch] = _turned_cost(arms[branch], seed, limits, 0, 3)
     for _ in range(4):
         arm = cheapest(costs)
         if costs[arm] >= best:
@@ -229,8 +227,7 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
         _wrist_rotation(T, trial[0], trial[1] + trial[2], M)
         _wrist(M, seed[3], trial)
         for _ in range(2):
-            _turn(trial, seed, limits, 3, 6)
-            cost = max(costs[arm], move_cost(trial, seed, limits, 3, 6))
+            cost = max(costs[arm], _turned_cost(trial, seed, limits, 3, 6))
             if cost < best:
                 best = cost
                 for i in range(6):
@@ -240,31 +237,31 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
     return is_reachable
 
 
-@kernel
+@inner
+def _held(angle: float, i: int, seed: Array, limits: Array) -> float:
+    """Angle of joint i next to its seed, within its step and inside its limits."""
+    low, high, step = limits[0, i], limits[1, i], limits[2, i]
+    return bounded(turned(angle, seed[i], low, high, math.isfinite(step)), seed[i], low, high, step)
+
+
+@inner
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
     lead = math.atan2(geometry[1], geometry[3])
     is_down = math.cos(lead - q[2]) < 0.0
-    u = z = 0.0
-    for i in (0, 2, 1, 3, 4, 5):
-        if i == 2:
-            u, z = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3], T[2, 3]
-            bend = _bend(u, z, geometry)[0]
-            q[2] = lead - (math.pi - bend if is_down else bend)
-        elif i == 1:
-            q[1] = _upper_arm(u, z, q[2], geometry, seed[1])
-        elif i == 3:
-            _wrist_rotation(T, q[0], q[1] + q[2], M)
-        elif i == 4:
-            q[4] = _joint5(M, math.cos(q[3]), math.sin(q[3]))
-        elif i == 5:
-            c5, s5 = math.cos(q[4]), math.sin(q[4])
-            q[5] = _joint6(M, math.cos(q[3]), math.sin(q[3]), c5, s5)
-        _turn(q, seed, limits, i, i + 1)
-        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+    q[0] = _held(q[0], 0, seed, limits)
+    u, z = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3], T[2, 3]
+    bend = _bend(u, z, geometry)[0]
+    q[2] = _held(lead - (math.pi - bend if is_down else bend), 2, seed, limits)
+    q[1] = _held(_upper_arm(u, z, q[2], geometry, seed[1]), 1, seed, limits)
+    _wrist_rotation(T, q[0], q[1] + q[2], M)
+    q[3] = _held(q[3], 3, seed, limits)
+    c4, s4 = math.cos(q[3]), math.sin(q[3])
+    q[4] = _held(_joint5(M, c4, s4), 4, seed, limits)
+    q[5] = _held(_joint6(M, c4, s4, math.cos(q[4]), math.sin(q[4])), 5, seed, limits)
 
 
-@kernel
+@inner
 def _is_near_singular(q: Array, T: Array, geometry: Array) -> bool:
     """Whether the wrist is straight, the arm stretched or folded, or the wrist over axis 1."""
     a2, a3, d4 = geometry[0], geometry[1], geometry[3]

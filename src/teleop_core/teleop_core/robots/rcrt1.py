@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots import rcrt1_dynamics
@@ -58,18 +58,16 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     c4, s4 = math.cos(q[3]), math.sin(q[3])
     c5, s5 = math.cos(q[4]), math.sin(q[4])
     c6, s6 = math.cos(q[5]), math.sin(q[5])
-    # Columns of the wrist rotation Rz(q4) Ry(q5) Rz(q6), turned into the base column by column.
+    # Columns of Rz(q6), turned into the base one by one.
+    u, v, w = c6, s6, 0.0
     for column in range(3):
-        if column == 0:
-            x, y, z = c4 * c5 * c6 - s4 * s6, s4 * c5 * c6 + c4 * s6, -s5 * c6
-        elif column == 1:
-            x, y, z = -c4 * c5 * s6 - s4 * c6, -s4 * c5 * s6 + c4 * c6, s5 * s6
-        else:
-            x, y, z = c4 * s5, s4 * s5, c5
+        f, z = c5 * u + s5 * w, c5 * w - s5 * u
+        x, y = c4 * f - s4 * v, s4 * f + c4 * v
         h = c2 * x + s2 * z
         T[0, column] = c1 * h - s1 * y
         T[1, column] = s1 * h + c1 * y
         T[2, column] = c2 * z - s2 * x
+        u, v, w = (-s6, c6, 0.0) if column == 0 else (0.0, 0.0, 1.0)
     L6, d2 = geometry[0], geometry[1]
     T[0, 3] = c1 * s2 * q[2] - s1 * d2 + L6 * T[0, 2]
     T[1, 3] = s1 * s2 * q[2] + c1 * d2 + L6 * T[1, 2]
@@ -111,7 +109,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
             J[3 + i, j] = 0.0 if is_prismatic else a[i]
 
 
-@kernel
+@inner
 def _arm_branch(T: Array, geometry: Array, is_front: bool, seed: float, arm: Array) -> bool:
     """Write q1, q2, d3 (3,) of one arm branch; whether the wrist centre can be reached at all.
 
@@ -132,7 +130,7 @@ def _arm_branch(T: Array, geometry: Array, is_front: bool, seed: float, arm: Arr
     return is_reachable
 
 
-@kernel
+@inner
 def _wrist_frame(T: Array, q1: float, q2: float, M: Array) -> None:
     """Write (Rz(q1) Ry(q2))ᵀ R, the rotation left to the wrist, into the 3x3 corner of M."""
     c1, s1, c2, s2 = math.cos(q1), math.sin(q1), math.cos(q2), math.sin(q2)
@@ -143,13 +141,13 @@ def _wrist_frame(T: Array, q1: float, q2: float, M: Array) -> None:
         M[2, j] = s2 * h + c2 * T[2, j]
 
 
-@kernel
+@inner
 def _joint5(M: Array, c4: float, s4: float) -> float:
     """Joint 5 that brings the tool axis next to its wanted direction, given joint 4."""
     return math.atan2(c4 * M[0, 2] + s4 * M[1, 2], M[2, 2])
 
 
-@kernel
+@inner
 def _joint6(M: Array, c4: float, s4: float, c5: float, s5: float) -> float:
     """Joint 6 that turns the tool next to its wanted attitude, given joints 4 and 5."""
     x0 = c5 * (c4 * M[0, 0] + s4 * M[1, 0]) - s5 * M[2, 0]
@@ -158,7 +156,7 @@ def _joint6(M: Array, c4: float, s4: float, c5: float, s5: float) -> float:
     return math.atan2(y0 - x1, x0 + y1)
 
 
-@kernel
+@inner
 def _wrist(M: Array, seed: float, q: Array) -> None:
     """Write joints 4 to 6 of the branch with sin(q5) >= 0; joint 4 is the seed if it is zero."""
     s5 = math.sqrt(M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2])
@@ -170,7 +168,7 @@ def _wrist(M: Array, seed: float, q: Array) -> None:
     q[5] = _joint6(M, c4, s4, M[2, 2], s5)
 
 
-@kernel
+@inner
 def _share_roll(M: Array, limits: Array, q: Array) -> None:
     """With axes 4 and 6 in line, let joint 4 do the part of the roll that joint 6 cannot."""
     if M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2] > _COLLINEAR * _COLLINEAR:
@@ -184,13 +182,13 @@ def _share_roll(M: Array, limits: Array, q: Array) -> None:
     q[5] = wrapped(q[5] - rest)
 
 
-@kernel
+@inner
 def _flip(q: Array) -> None:
     """Turn joints 4 to 6 to the other wrist branch, which reaches the same pose."""
     q[3], q[4], q[5] = wrapped(q[3] + math.pi), -q[4], wrapped(q[5] + math.pi)
 
 
-@kernel
+@inner
 def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
     """Write the best of the four branches; whether the wrist centre can be reached at all.
 
@@ -215,7 +213,7 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
     return is_reachable
 
 
-@kernel
+@inner
 def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each wrist joint makes the best of those before.
 

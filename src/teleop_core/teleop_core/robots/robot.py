@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from teleop_core.compiled import kernel, pointer
+from teleop_core.compiled import inner, kernel, pointer
 from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import Array, checked_array, is_rigid, rotation_angle_between
 
@@ -128,7 +128,7 @@ def independent_axes(inertia: Array) -> Dynamics:
     )
 
 
-@kernel
+@inner
 def is_askable(T: Array, seed: Array) -> bool:
     """Whether T is a rigid transform and the seed finite: the question every ik kernel checks."""
     for i in range(seed.shape[0]):
@@ -166,7 +166,7 @@ def ik_batch(
             return  # fmt: skip
 
 
-@kernel
+@inner
 def pose_residual(reached: Array, wanted: Array, residual: Array) -> bool:
     """Write distance [m] and angle [rad] between two transforms; whether both are negligible."""
     square = 0.0

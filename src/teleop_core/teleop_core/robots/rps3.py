@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots.assumed_drives import electric_cylinders
@@ -63,7 +63,7 @@ _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
-@kernel
+@inner
 def _lean(q: Array, geometry: Array, theta: Array) -> None:
     """Write leg angles (3,) of the assembly next to legs that lean in by b - a."""
     b, a = geometry[0], geometry[1]
@@ -116,7 +116,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
             J[3 + r, k] -= normal * T[r, 2]
 
 
-@kernel
+@inner
 def _legs(T: Array, geometry: Array, q: Array) -> None:
     """Write leg lengths (3,) of the pose with T's height and normal, without torsion."""
     b, a = geometry[0], geometry[1]
@@ -133,7 +133,7 @@ def _legs(T: Array, geometry: Array, q: Array) -> None:
         q[i] = math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@kernel
+@inner
 def _is_near_singular(q: Array, theta: Array, geometry: Array) -> bool:
     """Whether the legs hardly fix the platform: unit rows of the loop equations span little."""
     gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))

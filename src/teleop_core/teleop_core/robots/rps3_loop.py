@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 from teleop_core.robots.damped import factorise, solve
 
@@ -17,7 +17,7 @@ _ROUNDING = 1e-28  # squared relative error that more iterations cannot improve
 _LARGEST_TURN = 0.5  # rad, of one iteration
 
 
-@kernel
+@inner
 def _dot(a: Array, b: Array) -> float:
     """Scalar product of vectors (3,); numba's own needs BLAS and seconds to compile."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
@@ -85,7 +85,7 @@ def constraints(
             gap[k] += li * lj * (ci * cj - 2.0 * si * sj)
 
 
-@kernel
+@inner
 def _damped_turn(G: Array, gap: Array, damping: float, turn: Array) -> None:
     """Write the change (3,) of the leg angles that lessens the errors, damped."""
     A, largest = np.empty((3, 3)), 0.0

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots.branches import bounded, is_allowed, move_cost, turned, wrapped
@@ -107,7 +107,7 @@ def _turn(q: Array, i: int, seed: Array, limits: Array) -> None:
         q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
 
 
-@kernel
+@inner
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
     for i in range(4):

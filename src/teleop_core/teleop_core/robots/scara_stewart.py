@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array
 from teleop_core.robots import scara_stewart_drives
@@ -90,7 +90,7 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     _place(q, geometry, platform, T)
 
 
-@kernel
+@inner
 def _twists(platform: Array, g: Array, twists: Array) -> None:
     """Write the platform's twist (6, 6) in the Stewart base per leg speed.
 
@@ -146,7 +146,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
         J[2, 3 + i] += wx * ey - wy * ex
 
 
-@kernel
+@inner
 def _arm(T: Array, g: Array, is_left: bool, seed: float, arm: Array) -> bool:
     """Write theta1 (up to a turn), theta2, d3 (3,) of one elbow; whether the SCARA reaches.
 
@@ -170,7 +170,7 @@ def _arm(T: Array, g: Array, is_left: bool, seed: float, arm: Array) -> bool:
     return abs(k) <= 1.0 + 1e-12
 
 
-@kernel
+@inner
 def _is_left(T: Array, seed: Array, limits: Array, g: Array) -> bool:
     """Which elbow to take: the seed's in a path, else the nearer one inside the limits."""
     if math.isfinite(limits[2, 0]) and abs(math.sin(seed[1])) > 1e-9:
@@ -187,7 +187,7 @@ def _is_left(T: Array, seed: Array, limits: Array, g: Array) -> bool:
     return bool(costs[0] <= costs[1])
 
 
-@kernel
+@inner
 def _swung(angle: float, seed: float, lower: float, upper: float, is_path: bool) -> float:
     """Joint 1 or 2 at an angle given up to turns, next to the seed.
 
@@ -202,7 +202,7 @@ def _swung(angle: float, seed: float, lower: float, upper: float, is_path: bool)
     return float(near)
 
 
-@kernel
+@inner
 def _held_arm(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
     """Write theta1, theta2, d3 of q that are allowed; whether the SCARA reaches at all.
 

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 from teleop_core.robots.stewart_legs import direct, leg_system
 
@@ -29,7 +29,7 @@ _SINES = (0.0, math.sqrt(0.75), math.sqrt(0.75), 0.0, -math.sqrt(0.75), -math.sq
 TILT = math.sin(math.radians(75.0))
 
 
-@kernel
+@inner
 def is_similar(sigma_b: float, sigma_m: float) -> bool:
     """Whether base and platform joints are similar hexagons: architecturally singular."""
     return abs(math.sin(sigma_b + sigma_m)) < _SIMILAR
@@ -64,7 +64,7 @@ def turned_and_tilted(turn: float, x: float, y: float, T: Array) -> None:
     T[2, 0], T[2, 1], T[2, 2] = x, y, z
 
 
-@kernel
+@inner
 def wanted_platform(T: Array, heading: float, w_z: float, platform: Array) -> None:
     """Write the platform pose in the Stewart base for T's attitude, tilted as far as it may be."""
     c, s = math.cos(heading), math.sin(heading)
@@ -83,7 +83,7 @@ def wanted_platform(T: Array, heading: float, w_z: float, platform: Array) -> No
     turned_and_tilted(turn, TILT / sine * x, TILT / sine * y, platform)
 
 
-@kernel
+@inner
 def _turn_of_hexagons(cosine: float, z1: complex, tilt: complex, up: float) -> float:
     """Turn of a platform of similar hexagons, from its cosine and from where the tilt shows.
 
@@ -99,7 +99,7 @@ def _turn_of_hexagons(cosine: float, z1: complex, tilt: complex, up: float) -> f
     return math.atan2(min(max(seen / (square * square), -most), most), cosine)
 
 
-@kernel
+@inner
 def _sums(legs: Array, constant: float, sums: Array) -> None:
     """Write mean and first harmonic of squared legs less ``constant``, odd and even: (2, 2)."""
     for half in range(2):
@@ -144,7 +144,7 @@ def orientation(legs: Array, g: Array, T: Array) -> None:
     T[2, 3], T[3, 3] = w_z, 1.0
 
 
-@kernel
+@inner
 def platform_pose(legs: Array, g: Array, T: Array) -> None:
     """Write the platform pose (4, 4) in the Stewart base that six legs hold best.
 
@@ -165,7 +165,7 @@ def leg_lengths(T: Array, g: Array, legs: Array, J: Array) -> None:
     leg_system(T, joints[0], joints[1], legs, J)
 
 
-@kernel
+@inner
 def is_blind(T: Array, J: Array, g: Array) -> bool:
     """Whether the legs hardly tell the platform's turn about the vertical."""
     square = T[2, 0] ** 2 + T[2, 1] ** 2

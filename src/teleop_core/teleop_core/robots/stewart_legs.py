@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 from teleop_core.robots.damped import factorise, solve
 
@@ -64,7 +64,7 @@ def moved(T: Array, move: Array, out: Array) -> None:
     out[3, 3] = 1.0
 
 
-@kernel
+@inner
 def _damped_move(J: Array, gap: Array, damping: float, size: float, move: Array) -> None:
     """Write the least-squares move (6,) that closes the gaps (6,), damped per length ``size``."""
     A = np.empty((6, 6))
@@ -93,7 +93,7 @@ def _largest(values: Array) -> float:
     return largest
 
 
-@kernel
+@inner
 def _pin(J: Array) -> None:
     """Take the shifts out of a leg Jacobian (6, 6)."""
     for i in range(6):
@@ -107,7 +107,7 @@ def _copy(source: Array, target: Array) -> None:
             target[i, j] = source[i, j]
 
 
-@kernel
+@inner
 def _gaps(wanted: Array, lengths: Array, gap: Array) -> float:
     """Write what the legs lack (6,) [m]; the sum of squares."""
     square = 0.0
@@ -166,14 +166,14 @@ def direct(
     return _largest(gap)
 
 
-@kernel
+@inner
 def _identity(A: Array) -> None:
     for i in range(A.shape[0]):
         for j in range(A.shape[0]):
             A[i, j] = 1.0 if i == j else 0.0
 
 
-@kernel
+@inner
 def invert(A: Array, inverse: Array) -> float:
     """Write the inverse (n, n) of A, which is destroyed; the product of the pivots' signs.
 

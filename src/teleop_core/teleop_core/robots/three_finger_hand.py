@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots.assumed_drives import finger_motors
@@ -77,7 +77,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
             J[3 + r, j] += (T[r, 2] * along_y - T[r, 1] * along_z) / radius
 
 
-@kernel
+@inner
 def _is_near_singular(q: Array, g: Array) -> bool:
     """Whether a finger is straight, folded, or touches its own axis."""
     for i in range(FINGERS):

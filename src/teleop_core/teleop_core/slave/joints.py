@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import kernel
+from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
 
 CONTROL_PERIOD = 1e-3
 
 
-@kernel
+@inner
 def _derivative(
     acceleration: Any,
     dynamics: Array,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import bound, kernel, pointer
+from teleop_core.compiled import bound, inner, kernel, pointer
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array, pose_from_transform
 from teleop_core.mapping.filters import lag_step
@@ -103,7 +103,7 @@ def _slave_dtypes(n: int) -> tuple[np.dtype[Any], np.dtype[Any]]:
 _FUTURE_NS = 1_000_000_000
 
 
-@kernel
+@inner
 def _take_command(p: Any, s: Any, row: Any) -> int:
     """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
 
@@ -128,7 +128,7 @@ def _take_command(p: Any, s: Any, row: Any) -> int:
     return 1 if now_ns - s.arrival_ns > p.timeout_ns else 0
 
 
-@kernel
+@inner
 def _advance_setpoint(p: Any, s: Any, before: Array, dt: float) -> None:
     """Filter the command and move the setpoint there, never faster than the drive can."""
     for i in range(before.shape[0]):
@@ -144,7 +144,7 @@ def _advance_setpoint(p: Any, s: Any, before: Array, dt: float) -> None:
         s.setpoint[i] = min(max(s.setpoint[i] + step, p.lower[i]), p.upper[i])
 
 
-@kernel
+@inner
 def _control(p: Any, s: Any, work: Any, gravity: Any, dynamics: Array, dt: float) -> None:
     """Read the encoders and write the drive effort of this tick into the work arrays."""
     q, dq, effort, memory, scratch_row = work[0], work[1], work[2], work[3], work[4]
