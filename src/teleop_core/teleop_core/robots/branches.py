@@ -7,6 +7,10 @@ from teleop_core.geometry import Array
 
 # Rounding that a joint on its limit may show [rad or m].
 _SLACK = 1e-12
+# Up to this joint 5 of a spherical wrist its two branches are neighbours [rad]. There limits count
+# in a path too: a wrist that would run into one goes over to the other branch, which costs little.
+# Farther away the branch stays, whatever it costs.
+BESIDE = 0.1
 # Added to the cost of a branch outside the limits: more than any move of one inside.
 OUTSIDE = 100.0
 
@@ -72,18 +76,33 @@ def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool)
 
 
 @inner
-def move_cost(q: Array, seed: Array, limits: Array, first: int, last: int) -> float:
+def turn(q: Array, seed: Array, limits: Array, first: int, last: int) -> None:
+    """Bring joints first..last-1 by whole turns next to the seed, or into their limits."""
+    is_path = math.isfinite(limits[2, 0])
+    for i in range(first, last):
+        q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
+
+
+@inner
+def cost_of(
+    q: Array, seed: Array, limits: Array, first: int, last: int, do_limits_count: bool
+) -> float:
     """Largest move of joints first..last-1 from the seed, the metric that orders branches.
 
-    Branches outside the limits come after all others. In a path (finite steps) limits do not
-    count, so that the branch never changes.
+    Branches outside the limits come after all others if the limits count.
     """
-    worst, outside = 0.0, 0.0
+    worst, is_outside = 0.0, False
     for i in range(first, last):
         worst = max(worst, abs(q[i] - seed[i]))
-        outside = max(outside, limits[0, i] - q[i], q[i] - limits[1, i])
-    is_path = math.isfinite(limits[2, 0])
-    return worst if is_path or outside <= _SLACK else OUTSIDE + worst
+        if q[i] < limits[0, i] - _SLACK or q[i] > limits[1, i] + _SLACK:
+            is_outside = do_limits_count
+    return OUTSIDE + worst if is_outside else worst
+
+
+@inner
+def move_cost(q: Array, seed: Array, limits: Array, first: int, last: int) -> float:
+    """:func:`cost_of` joints; in a path limits do not count, so that the branch never changes."""
+    return cost_of(q, seed, limits, first, last, not math.isfinite(limits[2, 0]))
 
 
 @inner

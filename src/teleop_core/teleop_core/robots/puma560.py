@@ -17,7 +17,16 @@ import numpy as np
 from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.branches import bounded, cheapest, is_allowed, move_cost, turned, wrapped
+from teleop_core.robots.branches import (
+    BESIDE,
+    bounded,
+    cheapest,
+    cost_of,
+    is_allowed,
+    turn,
+    turned,
+    wrapped,
+)
 from teleop_core.robots.robot import (
     Drives,
     IkStatus,
@@ -201,25 +210,18 @@ def _wrist(M: Array, seed: float, q: Array) -> None:
 
 
 @inner
-def _turned_cost(q: Array, seed: Array, limits: Array, first: int, last: int) -> float:
-    """Bring joints first..last-1 next to the seed, or into their limits; the cost of the move."""
-    is_path = math.isfinite(limits[2, 0])
-    for i in range(first, last):
-        q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
-    return move_cost(q, seed, limits, first, last)
-
-
-@inner
 def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
     """Write the best of the eight branches; whether the wrist centre can be reached at all.
 
-    The arm with the smallest move comes first, and no wrist is solved for one that cannot win.
+    The arm with the smallest move comes first, and no wrist is solved for one that cannot win;
+    in a path the wrist has no say in the arm's branch.
     """
-    arms, costs = np.empty((4, 6)), np.empty(4)
+    arms, costs, is_path = np.empty((4, 6)), np.empty(4), math.isfinite(limits[2, 0])
     is_reachable, best = _arms(T, geometry, seed, arms), math.inf
     for branch in range(4):
-        costs[branch] = _turned_cost(arms[branch], seed, limits, 0, 3)
-    for _ in range(4):
+        turn(arms[branch], seed, limits, 0, 3)
+        costs[branch] = cost_of(arms[branch], seed, limits, 0, 3, not is_path)
+    for _ in range(1 if is_path else 4):
         arm = cheapest(costs)
         if costs[arm] >= best:
             break
@@ -227,7 +229,9 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
         _wrist_rotation(T, trial[0], trial[1] + trial[2], M)
         _wrist(M, seed[3], trial)
         for _ in range(2):
-            cost = max(costs[arm], _turned_cost(trial, seed, limits, 3, 6))
+            turn(trial, seed, limits, 3, 6)
+            does_count = not is_path or abs(trial[4]) < BESIDE
+            cost = max(costs[arm], cost_of(trial, seed, limits, 3, 6, does_count))
             if cost < best:
                 best = cost
                 for i in range(6):

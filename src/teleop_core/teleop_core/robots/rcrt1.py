@@ -17,7 +17,7 @@ from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots import rcrt1_dynamics
-from teleop_core.robots.branches import bounded, is_allowed, move_cost, wrapped
+from teleop_core.robots.branches import BESIDE, bounded, cost_of, is_allowed, turn, wrapped
 from teleop_core.robots.robot import (
     IkStatus,
     Kernels,
@@ -176,7 +176,8 @@ def _share_roll(M: Array, limits: Array, q: Array) -> None:
     low, high = limits[0, 5], limits[1, 5]
     rest = q[5] - min(max(q[5], low), high)
     is_legal = limits[0, 3] <= q[3] + rest <= limits[1, 3]
-    if rest != 0.0 and not is_legal:  # then from the other end of joint 6
+    if rest != 0.0 and not is_legal and not math.isfinite(limits[2, 3]):
+        # Then from the other end of joint 6; a path does not go there.
         rest -= math.copysign(2.0 * math.pi - (high - low), rest)
     q[3] += rest
     q[5] = wrapped(q[5] - rest)
@@ -192,19 +193,26 @@ def _flip(q: Array) -> None:
 def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
     """Write the best of the four branches; whether the wrist centre can be reached at all.
 
-    The wrist of the second arm branch is solved only if that arm can still win.
+    The wrist of the arm behind is solved only if that arm can still win. In a path, which never
+    leads there, the wrist is solved from where the arm can be.
     """
     best, is_reachable, trial = math.inf, True, np.empty(6)
-    for arm in range(2):
+    is_path = math.isfinite(limits[2, 0])
+    for arm in range(1 if is_path else 2):
         is_reachable = _arm_branch(T, geometry, arm == 0, seed[0], trial)
-        arm_cost = move_cost(trial, seed, limits, 0, 3)
+        is_reachable = is_reachable and limits[0, 2] - 1e-9 <= trial[2] <= limits[1, 2] + 1e-9
+        for i in range(3 if is_path else 0):
+            trial[i] = bounded(trial[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+        arm_cost = cost_of(trial, seed, limits, 0, 3, not is_path)
         if arm_cost >= best:
             continue
         _wrist_frame(T, trial[0], trial[1], M)
         _wrist(M, seed[3], trial)
         for _ in range(2):
+            turn(trial, seed, limits, 3, 6)
             _share_roll(M, limits, trial)
-            cost = max(arm_cost, move_cost(trial, seed, limits, 3, 6))
+            does_count = not is_path or abs(trial[4]) < BESIDE
+            cost = max(arm_cost, cost_of(trial, seed, limits, 3, 6, does_count))
             if cost < best:
                 best = cost
                 for i in range(6):
@@ -228,6 +236,7 @@ def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
         elif i == 5:
             c5, s5 = math.cos(q[4]), math.sin(q[4])
             q[5] = _joint6(M, math.cos(q[3]), math.sin(q[3]), c5, s5)
+            turn(q, seed, limits, 5, 6)
         step = limits[2, i]
         if i == 3 and math.isfinite(step):
             step *= min(1.0, math.hypot(M[0, 2], M[1, 2]) / _NEAR)
@@ -250,7 +259,6 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         return -1
     reached = np.empty((4, 4))  # until the end its corner holds the rotation left to the wrist
     is_reachable = _choose(T, seed, limits, geometry, reached, q)
-    is_reachable = is_reachable and limits[0, 2] - 1e-9 <= q[2] <= limits[1, 2] + 1e-9
     is_slowed = abs(q[4]) < _NEAR and math.isfinite(limits[2, 3])
     if is_slowed or not is_allowed(q, seed, limits):
         _settle(T, seed, limits, reached, q)
