@@ -71,7 +71,9 @@ class _InnerKernel(_Kernel):
     """Has no way in from Python; numba would crash where this raises."""
 
     def __call__(self, *_: Any, **__: Any) -> Any:
-        raise TypeError(f"{self.py_func.__name__} is called by kernels only: decorate it with kernel")
+        raise TypeError(
+            f"{self.py_func.__name__} is called by kernels only: decorate it with kernel"
+        )
 
 
 def _compiled(kind: Any, function: Callable[..., Any], **options: bool) -> Any:
