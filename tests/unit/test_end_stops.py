@@ -6,7 +6,9 @@ import pytest
 from teleop_core.robots import IkStatus, load_robot
 
 DT = 0.001
-# Robot, joint vector of the start in degrees (d3 of the RCRT-1 in metres), joint that a path
+# Joints that stand half a turn away, or on the other side of zero, in another branch.
+SIDES = {"rcrt1": (3, 4), "puma560": (3, 4), "scara": (0, 1)}
+# Robot, joint vector of the start in degrees (d3 in metres), joint that a path
 # drives beyond its stop, by how many degrees beyond, and the sign of the way.
 RUNS = {
     "rcrt1 joint 4 up": ("rcrt1", (10.0, 100.0, 0.36, 150.0, 30.0, -20.0), 3, 80.0),
@@ -17,6 +19,8 @@ RUNS = {
     "puma560 joint 4 down": ("puma560", (10.0, -45.0, -45.0, -90.0, -60.0, 20.0), 3, -80.0),
     "puma560 joint 1 up": ("puma560", (140.0, -45.0, -45.0, 20.0, 45.0, 0.0), 0, 70.0),
     "puma560 joint 6 down": ("puma560", (10.0, -45.0, -45.0, 20.0, 45.0, -250.0), 5, -90.0),
+    "scara joint 4 up": ("scara", (-73.0, 19.0, 0.05, 300.0), 3, 100.0),
+    "scara joint 4 down": ("scara", (-73.0, -25.0, 0.05, -300.0), 3, -100.0),
 }
 
 
@@ -25,7 +29,7 @@ def test_path_beyond_an_end_stop_and_back_keeps_the_branch_and_ends_on_the_path(
     name, degrees, joint, beyond = RUNS[run]
     robot = load_robot(name)
     start = np.radians(degrees)
-    if name == "rcrt1":
+    if name in {"rcrt1", "scara"}:
         start[2] = degrees[2]
     path = np.tile(start, (4001, 1))
     path[:, joint] += np.radians(beyond) * np.sin(np.linspace(0.0, np.pi, len(path)))
@@ -36,9 +40,9 @@ def test_path_beyond_an_end_stop_and_back_keeps_the_branch_and_ends_on_the_path(
 
     assert np.abs(done.q[:, joint]).max() == abs(stop)
     assert (done.status[done.q[:, joint] == stop] == IkStatus.LIMITED).mean() > 0.98
-    # In another branch joints 4 and 6 stand half a turn away, joint 5 on its other side.
-    assert (np.sign(done.q[:, 4]) == np.sign(start[4])).all()
-    assert np.abs(done.q[:, 3] - start[3]).max() < 1.6
+    turning, crossing = SIDES[name]
+    assert np.abs(done.q[:, turning] - start[turning]).max() < 1.6
+    assert (np.sign(done.q[:, crossing]) == np.sign(start[crossing])).all()
     steps = np.abs(np.diff(done.q, axis=0))
     assert (steps <= robot.drives.speed_limit * DT + 1e-15).all()
     assert done.residual[-1].max() < 1e-9

@@ -131,12 +131,14 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not is_askable(T, seed):
         return -1
     trial, best = np.empty(4), math.inf
+    # In a path the stop of joint 4 has no say in which way the elbow points.
+    deciding = 2 if math.isfinite(limits[2, 0]) else 4
     is_reachable = False
     for branch in range(2):
         is_reachable = _solve(T, geometry, branch == 1, seed, trial)
         for i in range(4):
             _turn(trial, i, seed, limits)
-        cost = move_cost(trial, seed, limits, 0, 4)
+        cost = move_cost(trial, seed, limits, 0, deciding)
         if cost < best:
             best = cost
             for i in range(4):
