@@ -18,7 +18,7 @@ import numpy as np
 
 from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array, quaternion_from_rotation
+from teleop_core.geometry import Array
 from teleop_core.robots.branches import OUTSIDE, bounded, is_allowed, move_cost, turned, wrapped
 from teleop_core.robots.planar_3r import (
     NEAR,
@@ -109,61 +109,88 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 def pitch_and_roll(T: Array, q1: float, psi: float, q5: float) -> tuple[float, float]:
     """Pitch and joint 5 [rad] whose rotation is next to that of T, in the plane of joint 1.
 
-    The quaternion w, x, y, z of Rz(-q1) R Rx(180°) is to be near that of Ry(2a) Rz(2b). Their
-    product w cos a cos b + x sin a sin b + y sin a cos b + z cos a sin b is greatest at
-    a - b = atan2(y - z, w + x) and a + b = atan2(y + z, w - x); where one of them is undefined,
-    the tool being normal to the plane, it keeps its value from the given ``psi`` and ``q5``.
+    With N = Rz(-q1) R Rx(180°) the trace of Nᵀ Ry(psi) Rz(-q5) is greatest where psi leads the
+    tool to its direction in the plane, and psi + q5 or psi - q5, of which the one that is
+    defined best is taken, to the attitude as a whole. A tool normal to the plane leaves only
+    that one: the pitch moves from the given ``psi`` by as much as joint 5 from ``q5``.
 
     Source:
         Derived.
     """
-    N, quaternion = np.empty((3, 3)), np.empty(4)
     c, s = math.cos(q1), math.sin(q1)
-    for j in range(3):
-        sign = 1.0 if j == 0 else -1.0
-        N[0, j] = sign * (c * T[0, j] + s * T[1, j])
-        N[1, j] = sign * (c * T[1, j] - s * T[0, j])
-        N[2, j] = sign * T[2, j]
-    quaternion_from_rotation(N, quaternion)
-    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    difference, total = 0.5 * (psi + q5), 0.5 * (psi - q5)
-    if math.hypot(y - z, w + x) > _COLLINEAR:
-        difference = math.atan2(y - z, w + x)
-    if math.hypot(y + z, w - x) > _COLLINEAR:
-        total = math.atan2(y + z, w - x)
-    return total + difference, difference - total
+    x, y, z = c * T[0, 0] + s * T[1, 0], c * T[0, 1] + s * T[1, 1], c * T[0, 2] + s * T[1, 2]
+    out = s * T[0, 2] - c * T[1, 2]
+    sign = 1.0 if out <= 0.0 else -1.0
+    both = math.atan2(-sign * y - T[2, 0], x - sign * T[2, 1])  # psi + sign q5
+    if math.hypot(z, T[2, 2]) > _COLLINEAR:
+        psi = math.atan2(-z, -T[2, 2])
+    else:
+        psi += 0.5 * wrapped(both - psi - sign * q5)
+    return psi, sign * (both - psi)
 
 
-@kernel
-def _solve(T: Array, geometry: Array, is_back: bool, seed: Array, rows: Array) -> bool:
-    """Write the two branches (2, 5), elbow up first, of an arm that faces or turns its back."""
-    d1, a2, a3, d5 = geometry[0], geometry[1], geometry[2], geometry[3]
-    q1 = pointing(T[0, 3], T[1, 3], seed[0]) + (math.pi if is_back else 0.0)
-    r = math.cos(q1) * T[0, 3] + math.sin(q1) * T[1, 3]
-    psi, q5 = pitch_and_roll(T, q1, seed[1] + seed[2] + seed[3], seed[4])
-    x, y = r + d5 * math.sin(psi), d1 - T[2, 3] - d5 * math.cos(psi)
-    elbow, is_reachable = elbow_angle(x, y, a2, a3)
-    for row in range(2):
-        q = rows[row]
-        q[0], q[2], q[4] = q1, (elbow if row == 0 else -elbow), q5
-        q[1] = first_angle(x, y, a2, a3, q[2], seed[1])
-        q[3] = psi - q[1] - q[2]
+@inner
+def _plane(T: Array, geometry: Array, seed: Array, q: Array) -> tuple[float, float, float]:
+    """Pitch [rad], and where the tool is held ahead of and below joint 2 [m]; write joint 5."""
+    psi, q[4] = pitch_and_roll(T, q[0], seed[1] + seed[2] + seed[3], seed[4])
+    r = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3]
+    d1, d5 = geometry[0], geometry[3]
+    return psi, r + d5 * math.sin(psi), d1 - T[2, 3] - d5 * math.cos(psi)
+
+
+@inner
+def _bend(
+    plane: tuple[float, float, float], geometry: Array, elbow: float, seed: float, q: Array
+) -> None:
+    """Write joints 2 to 4 for one sign of the elbow."""
+    psi, x, y = plane
+    q[1] = first_angle(x, y, geometry[1], geometry[2], elbow, seed)
+    q[2], q[3] = elbow, psi - q[1] - elbow
+
+
+@inner
+def _choose(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
+    """Write the best of the four branches; whether the arm reaches the position at all.
+
+    It begins with the side and the elbow of the seed: the others are solved only if they can
+    still win.
+    """
+    trial, best, is_path = np.empty(5), math.inf, math.isfinite(limits[2, 0])
+    base, is_reachable = pointing(T[0, 3], T[1, 3], seed[0]), False
+    if abs(wrapped(base - seed[0])) > 0.5 * math.pi:
+        base += math.pi
+    for side in range(2):
+        trial[0] = turned(base + math.pi * side, seed[0], limits[0, 0], limits[1, 0], is_path)
+        if move_cost(trial, seed, limits, 0, 1) >= best:
+            continue
+        plane = _plane(T, geometry, seed, trial)
+        elbow, is_arm = elbow_angle(plane[1], plane[2], geometry[1], geometry[2])
+        is_reachable = is_reachable or is_arm
+        for branch in range(2):
+            elbow = math.copysign(elbow, seed[2]) if branch == 0 else -elbow
+            if abs(elbow - seed[2]) >= best:
+                continue
+            _bend(plane, geometry, elbow, seed[1], trial)
+            for i in range(1, 5):
+                trial[i] = turned(trial[i], seed[i], limits[0, i], limits[1, i], is_path)
+            cost = move_cost(trial, seed, limits, 0, 5) + (0.0 if is_arm else 10.0 * OUTSIDE)
+            if cost < best:
+                best = cost
+                for i in range(5):
+                    q[i] = trial[i]
     return is_reachable
 
 
 @inner
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
-    d1, a2, d5 = geometry[0], geometry[1], geometry[3]
     psi, x, y, is_path = 0.0, 0.0, 0.0, math.isfinite(limits[2, 0])
     for i in range(5):
         if i == 1:
-            psi, q[4] = pitch_and_roll(T, q[0], seed[1] + seed[2] + seed[3], seed[4])
-            x = math.cos(q[0]) * T[0, 3] + math.sin(q[0]) * T[1, 3] + d5 * math.sin(psi)
-            y = d1 - T[2, 3] - d5 * math.cos(psi)
-            q[1] = first_angle(x, y, a2, geometry[2], q[2], seed[1])
+            psi, x, y = _plane(T, geometry, seed, q)
+            q[1] = first_angle(x, y, geometry[1], geometry[2], q[2], seed[1])
         elif i == 2:
-            q[2] = second_angle(x, y, a2, q[1], seed[2])
+            q[2] = second_angle(x, y, geometry[1], q[1], seed[2])
         elif i == 3:
             q[3] = psi - q[1] - q[2]
         q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
@@ -191,20 +218,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """
     if not is_askable(T, seed):
         return -1
-    rows, best, is_path = np.empty((2, 5)), math.inf, math.isfinite(limits[2, 0])
-    is_reachable = is_arm = False
-    for branch in range(4):
-        trial = rows[branch % 2]
-        if branch % 2 == 0:
-            is_arm = _solve(T, geometry, branch == 2, seed, rows)
-            is_reachable = is_reachable or is_arm
-        for i in range(5):
-            trial[i] = turned(trial[i], seed[i], limits[0, i], limits[1, i], is_path)
-        cost = move_cost(trial, seed, limits, 0, 5) + (0.0 if is_arm else 10.0 * OUTSIDE)
-        if cost < best:
-            best = cost
-            for i in range(5):
-                q[i] = trial[i]
+    is_reachable = _choose(T, seed, limits, geometry, q)
     is_free = is_allowed(q, seed, limits)
     if not is_free:
         _settle(T, seed, limits, geometry, q)
@@ -224,15 +238,18 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
 
     A pose whose tool leaves the vertical plane through axis 1 has none.
     """
-    reached, residual, count = np.empty((4, 4)), np.empty(2), 0
-    for side in range(2):
-        rows = solutions[count : count + 2]
-        if _solve(T, geometry, side == 1, np.zeros(5), rows):
-            fk(rows[0], geometry, reached)
-            if pose_residual(reached, T, residual):
-                for i in range(5):
-                    rows[0, i], rows[1, i] = wrapped(rows[0, i]), wrapped(rows[1, i])
-                count += 2
+    reached, residual, seed, count = np.empty((4, 4)), np.empty(2), np.zeros(5), 0
+    for branch in range(4):
+        q = solutions[count]
+        q[0] = wrapped(pointing(T[0, 3], T[1, 3], 0.0) + math.pi * (branch // 2))
+        plane = _plane(T, geometry, seed, q)
+        elbow, is_reachable = elbow_angle(plane[1], plane[2], geometry[1], geometry[2])
+        _bend(plane, geometry, elbow if branch % 2 == 0 else -elbow, 0.0, q)
+        for i in range(1, 5):
+            q[i] = wrapped(q[i])
+        fk(q, geometry, reached)
+        if is_reachable and pose_residual(reached, T, residual):
+            count += 1
     return count
 
 
