@@ -168,7 +168,7 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> 
         is_reachable = is_reachable or is_arm
         for branch in range(2):
             elbow = math.copysign(elbow, seed[2]) if branch == 0 else -elbow
-            if abs(elbow - seed[2]) >= best:
+            if abs(wrapped(elbow - seed[2])) >= best:
                 continue
             _bend(plane, geometry, elbow, seed[1], trial)
             for i in range(1, 5):
