@@ -46,73 +46,86 @@ _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACH
 
 
 @inner
-def _angles(theta1: float, g: Array) -> tuple[float, float]:
-    """Rocker and coupler angle [rad] in the robot's mode; of the smallest gap when open."""
+def _links(theta1: float, g: Array) -> tuple[float, float, float, float, float, float]:
+    """Cosine and sine of crank, rocker and coupler in the robot's mode; of least gap when open.
+
+    Seen from the end of the crank, the right pivot is at (x, y) and the coupler's other end at
+    (x, y) + l3 (cos phi1, sin phi1): never nearer than l2.
+    """
     l0, l1, l2, l3 = g[0], g[1], g[2], g[3]
-    x, y = l0 - l1 * math.cos(theta1), -l1 * math.sin(theta1)
-    distance = math.hypot(x, y)
-    cosine = -1.0
+    c1, s1 = math.cos(theta1), math.sin(theta1)
+    x, y = l0 - l1 * c1, -l1 * s1
+    distance = math.sqrt(x * x + y * y)
+    cosine, along, across = -1.0, 1.0, 0.0
     if distance > 0.0:
         cosine = (l2 * l2 - distance * distance - l3 * l3) / (2.0 * l3 * distance)
-    phi1 = math.atan2(y, x) + g[5] * math.acos(min(max(cosine, -1.0), 1.0))
-    return phi1, math.atan2(l3 * math.sin(phi1) + y, l3 * math.cos(phi1) + x)
+        cosine, along, across = min(max(cosine, -1.0), 1.0), x / distance, y / distance
+    sine = g[5] * math.sqrt(1.0 - cosine * cosine)
+    c3, s3 = along * cosine - across * sine, across * cosine + along * sine
+    x, y = l3 * c3 + x, l3 * s3 + y
+    length = math.sqrt(x * x + y * y)
+    return c1, s1, c3, s3, x / length, y / length
 
 
 @kernel
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip``, (4, 4), of the coupler point for theta1 (1,) [rad]."""
-    _, coupler = _angles(q[0], geometry)
-    c, s, a = math.cos(coupler), math.sin(coupler), geometry[4]
+    c1, s1, _, _, c, s = _links(q[0], geometry)
+    l1, a = geometry[1], geometry[4]
     T[:] = 0.0
     T[0, 0], T[0, 1], T[1, 0], T[1, 1], T[2, 2], T[3, 3] = c, -s, s, c, 1.0, 1.0
-    T[0, 3] = geometry[1] * math.cos(q[0]) + a * c
-    T[1, 3] = geometry[1] * math.sin(q[0]) + a * s
+    T[0, 3], T[1, 3] = l1 * c1 + a * c, l1 * s1 + a * s
+
+
+@inner
+def _slopes(theta1: float, g: Array) -> tuple[float, float, float]:
+    """Slopes of the coupler point [m/rad] and of the coupler's angle along theta1.
+
+    Bounded where coupler and rocker are in line. The ends of the coupler have the same speed along
+    the rocker: l1 sin(phi1 - theta1) + l2 sin(phi1 - coupler) d coupler/d theta1 = 0.
+    """
+    c1, s1, c3, s3, c, s = _links(theta1, g)
+    sine = s3 * c - c3 * s
+    sine = math.copysign(max(abs(sine), _ROUNDING), sine)
+    turn = -g[1] * (s3 * c1 - c3 * s1) / (g[2] * sine)
+    return -g[1] * s1 - g[4] * turn * s, g[1] * c1 + g[4] * turn * c, turn
 
 
 @kernel
 def jacobian(q: Array, geometry: Array, J: Array) -> None:
-    """Write the Jacobian (6, 1); bounded where coupler and rocker are in line.
-
-    The ends of the coupler have the same speed along the rocker:
-    l1 sin(phi1 - theta1) + l2 sin(phi1 - coupler) d coupler/d theta1 = 0.
-    """
-    phi1, coupler = _angles(q[0], geometry)
-    l1, a = geometry[1], geometry[4]
-    sine = math.sin(phi1 - coupler)
-    sine = math.copysign(max(abs(sine), _ROUNDING), sine)
-    turn = -l1 * math.sin(phi1 - q[0]) / (geometry[2] * sine)
+    """Write the Jacobian (6, 1)."""
     J[:] = 0.0
-    J[0, 0] = -l1 * math.sin(q[0]) - a * turn * math.sin(coupler)
-    J[1, 0] = l1 * math.cos(q[0]) + a * turn * math.cos(coupler)
-    J[5, 0] = turn
+    J[0, 0], J[1, 0], J[5, 0] = _slopes(q[0], geometry)
 
 
 @inner
-def _distance(theta1: float, x: float, y: float, g: Array) -> float:
-    """Distance [m] of the coupler point from (x, y)."""
-    _, coupler = _angles(theta1, g)
-    dx = g[1] * math.cos(theta1) + g[4] * math.cos(coupler) - x
-    dy = g[1] * math.sin(theta1) + g[4] * math.sin(coupler) - y
-    return math.hypot(dx, dy)
+def _gap(theta1: float, T: Array, g: Array) -> tuple[float, float]:
+    """Way [m] from the coupler point to T's, in x and y."""
+    c1, s1, _, _, c, s = _links(theta1, g)
+    return T[0, 3] - g[1] * c1 - g[4] * c, T[1, 3] - g[1] * s1 - g[4] * s
+
+
+@inner
+def _distance(theta1: float, T: Array, g: Array) -> float:
+    """Distance [m] of the coupler point from T's."""
+    x, y = _gap(theta1, T, g)
+    return math.sqrt(x * x + y * y)
 
 
 @inner
 def _refined(theta1: float, lower: float, upper: float, T: Array, g: Array) -> float:
     """Crank angle in [lower, upper] whose coupler point is, going down, nearest to T's."""
-    q, J, reached = np.empty(1), np.empty((6, 1)), np.empty((4, 4))
-    best = _distance(theta1, T[0, 3], T[1, 3], g)
+    best = _distance(theta1, T, g)
     for _ in range(60):
         if best <= _CLOSE:
             break
-        q[0] = theta1
-        fk(q, g, reached)
-        jacobian(q, g, J)
-        slope = J[0, 0] * (T[0, 3] - reached[0, 3]) + J[1, 0] * (T[1, 3] - reached[1, 3])
-        move = slope / max(J[0, 0] ** 2 + J[1, 0] ** 2, 1e-18)
+        x, y = _gap(theta1, T, g)
+        dx, dy, _ = _slopes(theta1, g)
+        move = (dx * x + dy * y) / max(dx * dx + dy * dy, 1e-18)
         improved = False
         for _ in range(40):
             trial = min(max(theta1 + move, lower), upper)
-            distance = _distance(trial, T[0, 3], T[1, 3], g)
+            distance = _distance(trial, T, g)
             if distance < best:
                 improved = True
                 break
@@ -124,32 +137,31 @@ def _refined(theta1: float, lower: float, upper: float, T: Array, g: Array) -> f
 
 
 @inner
-def _candidate(k: int, T: Array, g: Array) -> float:
-    """One of the two crank angles whose end is ``a`` away from T's point."""
+def _candidates(T: Array, g: Array) -> tuple[float, float]:
+    """Middle and half the difference of the two crank angles whose end is ``a`` from T's point."""
     x, y, l1, a = T[0, 3], T[1, 3], g[1], g[4]
-    radius = math.hypot(x, y)
+    radius = math.sqrt(x * x + y * y)
     cosine = (radius * radius + l1 * l1 - a * a) / max(2.0 * l1 * radius, 1e-300)
-    half = math.acos(min(max(cosine, -1.0), 1.0))
-    return math.atan2(y, x) + (half if k == 0 else -half)
+    return math.atan2(y, x), math.acos(min(max(cosine, -1.0), 1.0))
 
 
-@kernel
+@inner
 def _nearest(T: Array, seed: float, limits: Array, g: Array) -> float:
     """Crank angle of the nearest point of the whole curve; of equal ones next to the seed."""
     lower, upper = limits[0, 0], limits[1, 0]
     best, cost = seed, math.inf
-    for k in range(2):
-        angle = turned(_candidate(k, T, g), seed, lower, upper, False)
-        inside = lower - _ROUNDING <= angle <= upper + _ROUNDING
-        is_exact = inside and _distance(angle, T[0, 3], T[1, 3], g) <= REACHED
-        if is_exact and abs(angle - seed) < cost:
+    middle, half = _candidates(T, g)
+    for side in (1.0, -1.0):
+        angle = turned(middle + side * half, seed, lower, upper, False)
+        is_nearer = abs(angle - seed) < cost and lower - _ROUNDING <= angle <= upper + _ROUNDING
+        if is_nearer and _distance(angle, T, g) <= REACHED:
             best, cost = angle, abs(angle - seed)
     if cost < math.inf:
         return best
     start = max(lower, seed - math.pi)
     width = (min(upper, start + 2.0 * math.pi) - start) / _SAMPLES
     for i in range(_SAMPLES + 1):
-        distance = _distance(start + i * width, T[0, 3], T[1, 3], g)
+        distance = _distance(start + i * width, T, g)
         if distance < cost:
             best, cost = start + i * width, distance
     return best
@@ -175,19 +187,20 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     reached = np.empty((4, 4))
     fk(q, geometry, reached)
     pose_residual(reached, T, residual)
-    if _distance(q[0], T[0, 3], T[1, 3], geometry) > REACHED:
+    if _distance(q[0], T, geometry) > REACHED:
         return _LIMITED if q[0] <= lower or q[0] >= upper else _UNREACHABLE
-    phi1, coupler = _angles(q[0], geometry)
-    return _NEAR_SINGULAR if abs(math.sin(phi1 - coupler)) < _NEAR else _FOLLOWED
+    _, _, c3, s3, c, s = _links(q[0], geometry)
+    return _NEAR_SINGULAR if abs(s3 * c - c3 * s) < _NEAR else _FOLLOWED
 
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """Write the crank angles (k, 1), k <= 2, whose coupler point is at T's x and y."""
     count = 0
-    for k in range(2):
-        angle = wrapped(_candidate(k, T, geometry))
-        is_exact = _distance(angle, T[0, 3], T[1, 3], geometry) <= REACHED
+    middle, half = _candidates(T, geometry)
+    for side in (1.0, -1.0):
+        angle = wrapped(middle + side * half)
+        is_exact = _distance(angle, T, geometry) <= REACHED
         if is_exact and (count == 0 or abs(wrapped(angle - solutions[0, 0])) > REACHED):
             solutions[count, 0] = angle
             count += 1
