@@ -2,14 +2,18 @@
 
 Run with ``python benchmarks/kinematics.py``. Solved means within 1e-6 m and 1e-6 rad of the
 target, legal means inside the joint limits too. The ratio is a peer's median over ours, the step
-is the largest joint move between neighbouring poses of a path. Slow peers get fewer poses, of a
-path those in its middle, where the singularity is. Peers that are not installed are named and
-skipped.
+is the largest joint move between neighbouring poses of a path. A smaller share of the poses is
+the middle of each workload, in a path where the singularity is; the spacing stays. PyKDL and
+pinocchio take no limits: their answers are brought inside by whole turns where that is enough.
+
+Peers that are not installed are named and skipped. PyKDL comes with the distribution
+(``apt install python3-pykdl``) and is found from a virtual environment of the same Python version.
 """
 
 import argparse
 import importlib
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -29,7 +33,9 @@ from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary, load_table  
 
 TABLES = Path(__file__).parent.parent / "config" / "robots"
 ARMS = ("puma560", "rcrt1")
+COUNT = 1000  # poses of a workload
 TOLERANCE = 1e-6
+TURN = 2.0 * np.pi
 Solver = Callable[[Any, Any], Any]
 # Brings a pose into the form a peer takes, outside the measured time; and its solver.
 Adapted = tuple[Callable[[Any], Any], Solver]
@@ -60,6 +66,35 @@ def as_it_is(pose: Any) -> Any:
     return pose
 
 
+def whole_turns(q: Any, robot: Any, turning: Any) -> Any:
+    """Bring turning joints that are outside their limits inside by whole turns, if one can be."""
+    outside = turning & ((q < robot.lower) | (q > robot.upper))
+    if not outside.any():
+        return q
+    turns = np.round((q - 0.5 * (robot.lower + robot.upper)) / TURN)
+    return np.where(outside, q - TURN * turns, q)
+
+
+def system_module(name: str) -> Any:
+    """Import a module, also one that only the distribution's own Python has beside it.
+
+    Its folders are searched last and for this import alone, so nothing else comes from there.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        python = shutil.which("python3", path=os.defpath) or sys.executable
+    question = "import site; print(*site.getsitepackages(), sep='\\n')"
+    asked = [python, "-I", "-c", question]
+    folders = subprocess.run(asked, capture_output=True, text=True, check=False).stdout
+    before = sys.path.copy()
+    try:
+        sys.path.extend(folders.splitlines())
+        return importlib.import_module(name)
+    finally:
+        sys.path[:] = before
+
+
 def eaik(table: DhTable, robot: Any) -> Adapted:
     """EAIK with the branch nearest to the seed, by the largest joint move, inside the limits."""
     module = importlib.import_module("eaik.IK_HP")
@@ -74,7 +109,6 @@ def eaik(table: DhTable, robot: Any) -> Adapted:
     points.append((here @ tool)[:3, 3])
     zero = (here @ tool)[:3, :3]
     solver = module.HPRobot(np.array(axes), np.diff(np.array(points), axis=0))
-    turn = 2.0 * np.pi
 
     def adapt(pose: Any) -> Any:  # its rotations count from the zero pose
         target = pose.copy()
@@ -83,7 +117,7 @@ def eaik(table: DhTable, robot: Any) -> Adapted:
 
     def solve(target: Any, seed: Any) -> Any:
         branches = np.asarray(solver.IK(target).Q)
-        branches = branches - turn * np.round((branches - seed) / turn)
+        branches = branches - TURN * np.round((branches - seed) / TURN)
         outside = ((branches < robot.lower) | (branches > robot.upper)).any(axis=1)
         return branches[np.argmin(np.abs(branches - seed).max(axis=1) + 100.0 * outside)]
 
@@ -102,6 +136,32 @@ def roboticstoolbox(table: DhTable, robot: Any) -> Adapted:
     return as_it_is, lambda pose, seed: chain.ik_LM(pose, q0=seed, tol=1e-14)[0]
 
 
+def pykdl(table: DhTable, robot: Any) -> Adapted:
+    """PyKDL's Levenberg-Marquardt; its default of 1e-5 would solve nothing to the tolerance."""
+    kdl = system_module("PyKDL")
+    chain, (frames, tool) = kdl.Chain(), joint_frames(table)
+    turning = np.array([kind == "turn" for _, kind in frames])
+
+    def adapt(pose: Any) -> Any:
+        return kdl.Frame(kdl.Rotation(*pose[:3, :3].flat), kdl.Vector(*pose[:3, 3]))
+
+    before = kdl.Joint(kdl.Joint.Fixed)  # a segment is a joint and the transform after it
+    for fixed, kind in [*frames, (tool, "none")]:
+        chain.addSegment(kdl.Segment(before, adapt(fixed)))
+        before = kdl.Joint(kdl.Joint.RotZ if kind == "turn" else kdl.Joint.TransZ)
+    solver = kdl.ChainIkSolverPos_LMA(chain, 1e-9)
+    start, found = kdl.JntArray(robot.n), kdl.JntArray(robot.n)
+
+    def solve(wanted: Any, seed: Any) -> Any:
+        for i, value in enumerate(seed):
+            start[i] = value
+        solver.CartToJnt(start, wanted, found)
+        q = np.array([found[i] for i in range(chain.getNrOfJoints())])  # the solver needs chain
+        return whole_turns(q, robot, turning)
+
+    return adapt, solve
+
+
 def pinocchio(table: DhTable, robot: Any) -> Adapted:
     """Closed-loop inverse kinematics in a Python loop on pinocchio, as in its examples."""
     pin = importlib.import_module("pinocchio")
@@ -111,6 +171,7 @@ def pinocchio(table: DhTable, robot: Any) -> Adapted:
         joint = pin.JointModelRZ() if kind == "turn" else pin.JointModelPZ()
         parent = model.addJoint(parent, joint, pin.SE3(fixed), f"joint{number}")
     data, end = model.createData(), pin.SE3(tool)
+    turning = np.array([kind == "turn" for _, kind in frames])
 
     def solve(wanted: Any, seed: Any) -> Any:
         q = np.array(seed)
@@ -124,7 +185,7 @@ def pinocchio(table: DhTable, robot: Any) -> Adapted:
             )
             square = jacobian @ jacobian.T + 1e-12 * np.eye(6)
             q = q + jacobian.T @ np.linalg.solve(square, error.vector)
-        return q
+        return whole_turns(q, robot, turning)
 
     return pin.SE3, solve
 
@@ -159,30 +220,41 @@ def ikpy(table: DhTable, robot: Any) -> Adapted:
     return as_it_is, solve
 
 
-# Peer, and how many poses it gets: slow ones fewer.
-PEERS: dict[str, tuple[Callable[[DhTable, Any], Adapted], int]] = {
-    "EAIK + nearest": (eaik, 1000),
-    "roboticstoolbox ik_LM": (roboticstoolbox, 500),
-    "pinocchio CLIK": (pinocchio, 300),
-    "ikpy": (ikpy, 20),
+PEERS: dict[str, Callable[[DhTable, Any], Adapted]] = {
+    "EAIK + nearest": eaik,
+    "roboticstoolbox ik_LM": roboticstoolbox,
+    "PyKDL LMA": pykdl,
+    "pinocchio CLIK": pinocchio,
+    "ikpy": ikpy,
 }
 
 
-def workloads(robot: Any, count: int) -> dict[str, tuple[Any, bool]]:
+def workloads(robot: Any) -> dict[str, tuple[Any, bool]]:
     """Joint vectors of the targets, and whether they are a path with a warm start."""
-    rng, way = np.random.default_rng(1), np.linspace(0.0, 1.0, count)[:, None]
+    rng, way = np.random.default_rng(1), np.arange(COUNT)[:, None] / COUNT
     start = robot.home.copy()
     start[4] = 0.7
     phases = rng.uniform(0.0, 2.0 * np.pi, robot.n)
     swing = 0.05 * (robot.upper - robot.lower)
     smooth = start - swing + swing * np.sin(2.0 * np.pi * way + phases)
-    singular = start - 0.2 * swing * way
-    singular[:, 4] = 0.4 - 0.8 * way[:, 0]  # axes 4 and 6 come into line in the middle
+    through = start - 0.2 * swing * way
+    through[:, 4] = 0.4 - 0.8 * way[:, 0]  # the very middle has axes 4 and 6 in line
     return {
-        "random": (rng.uniform(robot.lower, robot.upper, (count, robot.n)), False),
+        "random": (rng.uniform(robot.lower, robot.upper, (COUNT, robot.n)), False),
         "smooth path": (smooth, True),
-        "through singularity": (singular, True),
+        "through singularity": (through, True),
+        "beside singularity": (beside(robot, through), True),
     }
+
+
+def beside(robot: Any, through: Any) -> Any:
+    """The same path with the tool axis passing axis 4 at 0.01 rad: joint 4 swings half round."""
+    joints, miss = through.copy(), 0.01
+    swing = np.arctan2(through[:, 4], miss)
+    joints[:, 3] = 0.5 * (robot.lower[3] + robot.upper[3]) + swing
+    joints[:, 4] = np.hypot(through[:, 4], miss)
+    joints[:, 5] = through[:, 5] - swing  # the tool itself does not spin
+    return joints
 
 
 def run(adapted: Adapted, robot: Any, joints: Any, *, is_path: bool) -> tuple[list[float], Any]:
@@ -196,8 +268,8 @@ def run(adapted: Adapted, robot: Any, joints: Any, *, is_path: bool) -> tuple[li
         begin = time.perf_counter()
         try:
             answer = np.asarray(solve(pose, seed), dtype=float)
-        except Exception as error:  # a peer's own failure is a failed pose
-            answer = np.full(robot.n, np.nan) if error else seed
+        except Exception:  # a peer's own failure is a failed pose
+            answer = np.full(robot.n, np.nan)
         times.append(1e6 * (time.perf_counter() - begin))
         answers.append(answer)
         if is_path and np.isfinite(answer).all():
@@ -221,19 +293,13 @@ def judge(robot: Any, joints: Any, answers: Any) -> tuple[float, float]:
     return 100.0 * solved / len(joints), 100.0 * legal / len(joints)
 
 
-def middle(joints: Any, count: int) -> Any:
-    """The middle of a workload: of the singular path, the part around the singularity."""
-    start = max(0, (len(joints) - count) // 2)
-    return joints[start : start + count]
-
-
-def solvers(name: str, robot: Any) -> Iterator[tuple[str, Adapted, int]]:
+def solvers(name: str, robot: Any) -> Iterator[tuple[str, Adapted]]:
     """Ours, then every peer that is installed and can model the arm."""
-    yield "teleop_core", (as_it_is, lambda pose, seed: robot.ik(pose, seed).q), 1000
+    yield "teleop_core", (as_it_is, lambda pose, seed: robot.ik(pose, seed).q)
     table = load_table(TABLES / f"{name}.yaml")
-    for peer, (make, count) in PEERS.items():
+    for peer, make in PEERS.items():
         try:
-            yield peer, make(table, robot), count
+            yield peer, make(table, robot)
         except ImportError as error:
             print(f"  {peer}: skipped, not installed ({error})")
         except NotImplementedError as error:
@@ -242,15 +308,15 @@ def solvers(name: str, robot: Any) -> Iterator[tuple[str, Adapted, int]]:
 
 def compare(name: str, share: float) -> None:
     """Print one arm's table."""
-    robot = load_robot(name)
-    print(f"\n{name}, single calls from Python")
+    robot, count = load_robot(name), max(20, round(COUNT * share))
+    print(f"\n{name}, single calls from Python, {count} poses each")
     chosen = list(solvers(name, robot))
     print(f"  {'workload':21}{'solver':23}{'solved %':>9}{'legal %':>9}{'median µs':>11}"
           f"{'p99 µs':>9}{'ratio':>8}{'step':>8}")  # fmt: skip
-    for workload, (joints, is_path) in workloads(robot, max(20, round(1000 * share))).items():
-        ours = 0.0
-        for solver, adapted, count in chosen:
-            some = middle(joints, max(20, round(count * share)))
+    for workload, (joints, is_path) in workloads(robot).items():
+        start, ours = max(0, (COUNT - count) // 2), 0.0
+        some = joints[start : start + count]
+        for solver, adapted in chosen:
             times, answers = run(adapted, robot, some, is_path=is_path)
             median = float(np.median(times))
             ours = ours or median
