@@ -36,8 +36,9 @@ format: setup
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
+# In a worker: a crash of the middleware inside a test costs that test, not the run.
 test: lint
-	$(BIN)/pytest
+	$(BIN)/pytest -n 1
 
 bench-setup: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \

@@ -43,6 +43,7 @@ setup(
         "test": [
             "pytest",
             "pytest-rerunfailures",
+            "pytest-xdist",
             "hypothesis",
             "scipy",
             "pin",

@@ -114,11 +114,10 @@ class Peer:
         self._publishers: dict[str, Any] = {}
 
     def close(self) -> None:
-        """Leave, then end the nodes: a process that is killed leaves shared memory behind."""
-        self.observer.__exit__()
-        self._executor.shutdown()
-        self.node.destroy_node()
-        self.context.try_shutdown()
+        """End the nodes, then leave: a participant that goes while others talk to it can crash.
+
+        Nodes are asked to end: a process that is killed leaves shared memory behind.
+        """
         running = [node.process for node in self.nodes if node.process.poll() is None]
         for process in running:
             process.terminate()
@@ -128,6 +127,10 @@ class Peer:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+        self.observer.__exit__()
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
 
     # -- nodes -----------------------------------------------------------------------------------
 
