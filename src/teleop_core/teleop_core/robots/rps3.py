@@ -35,7 +35,7 @@ from teleop_core.robots.robot import (
     is_askable,
     pose_residual,
 )
-from teleop_core.robots.rps3_loop import constraints, frame, points, settle
+from teleop_core.robots.rps3_loop import COSINES, SINES, constraints, frame, loop, points, settle
 from teleop_core.robots.rps3_modes import (
     Assembly,
     AssemblyModes,
@@ -98,10 +98,9 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
             turn = 0.0
             for j in range(3):
                 turn -= inverse[i, j] * H[j, k]
-            angle = 2.0 * math.pi / 3.0 * i
             c, s = math.cos(theta[i]), math.sin(theta[i])
             along = (-c if i == k else 0.0) + q[i] * s * turn
-            x, y = along * math.cos(angle), along * math.sin(angle)
+            x, y = along * COSINES[i], along * SINES[i]
             z = (s if i == k else 0.0) + q[i] * c * turn
             px, py, pz = S[i, 0] - T[0, 3], S[i, 1] - T[1, 3], S[i, 2] - T[2, 3]
             J[0, k] += x / 3.0
@@ -125,8 +124,7 @@ def _legs(T: Array, geometry: Array, q: Array) -> None:
     r11, r12, r22 = 1.0 - x * x * share, -x * y * share, 1.0 - y * y * share
     px, py = 0.5 * a * (r11 - r22), -a * r12
     for i in range(3):
-        angle = 2.0 * math.pi / 3.0 * i
-        c, s = math.cos(angle), math.sin(angle)
+        c, s = COSINES[i], SINES[i]
         dx = px + a * (r11 * c + r12 * s) - b * c
         dy = py + a * (r12 * c + r22 * s) - b * s
         dz = T[2, 3] - a * (x * c + y * s)
@@ -136,14 +134,13 @@ def _legs(T: Array, geometry: Array, q: Array) -> None:
 @inner
 def _is_near_singular(q: Array, theta: Array, geometry: Array) -> bool:
     """Whether the legs hardly fix the platform: unit rows of the loop equations span little."""
-    gap, G, H = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    constraints(q, theta, geometry[0], geometry[1], gap, G, H)
+    gap, G = np.empty(3), np.empty((3, 3))
+    loop(q, theta, geometry[0], geometry[1], gap, G)
     volume = 1.0
-    for r in range(3):
-        volume *= math.sqrt(G[r, 0] ** 2 + G[r, 1] ** 2 + G[r, 2] ** 2)
-    determinant = G[0, 0] * (G[1, 1] * G[2, 2] - G[1, 2] * G[2, 1])
-    determinant -= G[0, 1] * (G[1, 0] * G[2, 2] - G[1, 2] * G[2, 0])
-    determinant += G[0, 2] * (G[1, 0] * G[2, 1] - G[1, 1] * G[2, 0])
+    for k in range(3):
+        volume *= math.sqrt(G[k, k] ** 2 + G[k, (k + 1) % 3] ** 2)
+    # Row k has no slope along angle k + 2: two products are left of the determinant's six.
+    determinant = G[0, 0] * G[1, 1] * G[2, 2] + G[0, 1] * G[1, 2] * G[2, 0]
     return bool(abs(determinant) < _NEAR * volume)
 
 
