@@ -18,8 +18,6 @@ from teleop_core.geometry import Array
 
 # Squared weighted error that counts as zero: 1e-12 m at a length of 0.1 m, 1e-11 rad.
 ZERO = 1e-22
-# Added to squared singular values, so that rounding cannot make a pivot negative.
-_FLOOR = 1e-12
 
 
 # Loops instead of slices and numpy calls: the same speed, a fraction of the compile time.
@@ -68,43 +66,48 @@ def pose_error(reached: Array, wanted: Array, length: float, error: Array) -> fl
 
 
 @inner
+def eliminate(A: Array, b: Array) -> None:
+    """Replace b (6,) by the solution of A x = b for a positive definite A (6, 6).
+
+    The upper triangle of A counts, and is overwritten.
+    """
+    for k in range(6):
+        pivot = 1.0 / max(A[k, k], 1e-300)
+        for i in range(k + 1, 6):
+            share = A[k, i] * pivot
+            b[i] -= share * b[k]
+            for j in range(i, 6):
+                A[i, j] -= share * A[k, j]
+        A[k, k] = pivot
+    for i in range(5, -1, -1):
+        for j in range(i + 1, 6):
+            b[i] -= A[i, j] * b[j]
+        b[i] *= A[i, i]
+
+
+@inner
 def factorise(A: Array) -> None:
-    """Replace the lower triangle of a positive definite A (m, m) by its Cholesky factor."""
-    for j in range(A.shape[0]):
-        pivot = A[j, j]
-        for k in range(j):
-            pivot -= A[j, k] * A[j, k]
-        A[j, j] = math.sqrt(max(pivot, 1e-300))
-        for i in range(j + 1, A.shape[0]):
-            value = A[i, j]
-            for k in range(j):
-                value -= A[i, k] * A[j, k]
-            A[i, j] = value / A[j, j]
-
-
-@kernel
-def solve(L: Array, b: Array) -> None:
-    """Replace b (m,) by the solution of L Lᵀ x = b."""
-    m = L.shape[0]
-    for i in range(m):
-        for k in range(i):
-            b[i] -= L[i, k] * b[k]
-        b[i] /= L[i, i]
-    for i in range(m - 1, -1, -1):
-        for k in range(i + 1, m):
-            b[i] -= L[k, i] * b[k]
-        b[i] /= L[i, i]
+    """Replace the upper triangle of a positive definite A (6, 6) by its Cholesky factor."""
+    for k in range(6):
+        A[k, k] = math.sqrt(max(A[k, k], 1e-300))
+        for i in range(k + 1, 6):
+            A[k, i] /= A[k, k]
+            for j in range(k + 1, i + 1):
+                A[j, i] -= A[k, j] * A[k, i]
 
 
 @inner
 def gram(J: Array, is_free: Array, damping: float, A: Array) -> None:
-    """Write J Jᵀ + damping I, (6, 6), over the columns of J (6, n) that are free (1.0 or 0.0)."""
+    """Write the upper triangle of J Jᵀ + damping I, (6, 6).
+
+    Of the columns of J (6, n) those that are free count (1.0, else 0.0).
+    """
     for r in range(6):
-        for s in range(r + 1):
+        for s in range(r, 6):
             value = damping if r == s else 0.0
             for i in range(J.shape[1]):
                 value += is_free[i] * J[r, i] * J[s, i]
-            A[r, s] = A[s, r] = value
+            A[r, s] = value
 
 
 @inner
@@ -133,8 +136,7 @@ def damped_move(
     A, y = np.empty((6, 6)), np.empty(6)
     assign(y, error)
     gram(J, is_free, damping, A)
-    factorise(A)
-    solve(A, y)
+    eliminate(A, y)
     for i in range(q.shape[0]):
         move = 0.0
         for r in range(6):
@@ -143,32 +145,25 @@ def damped_move(
 
 
 @kernel
-def smallest_singular_value(J: Array, length: float) -> float:
-    """Smallest singular value of J (6, n), n >= 6, after dividing its linear rows by ``length``.
+def is_near_singular(J: Array, length: float, bound: float) -> bool:
+    """Whether the smallest singular value of J (6, n), n >= 6, lies under a bound > 0.
 
-    By inverse iteration on J Jᵀ from the direction of the smallest pivot: never too small, and
-    close where it matters, near a singularity, where one value is much smaller than the others.
-    Below 1e-6 it is 0. J is overwritten by the weighted one.
+    The linear rows count after division by ``length``. It does where J Jᵀ - bound² I has a
+    negative eigenvalue, and then elimination meets a negative pivot (Sylvester's law of inertia).
     """
-    A, x, is_free = np.empty((6, 6)), np.empty(6), np.empty(J.shape[1])
-    for i in range(J.shape[1]):
-        is_free[i] = 1.0
-    weigh(J, length)
-    gram(J, is_free, _FLOOR, A)
-    factorise(A)
-    smallest = 0
-    for i in range(6):
-        if A[i, i] < A[smallest, smallest]:
-            smallest = i
-    for i in range(6):
-        x[i] = 1.0 if i == smallest else 0.0
-    norm = 1.0
-    for _ in range(3):
-        for i in range(6):
-            x[i] /= norm
-        solve(A, x)
-        norm = 0.0
-        for i in range(6):
-            norm += x[i] * x[i]
-        norm = math.sqrt(norm)
-    return math.sqrt(max(1.0 / norm - _FLOOR, 0.0))
+    A = np.empty((6, 6))
+    for r in range(6):
+        for s in range(r, 6):
+            value = 0.0
+            for i in range(J.shape[1]):
+                value += J[r, i] * J[s, i]
+            A[r, s] = value / ((length if r < 3 else 1.0) * (length if s < 3 else 1.0))
+        A[r, r] -= bound * bound
+    for k in range(6):
+        if A[k, k] <= 0.0:
+            return True
+        for i in range(k + 1, 6):
+            share = A[k, i] / A[k, k]
+            for j in range(i, 6):
+                A[i, j] -= share * A[k, j]
+    return False

@@ -21,8 +21,8 @@ from teleop_core.robots.damped import (
     assign,
     damped_move,
     free_joints,
+    is_near_singular,
     pose_error,
-    smallest_singular_value,
     weigh,
 )
 from teleop_core.robots.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
@@ -231,8 +231,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     if not pose_residual(reached, T, residual):
         return _LIMITED if _can_reach(T, q, geometry) else _UNREACHABLE
     jacobian(q, geometry, J)
-    near = smallest_singular_value(J, LENGTH) < _NEAR
-    return _NEAR_SINGULAR if near else _FOLLOWED
+    return _NEAR_SINGULAR if is_near_singular(J, LENGTH, _NEAR) else _FOLLOWED
 
 
 @kernel

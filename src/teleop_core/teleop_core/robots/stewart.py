@@ -28,7 +28,7 @@ from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.geometry import Array, checked_array, is_rigid
 from teleop_core.robots.assumed_drives import electric_cylinders
 from teleop_core.robots.branches import slowed
-from teleop_core.robots.damped import smallest_singular_value
+from teleop_core.robots.damped import is_near_singular
 from teleop_core.robots.robot import (
     REACHED,
     IkStatus,
@@ -195,7 +195,9 @@ _Z0, _SIZE, _SINGULAR = 36, 37, 38
 @kernel
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip`` (4, 4) of leg lengths (6,) [m], found from the home pose."""
-    T[:] = np.eye(4)
+    for i in range(4):
+        for j in range(4):
+            T[i, j] = 1.0 if i == j else 0.0
     T[2, 3] = geometry[_Z0]
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
     direct(q, base, platform, geometry[_SIZE], False, T)
@@ -236,7 +238,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     fk(q, geometry, reached)
     if not pose_residual(reached, T, residual):
         return _UNREACHABLE if is_there else _LIMITED
-    is_near = smallest_singular_value(legs.T.copy(), 1.0 / size) < _NEAR * 2.0 * size
+    is_near = is_near_singular(legs.T, 1.0 / size, _NEAR * 2.0 * size)
     return _NEAR_SINGULAR if is_near else _FOLLOWED
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
-from teleop_core.robots.damped import factorise, solve
+from teleop_core.robots.damped import eliminate
 
 # Legs count as closed within this error of length [m].
 CLOSED = 1e-11
@@ -29,20 +29,17 @@ def leg_system(T: Array, base: Array, platform: Array, lengths: Array, J: Array)
     A row is (u, R m × u), u the unit vector along the leg: leg speed per linear, then angular
     velocity of the platform frame.
     """
-    m, leg = np.empty(3), np.empty(3)
     for i in range(6):
-        square = 0.0
-        for r in range(3):
-            m[r] = T[r, 0] * platform[i, 0] + T[r, 1] * platform[i, 1] + T[r, 2] * platform[i, 2]
-            leg[r] = T[r, 3] + m[r] - base[i, r]
-            square += leg[r] * leg[r]
-        lengths[i] = math.sqrt(square)
-        for r in range(3):
-            leg[r] /= max(lengths[i], 1e-300)
-            J[i, r] = leg[r]
-        J[i, 3] = m[1] * leg[2] - m[2] * leg[1]
-        J[i, 4] = m[2] * leg[0] - m[0] * leg[2]
-        J[i, 5] = m[0] * leg[1] - m[1] * leg[0]
+        a, b, c = platform[i, 0], platform[i, 1], platform[i, 2]
+        mx = T[0, 0] * a + T[0, 1] * b + T[0, 2] * c
+        my = T[1, 0] * a + T[1, 1] * b + T[1, 2] * c
+        mz = T[2, 0] * a + T[2, 1] * b + T[2, 2] * c
+        x, y, z = T[0, 3] + mx - base[i, 0], T[1, 3] + my - base[i, 1], T[2, 3] + mz - base[i, 2]
+        lengths[i] = math.sqrt(x * x + y * y + z * z)
+        share = 1.0 / max(lengths[i], 1e-300)
+        x, y, z = share * x, share * y, share * z
+        J[i, 0], J[i, 1], J[i, 2] = x, y, z
+        J[i, 3], J[i, 4], J[i, 5] = my * z - mz * y, mz * x - mx * z, mx * y - my * x
 
 
 @kernel
@@ -65,56 +62,52 @@ def moved(T: Array, move: Array, out: Array) -> None:
 
 
 @inner
-def _damped_move(J: Array, gap: Array, damping: float, size: float, move: Array) -> None:
-    """Write the least-squares move (6,) that closes the gaps (6,), damped per length ``size``."""
-    A = np.empty((6, 6))
+def _damped_move(J: Array, gap: Array, damping: float, size: float, A: Array, move: Array) -> float:
+    """Write the least-squares move (6,) that closes the gaps (6,), damped per length ``size``.
+
+    ``A`` (6, 6) is overwritten.
+
+    Returns:
+        Largest part of the move.
+    """
     for r in range(6):
-        move[r] = 0.0
-        for i in range(6):
-            move[r] += J[i, r] * gap[i]
-        for s in range(r + 1):
-            A[r, s] = 0.0
+        for s in range(r, 6):
+            value = 0.0
             for i in range(6):
-                A[r, s] += J[i, r] * J[i, s]
+                value += J[i, r] * J[i, s]
+            A[r, s] = value
         A[r, r] += damping * (size * size if r > 2 else 1.0)
-    factorise(A)
-    solve(A, move)
+        value = 0.0
+        for i in range(6):
+            value += J[i, r] * gap[i]
+        move[r] = value
+    eliminate(A, move)
     turn = math.sqrt(move[3] ** 2 + move[4] ** 2 + move[5] ** 2)
-    if turn > _LARGEST_TURN:
-        for r in range(6):
-            move[r] *= _LARGEST_TURN / turn
-
-
-@kernel
-def _largest(values: Array) -> float:
-    largest = 0.0
-    for i in range(values.shape[0]):
-        largest = max(largest, abs(values[i]))
+    share, largest = min(1.0, _LARGEST_TURN / max(turn, 1e-300)), 0.0
+    for r in range(6):
+        move[r] *= share
+        largest = max(largest, abs(move[r]))
     return largest
 
 
 @inner
-def _pin(J: Array) -> None:
-    """Take the shifts out of a leg Jacobian (6, 6)."""
+def _gaps(
+    T: Array, wanted: Array, base: Array, platform: Array, is_pinned: bool, gap: Array, J: Array
+) -> tuple[float, float]:
+    """Write what the legs lack (6,) [m] and the leg Jacobian (6, 6), of a held origin if pinned.
+
+    Returns:
+        Sum of squares and largest of what they lack.
+    """
+    leg_system(T, base, platform, gap, J)
+    square = largest = 0.0
     for i in range(6):
-        J[i, 0] = J[i, 1] = J[i, 2] = 0.0
-
-
-@kernel
-def _copy(source: Array, target: Array) -> None:
-    for i in range(source.shape[0]):
-        for j in range(source.shape[1]):
-            target[i, j] = source[i, j]
-
-
-@inner
-def _gaps(wanted: Array, lengths: Array, gap: Array) -> float:
-    """Write what the legs lack (6,) [m]; the sum of squares."""
-    square = 0.0
-    for i in range(6):
-        gap[i] = wanted[i] - lengths[i]
+        gap[i] = wanted[i] - gap[i]
         square += gap[i] * gap[i]
-    return square
+        largest = max(largest, abs(gap[i]))
+        if is_pinned:
+            J[i, 0] = J[i, 1] = J[i, 2] = 0.0
+    return square, largest
 
 
 @kernel
@@ -137,33 +130,28 @@ def direct(
     Returns:
         Largest error of a leg length that is left [m].
     """
-    J, trial_J, trial = np.empty((6, 6)), np.empty((6, 6)), np.empty((4, 4))
-    lengths, gap, move = np.empty(6), np.empty(6), np.empty(6)
-    leg_system(T, base, platform, lengths, J)
-    cost, damping = _gaps(wanted, lengths, gap), 1e-4
+    gap, J = np.empty(6), np.empty((6, 6))
+    cost, worst = _gaps(T, wanted, base, platform, is_pinned, gap, J)
+    damping, A, move, trial = 1e-4, np.empty((6, 6)), np.empty(6), np.empty((4, 4))
     for _ in range(_ITERATIONS):
         if cost <= 1e-29 * size * size or damping > 1e8:
             break
-        if is_pinned:
-            _pin(J)
-        _damped_move(J, gap, damping, size, move)
+        largest = _damped_move(J, gap, damping, size, A, move)
         moved(T, move, trial)
-        leg_system(trial, base, platform, lengths, trial_J)
-        trial_cost = 0.0
-        for i in range(6):
-            trial_cost += (wanted[i] - lengths[i]) ** 2
+        trial_cost, trial_worst = _gaps(trial, wanted, base, platform, is_pinned, gap, J)
         if trial_cost >= cost:
-            if cost <= _ROUNDING * size * size or _largest(move) < 1e-13:
+            if cost <= _ROUNDING * size * size or largest < 1e-13:
                 break
+            _gaps(T, wanted, base, platform, is_pinned, gap, J)
             damping = max(10.0 * damping, 1e-12)
             continue
-        gained = cost - trial_cost
-        _copy(trial, T)
-        _copy(trial_J, J)
-        cost, damping = _gaps(wanted, lengths, gap), 0.05 * damping
+        gained, cost, worst, damping = cost - trial_cost, trial_cost, trial_worst, 0.05 * damping
+        for i in range(3):
+            for j in range(4):
+                T[i, j] = trial[i, j]
         if gained <= 1e-14 * cost:
             break
-    return _largest(gap)
+    return worst
 
 
 @inner
