@@ -11,15 +11,13 @@ Peers that are not installed are named and skipped. PyKDL comes with the distrib
 """
 
 import argparse
-import importlib
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,205 +26,14 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 
-from teleop_core.robots import load_robot  # noqa: E402
-from teleop_core.robots.dh import CONVENTIONS, DhTable, elementary, load_table  # noqa: E402
+from ik_peers import PEERS, Adapted, as_it_is  # noqa: E402
+from teleop_core.robots import list_robots, load_robot  # noqa: E402
+from teleop_core.robots.dh import load_table  # noqa: E402
 
 TABLES = Path(__file__).parent.parent / "config" / "robots"
 ARMS = ("puma560", "rcrt1")
 COUNT = 1000  # poses of a workload
 TOLERANCE = 1e-6
-TURN = 2.0 * np.pi
-Solver = Callable[[Any, Any], Any]
-# Brings a pose into the form a peer takes, outside the measured time; and its solver.
-Adapted = tuple[Callable[[Any], Any], Solver]
-
-
-def motions(table: DhTable) -> Iterator[tuple[str, str, float, float]]:
-    """Elementary motions of a chain: kind, axis, constant, sign of the joint (0: no joint)."""
-    for row in table.rows:
-        for kind, axis, symbol in CONVENTIONS[table.convention]:
-            is_joint = row.joint is not None and row.joint.symbol == symbol
-            sign = row.joint.sign if row.joint and is_joint else 0.0
-            yield kind, axis, row.constants.get(symbol, 0.0), sign
-
-
-def joint_frames(table: DhTable) -> tuple[list[tuple[Any, str]], Any]:
-    """Fixed transform before each joint with the joint's kind, and the one after the last."""
-    frames, fixed = [], np.eye(4)
-    for kind, axis, amount, sign in motions(table):
-        fixed = fixed @ elementary(kind, axis, amount)
-        if sign:
-            frames.append((fixed, kind))
-            fixed = np.eye(4)
-    return frames, fixed
-
-
-def as_it_is(pose: Any) -> Any:
-    """Return the pose: the peer takes a (4, 4) matrix."""
-    return pose
-
-
-def whole_turns(q: Any, robot: Any, turning: Any) -> Any:
-    """Bring turning joints that are outside their limits inside by whole turns, if one can be."""
-    outside = turning & ((q < robot.lower) | (q > robot.upper))
-    if not outside.any():
-        return q
-    turns = np.round((q - 0.5 * (robot.lower + robot.upper)) / TURN)
-    return np.where(outside, q - TURN * turns, q)
-
-
-def system_module(name: str) -> Any:
-    """Import a module, also one that only the distribution's own Python has beside it.
-
-    Its folders are searched last and for this import alone, so nothing else comes from there.
-    """
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        python = shutil.which("python3", path=os.defpath) or sys.executable
-    question = "import site; print(*site.getsitepackages(), sep='\\n')"
-    asked = [python, "-I", "-c", question]
-    folders = subprocess.run(asked, capture_output=True, text=True, check=False).stdout
-    before = sys.path.copy()
-    try:
-        sys.path.extend(folders.splitlines())
-        return importlib.import_module(name)
-    finally:
-        sys.path[:] = before
-
-
-def eaik(table: DhTable, robot: Any) -> Adapted:
-    """EAIK with the branch nearest to the seed, by the largest joint move, inside the limits."""
-    module = importlib.import_module("eaik.IK_HP")
-    frames, tool = joint_frames(table)
-    if any(kind == "slide" for _, kind in frames):
-        raise NotImplementedError("it has no sliding joints")
-    here, axes, points = np.eye(4), [], [np.zeros(3)]
-    for fixed, _ in frames:
-        here = here @ fixed
-        axes.append(here[:3, 2])
-        points.append(here[:3, 3])
-    points.append((here @ tool)[:3, 3])
-    zero = (here @ tool)[:3, :3]
-    solver = module.HPRobot(np.array(axes), np.diff(np.array(points), axis=0))
-
-    def adapt(pose: Any) -> Any:  # its rotations count from the zero pose
-        target = pose.copy()
-        target[:3, :3] = pose[:3, :3] @ zero.T
-        return target
-
-    def solve(target: Any, seed: Any) -> Any:
-        branches = np.asarray(solver.IK(target).Q)
-        branches = branches - TURN * np.round((branches - seed) / TURN)
-        outside = ((branches < robot.lower) | (branches > robot.upper)).any(axis=1)
-        return branches[np.argmin(np.abs(branches - seed).max(axis=1) + 100.0 * outside)]
-
-    return adapt, solve
-
-
-def roboticstoolbox(table: DhTable, robot: Any) -> Adapted:
-    """Roboticstoolbox's compiled Levenberg-Marquardt, with its restarts."""
-    rtb = importlib.import_module("roboticstoolbox")
-    chain = rtb.ETS()
-    for kind, axis, amount, sign in motions(table):
-        make = getattr(rtb.ET, f"R{axis}" if kind == "turn" else f"t{axis}")
-        chain = chain * make(amount) if amount else chain
-        chain = chain * make(flip=sign < 0.0) if sign else chain
-    chain.qlim = np.stack((robot.lower, robot.upper))
-    return as_it_is, lambda pose, seed: chain.ik_LM(pose, q0=seed, tol=1e-14)[0]
-
-
-def pykdl(table: DhTable, robot: Any) -> Adapted:
-    """PyKDL's Levenberg-Marquardt; its default of 1e-5 would solve nothing to the tolerance."""
-    kdl = system_module("PyKDL")
-    chain, (frames, tool) = kdl.Chain(), joint_frames(table)
-    turning = np.array([kind == "turn" for _, kind in frames])
-
-    def adapt(pose: Any) -> Any:
-        return kdl.Frame(kdl.Rotation(*pose[:3, :3].flat), kdl.Vector(*pose[:3, 3]))
-
-    before = kdl.Joint(kdl.Joint.Fixed)  # a segment is a joint and the transform after it
-    for fixed, kind in [*frames, (tool, "none")]:
-        chain.addSegment(kdl.Segment(before, adapt(fixed)))
-        before = kdl.Joint(kdl.Joint.RotZ if kind == "turn" else kdl.Joint.TransZ)
-    solver = kdl.ChainIkSolverPos_LMA(chain, 1e-9)
-    start, found = kdl.JntArray(robot.n), kdl.JntArray(robot.n)
-
-    def solve(wanted: Any, seed: Any) -> Any:
-        for i, value in enumerate(seed):
-            start[i] = value
-        solver.CartToJnt(start, wanted, found)
-        q = np.array([found[i] for i in range(chain.getNrOfJoints())])  # the solver needs chain
-        return whole_turns(q, robot, turning)
-
-    return adapt, solve
-
-
-def pinocchio(table: DhTable, robot: Any) -> Adapted:
-    """Closed-loop inverse kinematics in a Python loop on pinocchio, as in its examples."""
-    pin = importlib.import_module("pinocchio")
-    model, parent = pin.Model(), 0
-    frames, tool = joint_frames(table)
-    for number, (fixed, kind) in enumerate(frames):
-        joint = pin.JointModelRZ() if kind == "turn" else pin.JointModelPZ()
-        parent = model.addJoint(parent, joint, pin.SE3(fixed), f"joint{number}")
-    data, end = model.createData(), pin.SE3(tool)
-    turning = np.array([kind == "turn" for _, kind in frames])
-
-    def solve(wanted: Any, seed: Any) -> Any:
-        q = np.array(seed)
-        for _ in range(200):
-            pin.computeJointJacobians(model, data, q)
-            error = pin.log6((data.oMi[parent] * end).actInv(wanted))
-            if np.linalg.norm(error.vector) < 1e-9:
-                break
-            jacobian = end.inverse().action @ pin.getJointJacobian(
-                model, data, parent, pin.ReferenceFrame.LOCAL
-            )
-            square = jacobian @ jacobian.T + 1e-12 * np.eye(6)
-            q = q + jacobian.T @ np.linalg.solve(square, error.vector)
-        return whole_turns(q, robot, turning)
-
-    return pin.SE3, solve
-
-
-def ikpy(table: DhTable, robot: Any) -> Adapted:
-    """Ikpy's least squares, position and whole orientation."""
-    chain_module = importlib.import_module("ikpy.chain")
-    link_module = importlib.import_module("ikpy.link")
-    frames, tool = joint_frames(table)
-    links = [link_module.OriginLink()]
-    bounds = [*zip(robot.lower, robot.upper, strict=True), (None, None)]
-    for i, (fixed, kind) in enumerate([*frames, (tool, "none")]):
-        matrix, pitch = fixed, -np.arcsin(np.clip(fixed[2, 0], -1.0, 1.0))
-        roll = np.arctan2(matrix[2, 1], matrix[2, 2])
-        yaw = np.arctan2(matrix[1, 0], matrix[0, 0])
-        links.append(
-            link_module.URDFLink(
-                f"joint{i}", matrix[:3, 3], [roll, pitch, yaw], bounds=bounds[i],
-                rotation=[0, 0, 1] if kind == "turn" else None,
-                translation=[0, 0, 1] if kind == "slide" else None,
-                joint_type={"turn": "revolute", "slide": "prismatic", "none": "fixed"}[kind],
-            )
-        )  # fmt: skip
-    chain = chain_module.Chain(links, active_links_mask=[False, *[True] * len(frames), False])
-
-    def solve(pose: Any, seed: Any) -> Any:
-        start = np.array([0.0, *np.clip(seed, robot.lower, robot.upper), 0.0])
-        return chain.inverse_kinematics_frame(pose, initial_position=start, orientation_mode="all")[
-            1:-1
-        ]
-
-    return as_it_is, solve
-
-
-PEERS: dict[str, Callable[[DhTable, Any], Adapted]] = {
-    "EAIK + nearest": eaik,
-    "roboticstoolbox ik_LM": roboticstoolbox,
-    "PyKDL LMA": pykdl,
-    "pinocchio CLIK": pinocchio,
-    "ikpy": ikpy,
-}
 
 
 def workloads(robot: Any) -> dict[str, tuple[Any, bool]]:
@@ -320,18 +127,33 @@ def compare(name: str, share: float) -> None:
             times, answers = run(adapted, robot, some, is_path=is_path)
             median = float(np.median(times))
             ours = ours or median
-            step = np.nanmax(np.abs(np.diff(answers, axis=0))) if is_path else np.nan
+            step = np.nanmax(np.abs(np.diff(answers, axis=0))) if is_path else 0.0
             solved, legal = judge(robot, some, answers)
             print(f"  {workload:21}{solver:23}{solved:9.1f}{legal:9.1f}{median:11.1f}"
-                  f"{np.percentile(times, 99):9.1f}{median / ours:8.1f}{step:8.4f}")  # fmt: skip
+                  f"{np.percentile(times, 99):9.1f}{median / ours:8.1f}"
+                  f"{f'{step:.4f}' if is_path else '-':>8}")  # fmt: skip
+
+
+def batch(robot: Any, count: int) -> tuple[Any, Any]:
+    """Joint vectors that belong together, and seeds near them.
+
+    They are of poses all over the joint ranges, or within a tenth of them around home where most
+    others cannot be assembled.
+    """
+    rng, span = np.random.default_rng(2), robot.upper - robot.lower
+    anywhere = robot.fk(rng.uniform(robot.lower, robot.upper, (count, robot.n)))
+    answer = robot.ik(anywhere)
+    if (answer.residual[:, 0] > TOLERANCE).mean() > 0.1:
+        near = robot.home + rng.uniform(-0.1, 0.1, (count, robot.n)) * span
+        answer = robot.ik(robot.fk(np.clip(near, robot.lower, robot.upper)))
+    return answer.q, answer.q + 0.01 * span * rng.normal(0.0, 1.0, answer.q.shape)
 
 
 def batches(name: str, count: int) -> None:
     """Print how many poses and solutions a second one core makes in a batch."""
-    robot, rng = load_robot(name), np.random.default_rng(2)
-    q = rng.uniform(robot.lower, robot.upper, (count, robot.n))
-    poses, seeds = robot.fk(q), q + rng.normal(0.0, 0.05, q.shape)
-    robot.ik(poses[:2], seeds[:2])
+    robot = load_robot(name)
+    q, seeds = batch(robot, count)
+    poses = robot.fk(q)
     rates = {"fk": 0.0, "ik near": 0.0, "ik far": 0.0}
     for _ in range(5):
         for key, call in (
@@ -342,7 +164,7 @@ def batches(name: str, count: int) -> None:
             begin = time.perf_counter()
             call()
             rates[key] = max(rates[key], 1e-6 * count / (time.perf_counter() - begin))
-    print(f"  {name:10}" + "".join(f"{key:>10} {rate:6.2f} M/s" for key, rate in rates.items()))
+    print(f"  {name:18}" + "".join(f"{key:>10} {rate:6.2f} M/s" for key, rate in rates.items()))
 
 
 _START = """
@@ -378,8 +200,8 @@ def main() -> None:
     for name in ARMS:
         compare(name, share)
     print("\nbatches on one core")
-    for name in ARMS:
-        batches(name, round(100_000 * share))
+    for name in list_robots():
+        batches(name, round(20_000 * share))
     print("\nstart-up, each in a new process")
     for name in ARMS:
         start_up(name)
