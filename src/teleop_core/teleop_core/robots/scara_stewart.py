@@ -23,7 +23,7 @@ from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array
 from teleop_core.robots import scara_stewart_drives
-from teleop_core.robots.branches import bounded, move_cost, slowed, turned
+from teleop_core.robots.branches import bounded, is_allowed, move_cost, slowed, turned
 from teleop_core.robots.robot import (
     IkStatus,
     Kernels,
@@ -37,6 +37,7 @@ from teleop_core.robots.scara_stewart_legs import (
     is_blind,
     is_similar,
     leg_lengths,
+    leg_slopes,
     platform_pose,
     turned_and_tilted,
     wanted_platform,
@@ -96,8 +97,8 @@ def _twists(platform: Array, g: Array, twists: Array) -> None:
 
     Similar hexagons: least-squares turn about the held centre; hidden turns do not show.
     """
-    legs, J = np.empty(6), np.empty((6, 6))
-    leg_lengths(platform, g, legs, J)
+    J = np.empty((6, 6))
+    leg_slopes(platform, g, J)
     if not is_similar(g[3], g[4]):
         invert(J, twists)
         return
@@ -160,31 +161,46 @@ def _arm(T: Array, g: Array, is_left: bool, seed: float, arm: Array) -> bool:
     l1, l2 = g[_L1], g[_L2]
     x, y = T[0, 3] - g[_E] * T[0, 2], T[1, 3] - g[_E] * T[1, 2]
     k = (x * x + y * y - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
-    sine = max(math.sqrt(max(1.0 - k * k, 0.0)), _STRAIGHT)
-    arm[1] = math.atan2(sine if is_left else -sine, min(max(k, -1.0), 1.0))
-    arm[0] = seed
+    sine, cosine = max(math.sqrt(max(1.0 - k * k, 0.0)), _STRAIGHT), min(max(k, -1.0), 1.0)
+    if not is_left:
+        sine = -sine
+    arm[0], arm[1] = seed, math.atan2(sine, cosine)
     if math.hypot(x, y) > 1e-12:
-        inner = math.atan2(l2 * math.sin(arm[1]), l1 + l2 * math.cos(arm[1]))
-        arm[0] = math.atan2(y, x) - inner
+        arm[0] = math.atan2(y, x) - math.atan2(l2 * sine, l1 + l2 * cosine)
     arm[2] = T[2, 3] - g[_E] * T[2, 2] - g[_W] - g[_H1]
     return abs(k) <= 1.0 + 1e-12
 
 
 @inner
-def _is_left(T: Array, seed: Array, limits: Array, g: Array) -> bool:
-    """Which elbow to take: the seed's in a path, else the nearer one inside the limits."""
-    if math.isfinite(limits[2, 0]) and abs(math.sin(seed[1])) > 1e-9:
-        return bool(math.sin(seed[1]) > 0.0)
-    q, costs = np.empty(9), np.zeros(2)
-    platform, J = np.empty((4, 4)), np.empty((6, 6))
-    for elbow in range(2):
-        _arm(T, g, elbow == 0, seed[0], q)
-        q[0] = turned(q[0], seed[0], limits[0, 0], limits[1, 0], False)
-        if elbow == 0 or g[_CARRIED] > 0.0:  # else both elbows have the same legs
-            wanted_platform(T, g[_CARRIED] * (q[0] + q[1]), g[_W], platform)
-            leg_lengths(platform, g[_LEGS:_CARRIED], q[3:], J)
-        costs[elbow] = move_cost(q, seed, limits, 0, 9)
-    return bool(costs[0] <= costs[1])
+def _cost(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> float:
+    """Largest move of an elbow's joints from the seed; of the legs only if the elbow turns them."""
+    q[0] = turned(q[0], seed[0], limits[0, 0], limits[1, 0], False)
+    if g[_CARRIED] == 0.0:
+        return move_cost(q, seed, limits, 0, 3)
+    platform = np.empty((4, 4))
+    wanted_platform(T, q[0] + q[1], g[_W], platform)
+    leg_lengths(platform, g[_LEGS:_CARRIED], q[3:])
+    return move_cost(q, seed, limits, 0, 9)
+
+
+@inner
+def _choose(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
+    """Write theta1, theta2, d3 of the elbow to take; whether the SCARA reaches at all.
+
+    A path keeps the seed's elbow; else it is the nearer one inside the limits. The two differ in
+    the sign of theta2 at least.
+    """
+    sine = math.sin(seed[1])
+    is_reachable = _arm(T, g, sine >= 0.0, seed[0], q)
+    if math.isfinite(limits[2, 0]) and abs(sine) > 1e-9:
+        return is_reachable
+    best = _cost(T, seed, limits, g, q)
+    if abs(q[1] + seed[1]) < best:
+        trial = np.empty(9)
+        _arm(T, g, sine < 0.0, seed[0], trial)
+        if _cost(T, seed, limits, g, trial) < best:
+            q[0], q[1] = trial[0], trial[1]
+    return is_reachable
 
 
 @inner
@@ -208,7 +224,7 @@ def _held_arm(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
 
     Where joint 1 is held back, joint 2 points the second link at the wanted point.
     """
-    is_reachable = _arm(T, g, _is_left(T, seed, limits, g), seed[0], q)
+    is_reachable = _choose(T, seed, limits, g, q)
     is_path = math.isfinite(limits[2, 0])
     wanted = _swung(q[0], seed[0], limits[0, 0], limits[1, 0], is_path)
     q[0] = bounded(wanted, seed[0], limits[0, 0], limits[1, 0], limits[2, 0])
@@ -237,29 +253,30 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         return -1
     g = geometry[_LEGS:_CARRIED]
     is_reachable = _held_arm(T, seed, limits, geometry, q)
-    platform, J, reached = np.empty((4, 4)), np.empty((6, 6)), np.empty((4, 4))
+    platform, reached = np.empty((4, 4)), np.empty((4, 4))
     wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
-    leg_lengths(platform, g, q[3:], J)
-    if not slowed(q[3:], seed[3:], limits[:, 3:], q[3:]):
+    turning = leg_lengths(platform, g, q[3:])
+    is_held = not is_allowed(q, seed, limits)
+    if is_held and not slowed(q[3:], seed[3:], limits[:, 3:], q[3:]):
         platform_pose(q[3:], g, platform)
     _place(q, geometry, platform, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if is_reachable else _UNREACHABLE
-    is_near = abs(math.sin(q[1])) < _NEAR or is_blind(platform, J, g)
+    is_near = abs(math.sin(q[1])) < _NEAR or is_blind(platform, turning, g)
     return _NEAR_SINGULAR if is_near else _FOLLOWED
 
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """Write both elbows (2, 9), the positive one first; their number, 0 if there is none."""
-    platform, J, g = np.empty((4, 4)), np.empty((6, 6)), geometry[_LEGS:_CARRIED]
+    platform, g = np.empty((4, 4)), geometry[_LEGS:_CARRIED]
     for elbow in range(2):
         q = solutions[elbow]
         if not _arm(T, geometry, elbow == 0, 0.0, q):
             return 0
         q[0] = turned(q[0], 0.0, -math.pi, math.pi, False)
         wanted_platform(T, geometry[_CARRIED] * (q[0] + q[1]), g[2], platform)
-        leg_lengths(platform, g, q[3:], J)
+        leg_lengths(platform, g, q[3:])
     return 2 if T[2, 2] > 0.0 and math.hypot(T[2, 0], T[2, 1]) <= TILT else 0
 
 
@@ -277,11 +294,11 @@ def make(*, heading: str = "fixed", **geometry: float | str) -> Robot:
     g = np.array(list(row.values()))[_LEGS:_CARRIED]
     platform, legs = np.eye(4), np.empty(6)
     platform[2, 3] = row["w_z"]
-    leg_lengths(platform, g, legs, np.empty((6, 6)))
+    leg_lengths(platform, g, legs)
     lower = np.concatenate(([-_TURN, -_TURN, 0.0], _STROKES[0] * legs))
     upper = np.concatenate(([_TURN, _TURN, 0.5], _STROKES[1] * legs))
     turned_and_tilted(0.0, 0.0, math.sin(HOME_TILT), platform)
-    leg_lengths(platform, g, legs, np.empty((6, 6)))
+    leg_lengths(platform, g, legs)
     return Robot(
         name="scara_stewart",
         joint_names=JOINTS,

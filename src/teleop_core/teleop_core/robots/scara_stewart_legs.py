@@ -35,21 +35,52 @@ def is_similar(sigma_b: float, sigma_m: float) -> bool:
     return abs(math.sin(sigma_b + sigma_m)) < _SIMILAR
 
 
+@inner
+def _joint(i: int, radius: float, c: float, s: float) -> tuple[float, float]:
+    """Place of a leg's joint on its circle [m]; shifted back by the angle of c, s for odd legs."""
+    sign = 1.0 if i % 2 == 0 else -1.0
+    return (
+        radius * (_COSINES[i] * c + sign * _SINES[i] * s),
+        radius * (_SINES[i] * c - sign * _COSINES[i] * s),
+    )
+
+
 @kernel
-def layout(r_b: float, r_m: float, sigma_b: float, sigma_m: float, joints: Array) -> None:
-    """Write base joints and platform joints of the legs (2, 6, 3) [m]."""
-    cb, sb, cm, sm = math.cos(sigma_b), math.sin(sigma_b), math.cos(sigma_m), math.sin(sigma_m)
+def leg_lengths(T: Array, g: Array, legs: Array) -> float:
+    """Write leg lengths (6,) [m] of a platform pose (4, 4).
+
+    Returns:
+        Root mean square of the leg speeds per turn of the platform about the vertical [m].
+    """
+    cb, sb, cm, sm = math.cos(g[3]), math.sin(g[3]), math.cos(g[4]), math.sin(g[4])
+    turning = 0.0
     for i in range(6):
-        c, s = _COSINES[i], _SINES[i]
-        sign = 1.0 if i % 2 == 0 else -1.0
-        joints[0, i, 0], joints[0, i, 1] = (
-            r_b * (c * cb + sign * s * sb),
-            r_b * (s * cb - sign * c * sb),
-        )
-        joints[1, i, 0], joints[1, i, 1] = (
-            r_m * (c * cm - sign * s * sm),
-            r_m * (s * cm + sign * c * sm),
-        )
+        bx, by = _joint(i, g[0], cb, sb)
+        mx, my = _joint(i, g[1], cm, -sm)
+        x, y = T[0, 0] * mx + T[0, 1] * my, T[1, 0] * mx + T[1, 1] * my
+        dx, dy = T[0, 3] + x - bx, T[1, 3] + y - by
+        dz = T[2, 3] + T[2, 0] * mx + T[2, 1] * my
+        square = dx * dx + dy * dy + dz * dz
+        legs[i] = math.sqrt(square)
+        turning += (x * dy - y * dx) ** 2 / max(square, 1e-300)
+    return math.sqrt(turning / 6.0)
+
+
+@inner
+def leg_slopes(T: Array, g: Array, J: Array) -> None:
+    """Write the leg Jacobian (6, 6) of a platform pose (4, 4)."""
+    joints, legs = np.empty((2, 6, 3)), np.empty(6)
+    layout(g, joints)
+    leg_system(T, joints[0], joints[1], legs, J)
+
+
+@inner
+def layout(g: Array, joints: Array) -> None:
+    """Write base joints and platform joints of the legs (2, 6, 3) [m]."""
+    cb, sb, cm, sm = math.cos(g[3]), math.sin(g[3]), math.cos(g[4]), math.sin(g[4])
+    for i in range(6):
+        joints[0, i, 0], joints[0, i, 1] = _joint(i, g[0], cb, sb)
+        joints[1, i, 0], joints[1, i, 1] = _joint(i, g[1], cm, -sm)
         joints[0, i, 2] = joints[1, i, 2] = 0.0
 
 
@@ -152,25 +183,14 @@ def platform_pose(legs: Array, g: Array, T: Array) -> None:
     the pose with all six freedoms, found from the one with the centre held.
     """
     joints = np.empty((2, 6, 3))
-    layout(g[0], g[1], g[3], g[4], joints)
+    layout(g, joints)
     orientation(legs, g, T)
     direct(legs, joints[0], joints[1], g[1], is_similar(g[3], g[4]), T)
 
 
-@kernel
-def leg_lengths(T: Array, g: Array, legs: Array, J: Array) -> None:
-    """Write leg lengths (6,) [m] and leg Jacobian (6, 6) of a platform pose (4, 4)."""
-    joints = np.empty((2, 6, 3))
-    layout(g[0], g[1], g[3], g[4], joints)
-    leg_system(T, joints[0], joints[1], legs, J)
-
-
 @inner
-def is_blind(T: Array, J: Array, g: Array) -> bool:
-    """Whether the legs hardly tell the platform's turn about the vertical."""
+def is_blind(T: Array, turning: float, g: Array) -> bool:
+    """Whether the legs hardly tell the platform's turn; ``turning`` from :func:`leg_lengths`."""
     square = T[2, 0] ** 2 + T[2, 1] ** 2
-    turning = 0.0
-    for i in range(6):
-        turning += J[i, 5] * J[i, 5]
     is_level = is_similar(g[3], g[4]) and square < 1e-4
-    return bool(is_level or math.sqrt(turning / 6.0) < 0.02 * g[1])
+    return bool(is_level or turning < 0.02 * g[1])
