@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 from teleop_core.bags import topics
 from teleop_core.bags.reader import Bag
@@ -226,11 +227,15 @@ def test_an_operator_can_follow_a_recording(teleop, recording, tmp_path):
     out = tmp_path / "followed"
     settings = ("path.kind=bag", f"path.bag={recording}", "tremor_amplitude=0.0")
     teleop("sim", "--duration", 3, "--out", out, "--set", *settings)
-    wanted, got = (
-        Bag(p).read(topics.MASTER_MEASURED_CP).values[:3000, :3] for p in (recording, out)
-    )
+    wanted, got = (Bag(p).read(topics.MASTER_MEASURED_CP).values[:3000] for p in (recording, out))
     # The hand lags behind by its own dynamics, less than a tenth of a second at 40 mm/s.
-    assert np.linalg.norm(wanted - got, axis=1).max() < 5e-3
+    assert np.linalg.norm(wanted[:, :3] - got[:, :3], axis=1).max() < 5e-3
+    first, turns = Rotation.from_quat(wanted[0, 3:], scalar_first=True), []
+    for values in (wanted, got):
+        turns.append(first.inv() * Rotation.from_quat(values[:, 3:], scalar_first=True))
+    assert turns[0].magnitude().max() > 0.1
+    # The gimbal's noise, once recorded and once anew, with that of the first sample in both.
+    assert (turns[0].inv() * turns[1]).magnitude().max() < 4 * 2e-3 * 3**0.5
     assert "missing.bag" in one_line(
         teleop(
             "sim", "--out", tmp_path / "x", "--set", "path.kind=bag", "path.bag=missing.bag", code=2

@@ -216,3 +216,15 @@ def test_checked_array_refuses_what_is_not_finite(bad):
     with pytest.raises(ParameterError) as error:
         geometry.checked_array("q", [0.0, bad, 0.0], (3,))
     assert error.value.name == "q"
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_rotation_vectors_run_on_beyond_half_a_turn(seed):
+    rng = np.random.default_rng(seed)
+    start, axis = Rotation.random(rng=rng), rng.normal(size=3)
+    angles = np.linspace(0.0, 6.2, 50)
+    vectors = angles[:, None] * axis / np.linalg.norm(axis)
+    # Any sign of a quaternion is the same turn.
+    quaternions = (start * Rotation.from_rotvec(vectors)).as_quat(scalar_first=True)
+    quaternions *= rng.choice((-1.0, 1.0), (50, 1))
+    assert np.allclose(geometry.rotation_vectors(quaternions), vectors, rtol=0, atol=1e-12)

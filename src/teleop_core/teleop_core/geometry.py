@@ -192,6 +192,22 @@ def rotations_from_quaternions(quaternions: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def rotation_vectors(quaternions: Array) -> Array:
+    """Turns since the first of a series of unit quaternions (N, 4), w, x, y, z.
+
+    Returns:
+        Rotation vectors (N, 3) [rad] in the axes of the first. They run on beyond half a turn, up
+        to a whole one.
+    """
+    signs = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
+    q = quaternions * np.concatenate(([1.0], np.cumprod(signs)))[:, None]
+    w, axis = q[0, 0], q[0, 1:]
+    turned = w * q[:, 1:] - q[:, :1] * axis - np.cross(axis, q[:, 1:])
+    sine = np.linalg.norm(turned, axis=1)
+    angle = 2.0 * np.arctan2(sine, q @ q[0])
+    return turned * (angle / np.where(sine > 0.0, sine, 1.0))[:, None]
+
+
 def checked_array(name: str, value: object, shape: tuple[int, ...]) -> Array:
     """Writable float array of the wanted trailing shape, a leading batch axis allowed.
 

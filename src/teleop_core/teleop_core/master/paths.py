@@ -69,8 +69,8 @@ class Path:
     Args:
         parameters: Shape of the motion.
         rng: Draws the phases of random motion, once; the same seed gives the same path.
-        recorded: Times (N,) [s] from 0 and positions (N, 3) [m] relative to the first, for the
-            kind "bag".
+        recorded: Times (N,) [s] from 0, and positions [m] and rotation vectors [rad] relative to
+            the first (N, 6), for the kind "bag".
     """
 
     # Parts of random motion: cycles per period, incommensurate so that it does not repeat.
@@ -100,7 +100,8 @@ class Path:
         """
         p = self._p
         if p.kind == "bag":
-            return self._shape(times), np.zeros((len(times), 3))
+            moves = self._shape(times)
+            return moves[:, :3], moves[:, 3:]
         moved = np.maximum(times - p.approach_time, 0.0)
         # Motion grows over its first second, so that it starts at rest; points do by themselves.
         grown = minimum_jerk(moved)[:, None]
@@ -138,8 +139,8 @@ class Path:
 
     def _bag(self, times: Array) -> Array:
         assert self._recorded is not None
-        at, positions = self._recorded
-        return np.stack([np.interp(times, at, column) for column in positions.T], axis=1)
+        at, moves = self._recorded
+        return np.stack([np.interp(times, at, column) for column in moves.T], axis=1)
 
     def _hold(self, times: Array) -> Array:
         return np.zeros((len(times), 3))

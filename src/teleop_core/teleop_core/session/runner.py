@@ -14,7 +14,7 @@ from teleop_core.bags.reports import report
 from teleop_core.bags.topics import STREAMS
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
-from teleop_core.geometry import Array
+from teleop_core.geometry import Array, rotation_vectors
 from teleop_core.session.configuration import Configuration, Layer, parse_layer
 from teleop_core.session.graph import STAGES, Graph
 from teleop_core.signals import STATE_FIELDS, TICK_NS, make_signals
@@ -123,7 +123,8 @@ def recorded_path(configuration: Configuration) -> tuple[Array, Array] | None:
     bag.require((topics.MASTER_MEASURED_CP,))
     series = bag.read(topics.MASTER_MEASURED_CP)
     times = (series.stamp_ns - series.stamp_ns[0]) * 1e-9
-    return times, np.ascontiguousarray(series.values[:, :3] - series.values[0, :3])
+    moves = series.values[:, :3] - series.values[0, :3]
+    return times, np.hstack((moves, rotation_vectors(series.values[:, 3:])))
 
 
 def _record(
