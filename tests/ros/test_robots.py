@@ -1,30 +1,133 @@
-"""Robots of the sources through the ROS nodes: slaves and the MMA as master."""
+"""Every robot through the ROS nodes: all in live sessions, closed loops in separate processes."""
 
 import io
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from rich.console import Console
 
 from teleop_core.bags import topics
+from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag
+from teleop_core.geometry import pose_from_transform, rotation, transform
+from teleop_core.nodes.children import environment
 from teleop_core.nodes.live import live
-from teleop_core.robots import load_robot
+from teleop_core.robots import list_robots, load_robot
 from teleop_core.session.configuration import configure
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 SHORT = ("teleop.duration=2.0", "path.approach_time=0.5", "path.size=[0.02, 0.02, 0.02]")
-SLAVES = [
-    (f"robot={name}",) for name in ("puma560", "scara_stewart", "scara", "planar_3r", "five_axis")
-]
+SLAVES = [name for name in list_robots() if load_robot(name).drives is not None]
+GRID = 55e-6  # m, reading step of the Phantom Omni
+MS = 1_000_000
 
 
-@pytest.mark.parametrize("setting", [*SLAVES, ("device.handle=mma",)])
-def test_robot_moves_in_a_live_session(setting, tmp_path):
-    configuration = configure("free_motion", settings=[*SHORT, *setting])
-    live(configuration, tmp_path / "bag", Console(file=io.StringIO()), is_composed=True)
-    bag = Bag(tmp_path / "bag")
+def short_session(setting, folder):
+    configuration = configure("free_motion", settings=[*SHORT, setting])
+    live(configuration, folder / "bag", Console(file=io.StringIO()), is_composed=True)
+    return Bag(folder / "bag")
+
+
+def off_grid(bag):
+    """Largest distance of a master reading from the Phantom's grid, in its steps."""
+    steps = bag.read(topics.MASTER_MEASURED_CP).values[:, :3] / GRID
+    return np.abs(steps - np.rint(steps)).max()
+
+
+@pytest.mark.parametrize("name", SLAVES)
+def test_every_slave_moves_in_a_live_session(name, tmp_path):
+    bag, robot = short_session(f"robot={name}", tmp_path), load_robot(name)
     measured = bag.read(topics.SLAVE_MEASURED_JS)
-    robot = load_robot(configuration.groups["slave_sim"].robot)
     assert measured.names == robot.joint_names
     assert np.ptp(measured.values[:, : robot.n], axis=0).max() > 1e-3
+    assert off_grid(bag) < 1e-6
+
+
+def test_the_mma_leads_a_live_session_with_its_own_encoders(tmp_path):
+    bag = short_session("device.handle=mma", tmp_path)
+    measured = bag.read(topics.SLAVE_MEASURED_JS)
+    assert np.ptp(measured.values[:, : load_robot("rcrt1").n], axis=0).max() > 1e-3
+    assert off_grid(bag) > 0.1
+
+
+def send_pose(peer, stamp, T):
+    """Publish a pose of the slave's tip."""
+    pose = np.empty(7)
+    pose_from_transform(T, pose)
+    peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
+
+
+def beside_home(robot):
+    """Pose some millimetres and degrees away from home: further than one tick reaches."""
+    home = robot.fk(robot.home)
+    turn = rotation("x", 0.02) @ rotation("y", -0.01) @ rotation("z", 0.03)
+    return transform(home[:3, :3] @ turn, home[:3, 3] + [4e-3, -3e-3, 2e-3])
+
+
+@pytest.fixture
+def hybrid_node(peer):
+    """Inverse kinematics of the hybrid as ``ros2 run ... -p robot:=scara_stewart`` starts it."""
+    command = [sys.executable, "-m", "teleop_core.nodes.inverse_kinematics", "--ros-args"]
+    process = subprocess.Popen(
+        [*command, "-p", "robot:=scara_stewart"],
+        env=environment() | {"ROS_DOMAIN_ID": peer.domain},
+    )
+    try:
+        peer.wait_state("inverse_kinematics", "active")
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(peer, hybrid_node):
+    robot = load_robot("scara_stewart")
+    goal, answers = beside_home(robot), peer.listen(topics.SLAVE_SERVO_JP)
+    written = layout(topics.SLAVE_SETPOINT_JS, robot.joint_names)
+    setpoints, stamp = peer.publisher(topics.SLAVE_SETPOINT_JS), 0
+
+    def answered():
+        """Send on as a slave that is always where it was told to be; 30 ms lead to the goal."""
+        nonlocal stamp
+        stamp += MS
+        where = (answers.stamps[-1], answers.values[-1]) if answers.take() else (0, robot.home)
+        setpoints.publish(written.encode_one(*where))
+        send_pose(peer, stamp, goal)
+        return len(answers.stamps) >= 100
+
+    peer.wait(answered, "slave/servo_jp")
+    assert set(answers.stamps) <= set(range(MS, stamp + 1, MS))
+    # The pose goes through a quaternion, joints are those of its solution: rounding only.
+    assert np.abs(robot.fk(answers.values[-1]) - goal).max() < 1e-9
+
+
+def test_a_stewart_slave_goes_where_a_pose_says_from_process_to_process(peer):
+    robot = load_robot("stewart")
+    goal, stamp = beside_home(robot), 0
+    setpoints, measured = (
+        peer.listen(topic) for topic in (topics.SLAVE_SETPOINT_JS, topics.SLAVE_MEASURED_JS)
+    )
+    for name in ("slave_sim", "inverse_kinematics"):
+        peer.start(name, wait="", robot="stewart")
+    for name in ("slave_sim", "inverse_kinematics"):
+        peer.wait_state(name, "active")
+
+    def arrived():
+        nonlocal stamp
+        stamp += MS
+        send_pose(peer, stamp, goal)
+        q = setpoints.values[-1] if setpoints.take() else robot.home
+        return np.abs(robot.fk(q) - goal).max() < 1e-9
+
+    peer.wait(arrived, "slave at the goal")
+    measured.forget()
+    peer.wait(lambda: measured.take() > 200, "legs after that")
+    legs = np.array(measured.values)[:, : robot.n]
+    # Millimetres from home; friction and the drives' lag leave a few encoder steps of 1 µm.
+    assert np.abs(legs[-1] - robot.ik(goal).q).max() < 1e-4
