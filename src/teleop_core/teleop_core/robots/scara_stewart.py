@@ -67,7 +67,10 @@ _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACH
 
 @kernel
 def _place(q: Array, g: Array, platform: Array, T: Array) -> None:
-    """Write the tip (4, 4) of the arm with its platform at a pose (4, 4) in the Stewart base."""
+    """Write the tip (4, 4) of the arm with its platform at a pose (4, 4) in the Stewart base.
+
+    T may be the platform's pose itself.
+    """
     heading = g[_CARRIED] * (q[0] + q[1])
     c, s = math.cos(heading), math.sin(heading)
     for j in range(4):
@@ -86,9 +89,8 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     Source:
         Kucuk and Gungor 2016, eqs. 1-13, corrected.
     """
-    platform = np.empty((4, 4))
-    platform_pose(q[3:], geometry[_LEGS:_CARRIED], platform)
-    _place(q, geometry, platform, T)
+    platform_pose(q[3:], geometry[_LEGS:_CARRIED], T)
+    _place(q, geometry, T, T)
 
 
 @inner

@@ -25,6 +25,8 @@ _SIMILAR = 1e-9
 # Of 60° (i - 1).
 _COSINES = (1.0, 0.5, -0.5, -1.0, -0.5, 0.5)
 _SINES = (0.0, math.sqrt(0.75), math.sqrt(0.75), 0.0, -math.sqrt(0.75), -math.sqrt(0.75))
+# Sum of squared leg errors, over r_m², of legs that agree: rounding.
+_AGREED = 1e-29
 # Sine of the largest tilt of the platform, 75°: its ball joints' assumed limit.
 TILT = math.sin(math.radians(75.0))
 
@@ -131,14 +133,13 @@ def _turn_of_hexagons(cosine: float, z1: complex, tilt: complex, up: float) -> f
 
 
 @inner
-def _sums(legs: Array, constant: float, sums: Array) -> None:
-    """Write mean and first harmonic of squared legs less ``constant``, odd and even: (2, 2)."""
-    for half in range(2):
-        sums[half, 0] = sums[half, 1] = 0.0
-        for i in range(half, 6, 2):
-            value = (legs[i] * legs[i] - constant) / 3.0
-            sums[half, 0] += value
-            sums[half, 1] += value * complex(_COSINES[i], _SINES[i])
+def _sums(legs: Array, constant: float, half: int) -> tuple[float, complex]:
+    """Mean and first harmonic of squared legs less ``constant``, odd (half 0) or even ones."""
+    mean, x, y = 0.0, 0.0, 0.0
+    for i in range(half, 6, 2):
+        value = (legs[i] * legs[i] - constant) / 3.0
+        mean, x, y = mean + value, x + value * _COSINES[i], y + value * _SINES[i]
+    return mean, complex(x, y)
 
 
 @kernel
@@ -151,24 +152,24 @@ def orientation(legs: Array, g: Array, T: Array) -> None:
         T: Platform in the Stewart base (4, 4); its z points up.
     """
     r_b, r_m, w_z, sigma_b, sigma_m = g[0], g[1], g[2], g[3], g[4]
-    sums = np.empty((2, 2), np.complex128)
-    _sums(legs, w_z * w_z + r_b * r_b + r_m * r_m, sums)
-    odd, even, K = sums[0], sums[1], r_b * r_m
+    constant, K = w_z * w_z + r_b * r_b + r_m * r_m, r_b * r_m
+    odd_mean, odd = _sums(legs, constant, 0)
+    even_mean, even = _sums(legs, constant, 1)
     shift = sigma_m - sigma_b
     e_shift = complex(math.cos(shift), math.sin(shift))
     e_joint = complex(math.cos(sigma_m), math.sin(sigma_m))
     share = 0.5 / math.cos(shift + sigma_m)
-    tilt = (odd[1] * e_shift.conjugate() + even[1] * e_shift) * share / (w_z * r_m)
-    z1 = ((even[1] * e_joint.conjugate() - odd[1] * e_joint) * share / K).conjugate()
+    tilt = (odd * e_shift.conjugate() + even * e_shift) * share / (w_z * r_m)
+    z1 = ((even * e_joint.conjugate() - odd * e_joint) * share / K).conjugate()
     length = abs(tilt)
     if length > 0.9999:
         tilt *= 0.9999 / length
     up = math.sqrt(1.0 - tilt.real**2 - tilt.imag**2)
-    cosine = -(odd[0] + even[0]).real / (2.0 * K * math.cos(sigma_b + sigma_m) * (1.0 + up))
+    cosine = -(odd_mean + even_mean) / (2.0 * K * math.cos(sigma_b + sigma_m) * (1.0 + up))
     if is_similar(sigma_b, sigma_m):
         turn = _turn_of_hexagons(cosine, z1, tilt, up)
     else:
-        sine = (odd[0] - even[0]).real / (2.0 * K * math.sin(sigma_b + sigma_m) * (1.0 + up))
+        sine = (odd_mean - even_mean) / (2.0 * K * math.sin(sigma_b + sigma_m) * (1.0 + up))
         turn = math.atan2(sine, cosine)
     turned_and_tilted(turn, tilt.real, tilt.imag, T)
     T[0, 3] = T[1, 3] = T[3, 0] = T[3, 1] = T[3, 2] = 0.0
@@ -182,9 +183,15 @@ def platform_pose(legs: Array, g: Array, T: Array) -> None:
     Similar hexagons: the turn of least squared leg errors about the held centre. Other layouts:
     the pose with all six freedoms, found from the one with the centre held.
     """
+    orientation(legs, g, T)
+    found, square = np.empty(6), 0.0
+    leg_lengths(T, g, found)
+    for i in range(6):
+        square += (found[i] - legs[i]) ** 2
+    if square <= _AGREED * g[1] * g[1]:
+        return
     joints = np.empty((2, 6, 3))
     layout(g, joints)
-    orientation(legs, g, T)
     direct(legs, joints[0], joints[1], g[1], is_similar(g[3], g[4]), T)
 
 
