@@ -46,15 +46,14 @@ def test_three_distances_between_contacts_leave_six_freedoms(robot, hand):
 
 
 def test_finger_of_the_specification():
-    point = np.empty(3)
-    finger_point(np.radians([20.0, 35.0, -50.0]), np.array([1.0, 0.6, 0.4]), point)
+    point = finger_point(*np.radians([20.0, 35.0, -50.0]), (1.0, 0.6, 0.4))
     assert np.allclose(point, [1.764613, 0.642266, 0.240618], atol=6e-7)
 
 
 def test_finger_is_the_chain_of_its_denavit_hartenberg_table():
     rng = np.random.default_rng(1)
     for _ in range(20):
-        links, q, point = rng.uniform(0.2, 1.0, 3), rng.uniform(-3.0, 3.0, 3), np.empty(3)
+        links, q = rng.uniform(0.2, 1.0, 3), rng.uniform(-3.0, 3.0, 3)
         chain = rtb.DHRobot(
             [
                 rtb.RevoluteMDH(),
@@ -62,14 +61,14 @@ def test_finger_is_the_chain_of_its_denavit_hartenberg_table():
                 rtb.RevoluteMDH(a=links[1]),
             ]
         )
-        finger_point(q, links, point)
+        point = finger_point(*q, tuple(links))
         assert np.allclose(point, (chain.fkine(q).A @ [links[2], 0.0, 0.0, 1.0])[:3], atol=1e-14)
 
 
 def test_fingers_stand_where_the_lecture_puts_them(robot, hand):
     q = np.array([0.2, 0.3, -0.4] * 3)
-    points, local, g = hand.contact_points(q), np.empty(3), robot.geometry
-    finger_point(q[:3], np.array([g["l11"], g["l12"], g["l13"]]), local)
+    points, g = hand.contact_points(q), robot.geometry
+    local = np.array(finger_point(*q[:3], (g["l11"], g["l12"], g["l13"])))
     assert np.allclose(points[0], local + np.array([0.0, -g["d"], g["h"]]), atol=1e-15)
     assert np.allclose(points[1], local + np.array([0.0, g["d"], g["h"]]), atol=1e-15)
     assert np.allclose(points[2], rotation("y", g["gamma"]) @ local, atol=1e-15)

@@ -1,7 +1,7 @@
 """Fingers of the three-fingered hand: contact point and joints of one R-R-R finger, as kernels.
 
 A finger stands at the origin of its frame F: theta turns it about z, psi lifts the second link,
-phi bends the third. ``links`` are l1, l2, l3 [m].
+phi bends the third. ``links`` are l1, l2, l3 [m]. Points are three numbers: they need no memory.
 
 Source:
     Ghosal 2020, lecture 6, table and F_p of the hand (after Salisbury 1982); the inverse and its
@@ -9,8 +9,6 @@ Source:
 """
 
 import math
-
-import numpy as np
 
 from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
@@ -20,15 +18,17 @@ from teleop_core.robots.branches import bounded, turned, wrapped
 # path through it remembers its side.
 _STRAIGHT = 1e-8
 _HELD = 1e-12
+Triple = tuple[float, float, float]
+Branch = tuple[int, float, float, float, bool]
 
 
 @kernel
-def finger_point(q: Array, links: Array, p: Array) -> None:
-    """Write the contact point (3,) [m] in F of theta, psi, phi (3,)."""
-    outer = q[1] + q[2]
-    r = links[0] + links[1] * math.cos(q[1]) + links[2] * math.cos(outer)
-    p[0], p[1] = math.cos(q[0]) * r, math.sin(q[0]) * r
-    p[2] = links[1] * math.sin(q[1]) + links[2] * math.sin(outer)
+def finger_point(theta: float, psi: float, phi: float, links: Triple) -> Triple:
+    """Contact point [m] in F."""
+    outer = psi + phi
+    r = links[0] + links[1] * math.cos(psi) + links[2] * math.cos(outer)
+    z = links[1] * math.sin(psi) + links[2] * math.sin(outer)
+    return math.cos(theta) * r, math.sin(theta) * r, z
 
 
 @inner
@@ -45,82 +45,116 @@ def finger_jacobian(q: Array, links: Array, J: Array) -> None:
 
 
 @inner
-def _bent(r: float, z: float, links: Array, is_positive: bool, q: Array) -> bool:
-    """Write psi and phi of q (3,) for a point r ahead of, z above joint 2; whether it reaches."""
-    l2, l3 = links[1], links[2]
+def _bent(r: float, z: float, links: Triple, is_positive: bool) -> tuple[float, float, bool]:
+    """Angles psi and phi for a point r ahead of, z above joint 2; whether the finger reaches."""
+    _, l2, l3 = links
     k = (r * r + z * z - l2 * l2 - l3 * l3) / (2.0 * l2 * l3)
-    sine = max(math.sqrt(max(1.0 - k * k, 0.0)), _STRAIGHT)
-    q[2] = math.atan2(sine if is_positive else -sine, min(max(k, -1.0), 1.0))
-    inner = math.atan2(l3 * math.sin(q[2]), l2 + l3 * math.cos(q[2]))
-    q[1] = wrapped(math.atan2(z, r) - inner)
-    return abs(k) <= 1.0 + 1e-12
+    sine, cosine = max(math.sqrt(max(1.0 - k * k, 0.0)), _STRAIGHT), min(max(k, -1.0), 1.0)
+    if not is_positive:
+        sine = -sine
+    psi = math.atan2(z, r) - math.atan2(l3 * sine, l2 + l3 * cosine)
+    return wrapped(psi), math.atan2(sine, cosine), abs(k) <= 1.0 + 1e-12
 
 
 @kernel
-def finger_branch(p: Array, links: Array, branch: int, seed: float, q: Array) -> bool:
-    """Write theta, psi, phi (3,) of one of four branches; whether the finger reaches p at all.
+def finger_branch(
+    p: Triple, links: Triple, branch: int, seed: float
+) -> tuple[float, float, float, bool]:
+    """Angles theta, psi, phi of one of four branches; whether the finger reaches p at all.
 
     Branches 0 and 1 turn towards p, 2 and 3 away from it; even ones bend with phi > 0. On the
     axis of joint 1, where every theta will do, the seed's is kept.
     """
-    q[0] = seed
-    if math.hypot(p[0], p[1]) > 1e-12:
-        q[0] = wrapped(math.atan2(p[1], p[0]) + (math.pi if branch > 1 else 0.0))
-    r = p[0] * math.cos(q[0]) + p[1] * math.sin(q[0]) - links[0]
-    return bool(_bent(r, p[2], links, branch % 2 == 0, q))
+    x, y, z = p
+    theta, reach, turn = seed, math.sqrt(x * x + y * y), 0.0
+    if branch > 1:
+        reach, turn = -reach, math.pi
+    if abs(reach) > 1e-12:
+        theta = wrapped(math.atan2(y, x) + turn)
+    psi, phi, is_reachable = _bent(reach - links[0], z, links, branch % 2 == 0)
+    return theta, psi, phi, is_reachable
 
 
 @inner
-def _branch_of(seed: Array, links: Array) -> int:
+def _side(psi: float, phi: float, links: Triple) -> int:
     """Branch that a finger is on."""
-    reach = links[0] + links[1] * math.cos(seed[1]) + links[2] * math.cos(seed[1] + seed[2])
-    return (2 if reach < 0.0 else 0) + (0 if math.sin(seed[2]) >= 0.0 else 1)
+    reach = links[0] + links[1] * math.cos(psi) + links[2] * math.cos(psi + phi)
+    return (2 if reach < 0.0 else 0) + (0 if math.sin(phi) >= 0.0 else 1)
 
 
 @inner
-def _nearest_branch(p: Array, links: Array, seed: Array, limits: Array) -> int:
-    """Branch nearest to the seed by the largest joint move, inside the limits if one is."""
-    q, best, least = np.empty(3), 0, math.inf
-    for branch in range(4):
-        cost = 0.0 if finger_branch(p, links, branch, seed[0], q) else 1000.0
-        for i in range(3):
-            q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], False)
-            cost = max(cost, abs(q[i] - seed[i]))
-        for i in range(3):
-            if q[i] < limits[0, i] - _HELD or q[i] > limits[1, i] + _HELD:
-                cost += 100.0
+def _cost(angles: Triple, seed: Array, limits: Array, first: int) -> float:
+    """Largest joint move from the seed, and 100 for each joint outside its limits."""
+    worst, outside = 0.0, 0.0
+    for i in range(3):
+        j = first + i
+        angle = turned(angles[i], seed[j], limits[0, j], limits[1, j], False)
+        worst = max(worst, abs(angle - seed[j]))
+        if angle < limits[0, j] - _HELD or angle > limits[1, j] + _HELD:
+            outside += 100.0
+    return worst + outside
+
+
+@inner
+def _nearest_branch(p: Triple, links: Triple, seed: Array, limits: Array, first: int) -> Branch:
+    """Branch nearest to the seed by the largest joint move, inside the limits if one is.
+
+    It begins where the seed bends and where theta turns less than a quarter turn. The other bend
+    and the other turn are looked at only where phi or theta alone is not too large a move.
+    """
+    theta, phi = seed[first], seed[first + 2]
+    is_away = p[0] * math.cos(theta) + p[1] * math.sin(theta) < 0.0
+    begin = (2 if is_away else 0) + (0 if math.sin(phi) >= 0.0 else 1)
+    best = finger_branch(p, links, begin, theta)
+    least = _cost(best[:3], seed, limits, first) + (0.0 if best[3] else 1000.0)
+    number, bend = begin, abs(wrapped(best[2] + phi))
+    for k in range(1, 4):
+        if least <= (bend if k == 1 else 0.5 * math.pi):
+            continue
+        found = finger_branch(p, links, begin ^ k, theta)
+        cost = _cost(found[:3], seed, limits, first) + (0.0 if found[3] else 1000.0)
         if cost < least:
-            best, least = branch, cost
-    return best
+            number, best, least = begin ^ k, found, cost
+    return number, best[0], best[1], best[2], best[3]
 
 
 @inner
-def finger_joints(p: Array, links: Array, seed: Array, limits: Array, q: Array) -> bool:
-    """Write theta, psi, phi (3,) for a contact point; whether the finger reaches it at all.
+def _is_held(angle: float, i: int, seed: Array, limits: Array, q: Array) -> bool:
+    """Write joint i, next to an angle given up to turns; whether limits or step hold it back."""
+    is_path = math.isfinite(limits[2, i])
+    wanted = turned(angle, seed[i], limits[0, i], limits[1, i], is_path)
+    q[i] = bounded(wanted, seed[i], limits[0, i], limits[1, i], limits[2, i])
+    return bool(abs(q[i] - wanted) > _HELD)
+
+
+@inner
+def finger_joints(
+    p: Triple, links: Triple, seed: Array, limits: Array, first: int, q: Array
+) -> bool:
+    """Write theta, psi, phi for a contact point; whether the finger reaches it at all.
 
     In a path (finite steps) the finger stays on its branch. Where a joint is held back, the
     joints after it make the best of it: psi and phi from where theta really is, phi from psi.
 
     Args:
-        p: Wanted contact point (3,) [m] in F.
+        p: Wanted contact point [m] in F.
         links: l1, l2, l3 [m].
-        seed: Joints (3,) to stay next to [rad].
-        limits: Rows lower, upper, largest step: (3, 3) [rad].
-        q: Joints (3,), inside the limits and a step of the seed.
+        seed: Joints (n,) to stay next to [rad].
+        limits: Rows lower, upper, largest step: (3, n) [rad].
+        first: Place of theta among the joints.
+        q: Joints (n,), inside the limits and a step of the seed.
     """
-    is_path = math.isfinite(limits[2, 0])
-    branch = _branch_of(seed, links) if is_path else _nearest_branch(p, links, seed, limits)
-    is_reachable = finger_branch(p, links, branch, seed[0], q)
-    wanted = turned(q[0], seed[0], limits[0, 0], limits[1, 0], is_path)
-    q[0] = bounded(wanted, seed[0], limits[0, 0], limits[1, 0], limits[2, 0])
-    r = p[0] * math.cos(q[0]) + p[1] * math.sin(q[0]) - links[0]
-    if abs(q[0] - wanted) > _HELD:
-        _bent(r, p[2], links, branch % 2 == 0, q)
-    wanted = turned(q[1], seed[1], limits[0, 1], limits[1, 1], is_path)
-    q[1] = bounded(wanted, seed[1], limits[0, 1], limits[1, 1], limits[2, 1])
-    if abs(q[1] - wanted) > _HELD:
-        x, z = r - links[1] * math.cos(q[1]), p[2] - links[1] * math.sin(q[1])
-        q[2] = math.atan2(z, x) - q[1]
-    wanted = turned(q[2], seed[2], limits[0, 2], limits[1, 2], is_path)
-    q[2] = bounded(wanted, seed[2], limits[0, 2], limits[1, 2], limits[2, 2])
+    if math.isfinite(limits[2, first]):
+        branch = _side(seed[first + 1], seed[first + 2], links)
+        theta, psi, phi, is_reachable = finger_branch(p, links, branch, seed[first])
+    else:
+        branch, theta, psi, phi, is_reachable = _nearest_branch(p, links, seed, limits, first)
+    is_held = _is_held(theta, first, seed, limits, q)
+    r = p[0] * math.cos(q[first]) + p[1] * math.sin(q[first]) - links[0]
+    if is_held:
+        psi, phi, _ = _bent(r, p[2], links, branch % 2 == 0)
+    if _is_held(psi, first + 1, seed, limits, q):
+        psi = q[first + 1]
+        phi = math.atan2(p[2] - links[1] * math.sin(psi), r - links[1] * math.cos(psi)) - psi
+    _is_held(phi, first + 2, seed, limits, q)
     return bool(is_reachable)

@@ -19,9 +19,14 @@ import numpy as np
 from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.geometry import Array, checked_array, is_rigid
-from teleop_core.robots.hand_fingers import finger_branch, finger_jacobian, finger_point
+from teleop_core.robots.hand_fingers import (
+    Triple,
+    finger_branch,
+    finger_jacobian,
+    finger_point,
+)
 from teleop_core.robots.robot import REACHED, geometry_of
-from teleop_core.robots.rps3_loop import frame
+from teleop_core.robots.rps3_loop import COSINES, SINES, frame
 
 FINGERS = 3
 # No lengths are published: those of a hand that holds an object of 5 cm.
@@ -34,59 +39,68 @@ GEOMETRY = {
 _D, _H, _GAMMA, SIDE = 9, 10, 11, 12
 
 
-@kernel
-def _turn(i: int, g: Array, sign: float, v: Array) -> None:
-    """Turn a vector (3,) from finger frame F_i to the base (sign 1) or back (-1), in place."""
-    if i == FINGERS - 1:
-        c, s = math.cos(g[_GAMMA]), sign * math.sin(g[_GAMMA])
-        v[0], v[2] = c * v[0] + s * v[2], c * v[2] - s * v[0]
-
-
-@kernel
-def _shift(i: int, g: Array, sign: float, p: Array) -> None:
-    """Add (sign 1) or take away (-1) the base (3,) of finger i, in place."""
+@inner
+def _turned(i: int, g: Array, sign: float, x: float, y: float, z: float) -> Triple:
+    """Vector of finger frame F_i in base axes (sign 1), or back (-1)."""
     if i < FINGERS - 1:
-        p[1] += sign * (g[_D] if i == 1 else -g[_D])
-        p[2] += sign * g[_H]
+        return x, y, z
+    c, s = math.cos(g[_GAMMA]), sign * math.sin(g[_GAMMA])
+    return c * x + s * z, y, c * z - s * x
+
+
+@inner
+def _base(i: int, g: Array) -> tuple[float, float]:
+    """Where finger i stands: y, z [m]."""
+    if i == FINGERS - 1:
+        return 0.0, 0.0
+    return (g[_D] if i == 1 else -g[_D]), g[_H]
+
+
+@inner
+def links_of(i: int, g: Array) -> Triple:
+    """Links of finger i [m]."""
+    return g[3 * i], g[3 * i + 1], g[3 * i + 2]
 
 
 @kernel
 def contacts(q: Array, g: Array, points: Array) -> None:
     """Write the contact points (3, 3) [m] of nine joints, one finger a row."""
     for i in range(FINGERS):
-        finger_point(q[3 * i : 3 * i + 3], g[3 * i : 3 * i + 3], points[i])
-        _turn(i, g, 1.0, points[i])
-        _shift(i, g, 1.0, points[i])
+        x, y, z = finger_point(q[3 * i], q[3 * i + 1], q[3 * i + 2], links_of(i, g))
+        x, y, z = _turned(i, g, 1.0, x, y, z)
+        base_y, base_z = _base(i, g)
+        points[i, 0], points[i, 1], points[i, 2] = x, base_y + y, base_z + z
 
 
 @kernel
-def wanted_contact(i: int, T: Array, g: Array, p: Array) -> None:
-    """Write where contact i of the object at T is, (3,) [m], in base coordinates."""
-    radius, angle = g[SIDE] / math.sqrt(3.0), 2.0 * math.pi / 3.0 * i
-    x, y = radius * math.cos(angle), radius * math.sin(angle)
-    for r in range(3):
-        p[r] = T[r, 3] + T[r, 0] * x + T[r, 1] * y
+def wanted_contact(i: int, T: Array, g: Array) -> Triple:
+    """Where contact i of the object at T is [m], in base coordinates."""
+    radius = g[SIDE] / math.sqrt(3.0)
+    x, y = radius * COSINES[i], radius * SINES[i]
+    return (
+        T[0, 3] + T[0, 0] * x + T[0, 1] * y,
+        T[1, 3] + T[1, 0] * x + T[1, 1] * y,
+        T[2, 3] + T[2, 0] * x + T[2, 1] * y,
+    )
 
 
-@inner
-def local_contact(i: int, T: Array, g: Array, p: Array) -> None:
-    """Write where contact i of the object at T is, (3,) [m], in finger frame F_i."""
-    wanted_contact(i, T, g, p)
-    _shift(i, g, -1.0, p)
-    _turn(i, g, -1.0, p)
+@kernel
+def local_point(i: int, g: Array, p: Triple) -> Triple:
+    """Point of the base [m] in finger frame F_i."""
+    base_y, base_z = _base(i, g)
+    return _turned(i, g, -1.0, p[0], p[1] - base_y, p[2] - base_z)
 
 
 @kernel
 def contact_jacobian(q: Array, g: Array, J: Array) -> None:
     """Write the slopes (9, 9) of the contact points along the joints, one block per finger."""
-    local, column = np.empty((3, 3)), np.empty(3)
+    local = np.empty((3, 3))
     J[:] = 0.0
     for i in range(FINGERS):
         finger_jacobian(q[3 * i : 3 * i + 3], g[3 * i : 3 * i + 3], local)
         for j in range(3):
-            column[:] = local[:, j]
-            _turn(i, g, 1.0, column)
-            J[3 * i : 3 * i + 3, 3 * i + j] = column
+            x, y, z = _turned(i, g, 1.0, local[0, j], local[1, j], local[2, j])
+            J[3 * i, 3 * i + j], J[3 * i + 1, 3 * i + j], J[3 * i + 2, 3 * i + j] = x, y, z
 
 
 class Grasp(IntEnum):
@@ -129,7 +143,7 @@ class Hand:
         if not is_rigid(pose):
             raise ParameterError("T", pose.tolist(), "a rigid transform")
         for i in range(FINGERS):
-            wanted_contact(i, pose, self._row, points[i])
+            points[i] = wanted_contact(i, pose, self._row)
         return points
 
     def object_pose(self, points: object) -> Array:
@@ -145,12 +159,11 @@ class Hand:
         """All joints (k, 3) [rad], k <= 4, with which finger 1, 2 or 3 touches a point (3,)."""
         if finger not in {1, 2, 3}:
             raise ParameterError("finger", finger, "1, 2 or 3 (the thumb)")
-        i, local, found = finger - 1, _shaped("point", point, (3,)).copy(), np.empty((4, 3))
-        _shift(i, self._row, -1.0, local)
-        _turn(i, self._row, -1.0, local)
-        links = self._row[3 * i : 3 * i + 3].copy()
-        reached = [finger_branch(local, links, k, 0.0, found[k]) for k in range(4)]
-        return found[reached]
+        i, x = finger - 1, _shaped("point", point, (3,))
+        local = local_point(i, self._row, (x[0], x[1], x[2]))
+        links = tuple(self._row[3 * i : 3 * i + 3])
+        found = np.array([finger_branch(local, links, k, 0.0) for k in range(4)])
+        return found[found[:, 3] > 0.0, :3]
 
     def slip(self, q: object) -> Array:
         """How far each two contacts are apart beyond the object's side: 12, 23, 31, (3,) [m]."""

@@ -18,7 +18,7 @@ from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots.assumed_drives import finger_motors
-from teleop_core.robots.hand_fingers import finger_branch, finger_joints, finger_point
+from teleop_core.robots.hand_fingers import Triple, finger_branch, finger_joints
 from teleop_core.robots.hand_grasp import (
     FINGERS,
     GEOMETRY,
@@ -29,7 +29,9 @@ from teleop_core.robots.hand_grasp import (
     checked_geometry,
     contact_jacobian,
     contacts,
-    local_contact,
+    links_of,
+    local_point,
+    wanted_contact,
 )
 from teleop_core.robots.robot import (
     REACHED,
@@ -78,14 +80,10 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 
 @inner
-def _is_near_singular(q: Array, g: Array) -> bool:
+def _is_near_singular(p: Triple, phi: float, links: Triple) -> bool:
     """Whether a finger is straight, folded, or touches its own axis."""
-    for i in range(FINGERS):
-        psi, phi, l1, l2, l3 = q[3 * i + 1], q[3 * i + 2], g[3 * i], g[3 * i + 1], g[3 * i + 2]
-        reach = l1 + l2 * math.cos(psi) + l3 * math.cos(psi + phi)
-        if abs(math.sin(phi)) < _NEAR or abs(reach) < _NEAR * (l1 + l2 + l3):
-            return True
-    return False
+    reach = math.sqrt(p[0] * p[0] + p[1] * p[1])
+    return bool(abs(math.sin(phi)) < _NEAR or reach < _NEAR * (links[0] + links[1] + links[2]))
 
 
 @kernel
@@ -93,42 +91,45 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """Write nine joints for ``T_base_object``; see :class:`teleop_core.robots.robot.Kernels`."""
     if not is_askable(T, seed):
         return -1
-    is_reachable, is_held = True, True
-    p, local, bounds, reached = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((4, 4))
+    is_reachable, is_touching, is_near = True, True, False
+    points, reached = np.empty((3, 3)), np.empty((4, 4))
     for i in range(FINGERS):
-        first, last = 3 * i, 3 * i + 3
-        local_contact(i, T, geometry, local)
-        bounds[:] = limits[:, first:last]
-        links, joints = geometry[first:last], q[first:last]
-        if not finger_joints(local, links, seed[first:last], bounds, joints):
-            is_reachable = False
-        finger_point(joints, links, p)
-        for r in range(3):
-            is_held = is_held and abs(p[r] - local[r]) <= REACHED
-    fk(q, geometry, reached)
+        links, p = links_of(i, geometry), local_point(i, geometry, wanted_contact(i, T, geometry))
+        is_finger = finger_joints(p, links, seed, limits, 3 * i, q)
+        is_reachable = is_reachable and is_finger
+        is_near = is_near or _is_near_singular(p, q[3 * i + 2], links)
+    contacts(q, geometry, points)
+    for i in range(FINGERS):
+        x, y, z = wanted_contact(i, T, geometry)
+        off = max(abs(points[i, 0] - x), abs(points[i, 1] - y), abs(points[i, 2] - z))
+        is_touching = is_touching and off <= REACHED
+    frame(points, reached)
     pose_residual(reached, T, residual)
-    if not is_held:
+    if not is_touching:
         return _LIMITED if is_reachable else _UNREACHABLE
-    return _NEAR_SINGULAR if _is_near_singular(q, geometry) else _FOLLOWED
+    return _NEAR_SINGULAR if is_near else _FOLLOWED
 
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """Write up to 64 joint vectors (k, 9), four branches for each finger; their number."""
-    local, counts = np.empty(3), np.zeros(3, np.int64)
-    fingers = np.empty((FINGERS, 4, 3))
+    counts, fingers = np.zeros(3, np.int64), np.empty((FINGERS, 4, 3))
     for i in range(FINGERS):
-        local_contact(i, T, geometry, local)
+        links, p = links_of(i, geometry), local_point(i, geometry, wanted_contact(i, T, geometry))
         for branch in range(4):
-            joints = fingers[i, counts[i]]
-            if finger_branch(local, geometry[3 * i : 3 * i + 3], branch, 0.0, joints):
+            theta, psi, phi, is_reachable = finger_branch(p, links, branch, 0.0)
+            if is_reachable:
+                joints = fingers[i, counts[i]]
+                joints[0], joints[1], joints[2] = theta, psi, phi
                 counts[i] += 1
     count = 0
     for a in range(counts[0]):
         for b in range(counts[1]):
             for c in range(counts[2]):
-                solutions[count, :3], solutions[count, 3:6] = fingers[0, a], fingers[1, b]
-                solutions[count, 6:] = fingers[2, c]
+                for j in range(3):
+                    solutions[count, j] = fingers[0, a, j]
+                    solutions[count, 3 + j] = fingers[1, b, j]
+                    solutions[count, 6 + j] = fingers[2, c, j]
                 count += 1
     return count
 
