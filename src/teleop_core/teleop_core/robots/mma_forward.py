@@ -84,7 +84,7 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     T[3, 3] = 1.0
 
 
-@kernel
+@inner
 def _turn(
     J: Array, column: int, axis: tuple[float, float, float], x: float, y: float, z: float
 ) -> None:
@@ -94,19 +94,17 @@ def _turn(
     J[3, column], J[4, column], J[5, column] = a, b, c
 
 
-@kernel
-def jacobian(q: Array, geometry: Array, J: Array) -> None:
-    """Write the geometric Jacobian (6, 7): rows linear, then angular, in base axes.
+@inner
+def jacobian_at(q: Array, geometry: Array, T: Array, J: Array) -> None:
+    """Write the geometric Jacobian (6, 7) where the tip is known to be at T: :func:`jacobian`.
 
-    θ3' moves the tip without turning it, because the parallelogram keeps link 4 parallel to
-    link 3a. The rank falls to five where θ6 and θ8 are both ±90°, whatever the arm does.
+    The axes of the wrist are read from T: before θ10 and the fixed turn θ12 its columns are
+    col1, K and X.
     """
-    axes, T, lever = np.empty((3, 3)), np.empty((4, 4)), np.empty(3)
-    wrist_axes(q, axes)
-    fk(q, geometry, T)
     _, S, F, G = groups(geometry)
     x, y, z = T[0, 3], T[1, 3], T[2, 3] - geometry[0]
-    c1, s1 = math.cos(q[0]), math.sin(q[0])
+    c1, s1, c10, s10 = math.cos(q[0]), math.sin(q[0]), math.cos(q[6]), math.sin(q[6])
+    c12, s12 = math.cos(geometry[12]), math.sin(geometry[12])
     c23, s23 = math.cos(q[1] + q[2]), math.sin(q[1] + q[2])
     c, s = geometry[2] * math.cos(q[1] + q[3]), geometry[2] * math.sin(q[1] + q[3])
     J[0, 3], J[1, 3], J[2, 3] = -c1 * s, -s1 * s, -c
@@ -117,9 +115,24 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
     _turn(J, 1, (-s1, c1, 0.0), x, y, z)
     _turn(J, 2, (-s1, c1, 0.0), x - c1 * c, y - s1 * c, z + s)
     for i in range(3):
-        lever[i] = F * axes[i, 0] + G * T[i, 2]
-    x, y, z = lever[0], lever[1], lever[2]
-    _turn(J, 6, (-axes[0, 0], -axes[1, 0], -axes[2, 0]), x, y, z)
-    x, y, z = x + S * axes[0, 1], y + S * axes[1, 1], z + S * axes[2, 1]
+        col1, column2 = c12 * T[i, 0] - s12 * T[i, 1], s12 * T[i, 0] + c12 * T[i, 1]
+        # Axes of joints 10 and 8, and in place of joint 6 for a moment the lever of joint 10.
+        J[3 + i, 6], J[3 + i, 5] = -col1, -(c10 * column2 + s10 * T[i, 2])
+        J[3 + i, 4] = F * col1 + G * T[i, 2]
+    x, y, z = J[3, 4], J[4, 4], J[5, 4]
+    _turn(J, 6, (J[3, 6], J[4, 6], J[5, 6]), x, y, z)
+    x, y, z = x - S * J[3, 5], y - S * J[4, 5], z - S * J[5, 5]
     _turn(J, 4, (c1 * c23, s1 * c23, -s23), x, y, z)
-    _turn(J, 5, (-axes[0, 1], -axes[1, 1], -axes[2, 1]), x, y, z)
+    _turn(J, 5, (J[3, 5], J[4, 5], J[5, 5]), x, y, z)
+
+
+@kernel
+def jacobian(q: Array, geometry: Array, J: Array) -> None:
+    """Write the geometric Jacobian (6, 7): rows linear, then angular, in base axes.
+
+    θ3' moves the tip without turning it, because the parallelogram keeps link 4 parallel to
+    link 3a. The rank falls to five where θ6 and θ8 are both ±90°, whatever the arm does.
+    """
+    T = np.empty((4, 4))
+    fk(q, geometry, T)
+    jacobian_at(q, geometry, T, J)

@@ -26,7 +26,7 @@ from teleop_core.robots.damped import (
     weigh,
 )
 from teleop_core.robots.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
-from teleop_core.robots.mma_forward import fk, groups, jacobian
+from teleop_core.robots.mma_forward import fk, groups, jacobian_at
 from teleop_core.robots.robot import IkStatus, is_askable, pose_residual
 
 LENGTH = 0.1  # distance [m] that weighs as much as one radian
@@ -69,7 +69,7 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
             assign(q, trial)
             if square <= ZERO or is_stalled:
                 break
-            jacobian(q, geometry, J)
+            jacobian_at(q, geometry, reached, J)
             weigh(J, LENGTH)
             if free_joints(J, error, q, box, is_free) <= 1e-9 * math.sqrt(square):
                 break
@@ -230,7 +230,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     fk(q, geometry, reached)
     if not pose_residual(reached, T, residual):
         return _LIMITED if _can_reach(T, q, geometry) else _UNREACHABLE
-    jacobian(q, geometry, J)
+    jacobian_at(q, geometry, reached, J)
     return _NEAR_SINGULAR if is_near_singular(J, LENGTH, _NEAR) else _FOLLOWED
 
 
