@@ -74,7 +74,11 @@ def _lean(q: Array, geometry: Array, theta: Array) -> None:
 
 @kernel
 def fk(q: Array, geometry: Array, T: Array) -> None:
-    """Write ``T_base_tip`` (4, 4) of leg lengths (3,) [m]; of least error if none closes."""
+    """Write ``T_base_tip`` (4, 4) of leg lengths (3,) [m], found from the legs' even lean.
+
+    Where none is found (none closes, or all modes are far, tilted by 70 degrees and more) it is
+    the one of least error.
+    """
     theta, S = np.empty(3), np.empty((3, 3))
     _lean(q, geometry, theta)
     points(q, theta, geometry[0], S)

@@ -9,7 +9,8 @@ As a robot, q is the six leg lengths, the tip is the platform frame, and ``fk`` 
 kinematics from the home pose: the level platform ``z0`` above the base. Where the wanted pose
 belongs to another assembly than the one that ``fk`` finds, ``ik`` gives its legs and says
 UNREACHABLE. On an architecturally singular layout ``fk`` and ``jacobian`` are NaN, and ``ik``
-says NEAR_SINGULAR. Where no pose has the lengths, ``fk`` is the one of least error.
+says NEAR_SINGULAR. Where no pose with the lengths is found from home (none has them, or the one
+that has is turned by more than about 1 rad), ``fk`` is the one of least error.
 ``load_robot("stewart", **layout.symbols())`` takes any layout.
 
 Source:
