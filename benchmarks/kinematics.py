@@ -27,7 +27,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from ik_peers import PEERS, Adapted, as_it_is  # noqa: E402
-from teleop_core.robots import list_robots, load_robot  # noqa: E402
+from teleop_core.robots import IkStatus, list_robots, load_robot  # noqa: E402
 from teleop_core.robots.dh import load_table  # noqa: E402
 
 TABLES = Path(__file__).parent.parent / "config" / "robots"
@@ -143,7 +143,7 @@ def batch(robot: Any, count: int) -> tuple[Any, Any]:
     rng, span = np.random.default_rng(2), robot.upper - robot.lower
     anywhere = robot.fk(rng.uniform(robot.lower, robot.upper, (count, robot.n)))
     answer = robot.ik(anywhere)
-    if (answer.residual[:, 0] > TOLERANCE).mean() > 0.1:
+    if (answer.status != IkStatus.FOLLOWED).mean() > 0.2:
         near = robot.home + rng.uniform(-0.1, 0.1, (count, robot.n)) * span
         answer = robot.ik(robot.fk(np.clip(near, robot.lower, robot.upper)))
     return answer.q, answer.q + 0.01 * span * rng.normal(0.0, 1.0, answer.q.shape)

@@ -94,9 +94,8 @@ def cost_of(
     worst, is_outside = 0.0, False
     for i in range(first, last):
         worst = max(worst, abs(q[i] - seed[i]))
-        if q[i] < limits[0, i] - _SLACK or q[i] > limits[1, i] + _SLACK:
-            is_outside = do_limits_count
-    return OUTSIDE + worst if is_outside else worst
+        is_outside |= (q[i] < limits[0, i] - _SLACK) | (q[i] > limits[1, i] + _SLACK)
+    return OUTSIDE + worst if is_outside and do_limits_count else worst
 
 
 @inner
