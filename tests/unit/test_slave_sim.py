@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from teleop_core.compiled import pointer
 from teleop_core.errors import ParameterError
 from teleop_core.robots import load_robot
-from teleop_core.robots.robot import ACCELERATION, independent_acceleration
+from teleop_core.robots.drives import ACCELERATION, independent_acceleration
 from teleop_core.signals import TICK_NS
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.slave_sim import (

@@ -20,6 +20,7 @@ from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots.branches import OUTSIDE, bounded, is_allowed, move_cost, turned, wrapped
+from teleop_core.robots.drives import Drives, independent_axes
 from teleop_core.robots.planar_3r import (
     NEAR,
     elbow_angle,
@@ -29,12 +30,10 @@ from teleop_core.robots.planar_3r import (
 )
 from teleop_core.robots.robot import (
     REACHED,
-    Drives,
     IkStatus,
     Kernels,
     Robot,
     geometry_of,
-    independent_axes,
     is_askable,
     pose_residual,
 )

@@ -17,8 +17,8 @@ import numpy as np
 from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.assumed_drives import geared_motors
 from teleop_core.robots.branches import bounded, turned, wrapped
+from teleop_core.robots.drives import geared_motors, independent_axes
 from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar
 from teleop_core.robots.robot import (
     REACHED,
@@ -26,7 +26,6 @@ from teleop_core.robots.robot import (
     Kernels,
     Robot,
     geometry_of,
-    independent_axes,
     is_askable,
     pose_residual,
 )

@@ -15,15 +15,14 @@ import numpy as np
 from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.assumed_drives import geared_motors
 from teleop_core.robots.branches import bounded, turned
+from teleop_core.robots.drives import geared_motors, independent_axes
 from teleop_core.robots.robot import (
     REACHED,
     IkStatus,
     Kernels,
     Robot,
     geometry_of,
-    independent_axes,
     is_askable,
     pose_residual,
 )

@@ -27,13 +27,12 @@ from teleop_core.robots.branches import (
     turned,
     wrapped,
 )
+from teleop_core.robots.drives import Drives, independent_axes
 from teleop_core.robots.robot import (
-    Drives,
     IkStatus,
     Kernels,
     Robot,
     geometry_of,
-    independent_axes,
     is_askable,
     pose_residual,
 )

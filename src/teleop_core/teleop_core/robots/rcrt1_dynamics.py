@@ -10,7 +10,7 @@ import numpy as np
 
 from teleop_core.compiled import kernel
 from teleop_core.geometry import Array
-from teleop_core.robots.robot import Drives, Dynamics
+from teleop_core.robots.drives import Drives, Dynamics
 
 # Symbols as in the source: moments about the link-frame origins [kg·m²], centres of mass G [m].
 LINKS = {

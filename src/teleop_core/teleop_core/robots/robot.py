@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from teleop_core.compiled import inner, kernel, pointer
 from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import Array, checked_array, is_rigid, rotation_angle_between
+from teleop_core.robots.drives import Drives, Dynamics
 
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
 # Signatures that let one compiled graph run any robot: see Kernels for the arguments.
 FK = types.void(_ROW, _ROW, _TABLE)
 IK = types.int64(_TABLE, _ROW, _TABLE, _ROW, _ROW, _ROW)
-ACCELERATION = types.void(_ROW, _ROW, _ROW, _ROW, _ROW)
-GRAVITY = types.void(_ROW, _ROW, _ROW)
+
 
 # A pose counts as reached within this distance [m] and angle [rad].
 REACHED = 1e-9
@@ -66,66 +66,6 @@ class Kernels:
     jacobian: Any
     ik: Any
     ik_all: Any
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Drives:
-    """Drive table of a slave, one entry per joint [N·m or N, rad or m].
-
-    ``bandwidth`` is the triple closed-loop pole of the default PID gains [rad/s];
-    ``friction_speed`` is where Coulomb friction reaches 70 % of its value [rad/s or m/s];
-    ``inertia`` is the reflected motor inertia plus, at home, that of the links.
-    """
-
-    inertia: Array
-    viscous: Array
-    coulomb: Array
-    friction_speed: Array
-    effort_limit: Array
-    speed_limit: Array
-    encoder_step: Array
-    bandwidth: Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Dynamics:
-    """Rigid-body model of a slave over its ``parameters`` row.
-
-    ``acceleration(q, dq, effort, parameters, ddq)`` and ``gravity(q, parameters, effort)`` write
-    their last argument (n,). ``compensated`` (n,) names the axes whose gravity the published
-    controller feeds forward.
-    """
-
-    acceleration: Any
-    gravity: Any
-    parameters: Array
-    compensated: NDArray[np.bool_]
-
-
-@kernel
-def independent_acceleration(
-    q: Array, dq: Array, effort: Array, inertia: Array, ddq: Array
-) -> None:
-    """Write accelerations of axes that are dominated by their motors."""
-    for i in range(ddq.shape[0]):
-        ddq[i] = effort[i] / inertia[i]
-
-
-@kernel
-def no_gravity(q: Array, inertia: Array, effort: Array) -> None:
-    """Write zeros: balanced axes."""
-    for i in range(effort.shape[0]):
-        effort[i] = 0.0
-
-
-def independent_axes(inertia: Array) -> Dynamics:
-    """Model of axes that do not act on each other, with these inertias (n,) [kg·m² or kg]."""
-    return Dynamics(
-        acceleration=independent_acceleration,
-        gravity=no_gravity,
-        parameters=inertia,
-        compensated=np.zeros(len(inertia), np.bool_),
-    )
 
 
 @inner

@@ -23,15 +23,14 @@ import numpy as np
 from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.assumed_drives import electric_cylinders
 from teleop_core.robots.branches import slowed
+from teleop_core.robots.drives import electric_cylinders, independent_axes
 from teleop_core.robots.robot import (
     REACHED,
     IkStatus,
     Kernels,
     Robot,
     geometry_of,
-    independent_axes,
     is_askable,
     pose_residual,
 )

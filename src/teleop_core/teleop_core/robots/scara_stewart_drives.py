@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from teleop_core.robots.robot import Drives, independent_axes
+from teleop_core.robots.drives import Drives, independent_axes
 
 # Two joints of a small SCARA with their links, a vertical slide, six electric cylinders; the slide
 # and the tool are balanced.

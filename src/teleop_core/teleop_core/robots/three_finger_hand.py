@@ -17,7 +17,7 @@ import numpy as np
 from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.assumed_drives import finger_motors
+from teleop_core.robots.drives import finger_motors, independent_axes
 from teleop_core.robots.hand_fingers import Triple, finger_branch, finger_joints
 from teleop_core.robots.hand_grasp import (
     FINGERS,
@@ -38,7 +38,6 @@ from teleop_core.robots.robot import (
     IkStatus,
     Kernels,
     Robot,
-    independent_axes,
     is_askable,
     pose_residual,
 )

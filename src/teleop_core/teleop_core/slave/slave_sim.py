@@ -13,7 +13,8 @@ from teleop_core.geometry import Array, pose_from_transform
 from teleop_core.mapping.filters import lag_step
 from teleop_core.parameters import parameter
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.robot import ACCELERATION, GRAVITY, Robot
+from teleop_core.robots.drives import ACCELERATION, GRAVITY
+from teleop_core.robots.robot import Robot
 from teleop_core.signals import copy, make_signals
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.pid import critically_damped_gains, pid_step
