@@ -31,6 +31,12 @@ def bounded(wanted: float, seed: float, lower: float, upper: float, step: float)
 
 
 @inner
+def hold(q: Array, i: int, seed: Array, limits: Array) -> None:
+    """Keep joint i of ``q`` within its step of the seed and inside its limits."""
+    q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+
+
+@inner
 def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
     """Write ``q`` on the straight way from the seed to ``wanted``; whether it got there.
 

@@ -16,7 +16,7 @@ from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.robots import rcrt1_dynamics
-from teleop_core.robots.branches import BESIDE, bounded, cost_of, is_allowed, turn, wrapped
+from teleop_core.robots.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped
 from teleop_core.robots.robot import (
     IkStatus,
     Kernels,
@@ -201,7 +201,7 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
         is_reachable = _arm_branch(T, geometry, arm == 0, seed[0], trial)
         is_reachable = is_reachable and limits[0, 2] - 1e-9 <= trial[2] <= limits[1, 2] + 1e-9
         for i in range(3 if is_path else 0):
-            trial[i] = bounded(trial[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+            hold(trial, i, seed, limits)
         arm_cost = cost_of(trial, seed, limits, 0, 3, not is_path)
         if arm_cost >= best:
             continue
@@ -227,19 +227,19 @@ def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
     In a path joint 4 slows down towards the wrist singularity, where noise of the pose would
     turn it at full speed; in line with joint 6 it rests.
     """
-    for i in range(6):
-        if i == 3:
-            _wrist_frame(T, q[0], q[1], M)
-        elif i == 4:
-            q[4] = _joint5(M, math.cos(q[3]), math.sin(q[3]))
-        elif i == 5:
-            c5, s5 = math.cos(q[4]), math.sin(q[4])
-            q[5] = _joint6(M, math.cos(q[3]), math.sin(q[3]), c5, s5)
-            turn(q, seed, limits, 5, 6)
-        step = limits[2, i]
-        if i == 3 and math.isfinite(step):
-            step *= min(1.0, math.hypot(M[0, 2], M[1, 2]) / _NEAR)
-        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], step)
+    for i in range(3):
+        hold(q, i, seed, limits)
+    _wrist_frame(T, q[0], q[1], M)
+    step = limits[2, 3]
+    if math.isfinite(step):
+        step *= min(1.0, math.hypot(M[0, 2], M[1, 2]) / _NEAR)
+    q[3] = bounded(q[3], seed[3], limits[0, 3], limits[1, 3], step)
+    c4, s4 = math.cos(q[3]), math.sin(q[3])
+    q[4] = _joint5(M, c4, s4)
+    hold(q, 4, seed, limits)
+    q[5] = _joint6(M, c4, s4, math.cos(q[4]), math.sin(q[4]))
+    turn(q, seed, limits, 5, 6)
+    hold(q, 5, seed, limits)
 
 
 @kernel
