@@ -117,13 +117,3 @@ def is_allowed(q: Array, seed: Array, limits: Array) -> bool:
         if not limits[0, i] <= q[i] <= limits[1, i] or abs(q[i] - seed[i]) > limits[2, i]:
             return False
     return True
-
-
-@inner
-def cheapest(costs: Array) -> int:
-    """Index of the smallest cost, the first of equal ones."""
-    best = 0
-    for i in range(1, costs.shape[0]):
-        if costs[i] < costs[best]:
-            best = i
-    return best

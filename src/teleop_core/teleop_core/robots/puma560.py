@@ -20,7 +20,6 @@ from teleop_core.geometry import Array
 from teleop_core.robots.branches import (
     BESIDE,
     bounded,
-    cheapest,
     cost_of,
     is_allowed,
     turn,
@@ -62,6 +61,7 @@ _COLLINEAR = 1e-10
 _ON_AXIS = 1e-12
 # Sines and relative distances under which small moves need large joint moves.
 _NEAR = 0.02
+_COST = 6  # column after the six joints of a branch
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
@@ -209,34 +209,38 @@ def _wrist(M: Array, seed: float, q: Array) -> None:
 
 
 @inner
-def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
+def _choose(T: Array, seed: Array, limits: Array, geometry: Array, work: Array, q: Array) -> bool:
     """Write the best of the eight branches; whether the wrist centre can be reached at all.
 
     The arm with the smallest move comes first, and no wrist is solved for one that cannot win;
     in a path the wrist has no say in the arm's branch.
     """
-    arms, costs, is_path = np.empty((4, 6)), np.empty(4), math.isfinite(limits[2, 0])
-    is_reachable, best = _arms(T, geometry, seed, arms), math.inf
+    M, is_path = work[4:], math.isfinite(limits[2, 0])
+    is_reachable, best = _arms(T, geometry, seed, work), math.inf
     for branch in range(4):
-        turn(arms[branch], seed, limits, 0, 3)
-        costs[branch] = cost_of(arms[branch], seed, limits, 0, 3, not is_path)
+        turn(work[branch], seed, limits, 0, 3)
+        work[branch, _COST] = cost_of(work[branch], seed, limits, 0, 3, not is_path)
     for _ in range(1 if is_path else 4):
-        arm = cheapest(costs)
-        if costs[arm] >= best:
+        arm = 0
+        for branch in range(1, 4):
+            if work[branch, _COST] < work[arm, _COST]:
+                arm = branch
+        trial = work[arm]
+        arm_cost = trial[_COST]
+        if arm_cost >= best:
             break
-        trial = arms[arm]
         _wrist_rotation(T, trial[0], trial[1] + trial[2], M)
         _wrist(M, seed[3], trial)
         for _ in range(2):
             turn(trial, seed, limits, 3, 6)
             does_count = not is_path or abs(trial[4]) < BESIDE
-            cost = max(costs[arm], cost_of(trial, seed, limits, 3, 6, does_count))
+            cost = max(arm_cost, cost_of(trial, seed, limits, 3, 6, does_count))
             if cost < best:
                 best = cost
                 for i in range(6):
                     q[i] = trial[i]
             trial[3], trial[4], trial[5] = trial[3] + math.pi, -trial[4], trial[5] + math.pi
-        costs[arm] = math.inf
+        trial[_COST] = math.inf
     return is_reachable
 
 
@@ -288,8 +292,10 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """
     if not is_askable(T, seed):
         return -1
-    reached = np.empty((4, 4))  # until the end its corner holds the rotation left to the wrist
-    is_reachable = _choose(T, seed, limits, geometry, reached, q)
+    # Memory for four arms with their costs, then the rotation left to the wrist, at last the tip.
+    work = np.empty((8, 7))
+    reached = work[4:]
+    is_reachable = _choose(T, seed, limits, geometry, work, q)
     if not is_allowed(q, seed, limits):
         _settle(T, seed, limits, geometry, reached, q)
     fk(q, geometry, reached)
