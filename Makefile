@@ -36,9 +36,11 @@ format: setup
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# In a worker: a crash of the middleware inside a test costs that test, not the run.
+# Live nodes need the processors for themselves, and come last, when the kernels are compiled. In a
+# worker a crash of the middleware inside a test costs that test, not the run.
 test: lint
-	$(BIN)/pytest -n 1
+	$(BIN)/pytest -n 2 -m "not ros"
+	$(BIN)/pytest -n 1 -m ros
 
 bench-setup: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
