@@ -111,7 +111,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def inner(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that only other kernels call: a third less work than :func:`kernel`.
+    """Compile a kernel that only other kernels call: about a quarter less work than :func:`kernel`.
 
     A call from Python raises TypeError.
     """

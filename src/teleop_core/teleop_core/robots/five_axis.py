@@ -19,7 +19,7 @@ import numpy as np
 from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.branches import OUTSIDE, bounded, is_allowed, move_cost, turned, wrapped
+from teleop_core.robots.branches import OUTSIDE, hold, is_allowed, move_cost, turn, turned, wrapped
 from teleop_core.robots.drives import Drives, independent_axes
 from teleop_core.robots.planar_3r import (
     NEAR,
@@ -170,8 +170,7 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> 
             if abs(wrapped(elbow - seed[2])) >= best:
                 continue
             _bend(plane, geometry, elbow, seed[1], trial)
-            for i in range(1, 5):
-                trial[i] = turned(trial[i], seed[i], limits[0, i], limits[1, i], is_path)
+            turn(trial, seed, limits, 1, 5)
             cost = move_cost(trial, seed, limits, 0, 5) + (0.0 if is_arm else 10.0 * OUTSIDE)
             if cost < best:
                 best = cost
@@ -183,7 +182,7 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> 
 @inner
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
-    psi, x, y, is_path = 0.0, 0.0, 0.0, math.isfinite(limits[2, 0])
+    psi, x, y = 0.0, 0.0, 0.0
     for i in range(5):
         if i == 1:
             psi, x, y = _plane(T, geometry, seed, q)
@@ -192,8 +191,8 @@ def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> 
             q[2] = second_angle(x, y, geometry[1], q[1], seed[2])
         elif i == 3:
             q[3] = psi - q[1] - q[2]
-        q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
-        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+        turn(q, seed, limits, i, i + 1)
+        hold(q, i, seed, limits)
 
 
 @inner
@@ -201,8 +200,8 @@ def _is_met(q: Array, T: Array) -> bool:
     """Whether pitch and roll are the wanted ones."""
     psi = q[1] + q[2] + q[3]
     pitch, roll = pitch_and_roll(T, q[0], psi, q[4])
-    turn = max(abs(wrapped(pitch - psi)), abs(wrapped(roll - q[4])))
-    return turn <= REACHED
+    angle = max(abs(wrapped(pitch - psi)), abs(wrapped(roll - q[4])))
+    return angle <= REACHED
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy as np
 from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.branches import bounded, is_allowed, move_cost, turned, wrapped
+from teleop_core.robots.branches import hold, is_allowed, move_cost, turn, wrapped
 from teleop_core.robots.drives import Drives, independent_axes
 from teleop_core.robots.robot import (
     REACHED,
@@ -132,28 +132,27 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 def _solve(T: Array, geometry: Array, is_other: bool, seed: Array, q: Array) -> bool:
     """Write one branch (3,), elbow angle positive or, the other, negative; whether it reaches."""
     l1, l2, l3 = geometry[0], geometry[1], geometry[2]
-    turn = heading(T)
-    x, y = T[0, 3] - l3 * math.cos(turn), T[1, 3] - l3 * math.sin(turn)
+    angle = heading(T)
+    x, y = T[0, 3] - l3 * math.cos(angle), T[1, 3] - l3 * math.sin(angle)
     elbow, is_reachable = elbow_angle(x, y, l1, l2)
     q[1] = -elbow if is_other else elbow
     q[0] = first_angle(x, y, l1, l2, q[1], seed[0])
-    q[2] = turn - q[0] - q[1]
+    q[2] = angle - q[0] - q[1]
     return is_reachable
 
 
 @inner
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
-    turn, is_path = heading(T), math.isfinite(limits[2, 0])
-    l3 = geometry[2]
-    x, y = T[0, 3] - l3 * math.cos(turn), T[1, 3] - l3 * math.sin(turn)
+    angle, l3 = heading(T), geometry[2]
+    x, y = T[0, 3] - l3 * math.cos(angle), T[1, 3] - l3 * math.sin(angle)
     for i in range(3):
         if i == 1:
             q[1] = second_angle(x, y, geometry[0], q[0], seed[1])
         elif i == 2:
-            q[2] = turn - q[0] - q[1]
-        q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
-        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+            q[2] = angle - q[0] - q[1]
+        turn(q, seed, limits, i, i + 1)
+        hold(q, i, seed, limits)
 
 
 @kernel
@@ -167,12 +166,11 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """
     if not is_askable(T, seed):
         return -1
-    trial, best, is_path = np.empty(3), math.inf, math.isfinite(limits[2, 0])
+    trial, best = np.empty(3), math.inf
     is_reachable = False
     for branch in range(2):
         is_reachable = _solve(T, geometry, branch == 1, seed, trial)
-        for i in range(3):
-            trial[i] = turned(trial[i], seed[i], limits[0, i], limits[1, i], is_path)
+        turn(trial, seed, limits, 0, 3)
         cost = move_cost(trial, seed, limits, 0, 3)
         if cost < best:
             best = cost

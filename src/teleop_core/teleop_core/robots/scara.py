@@ -14,7 +14,7 @@ import numpy as np
 from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
-from teleop_core.robots.branches import bounded, is_allowed, move_cost, turned, wrapped
+from teleop_core.robots.branches import hold, is_allowed, move_cost, turn, wrapped
 from teleop_core.robots.drives import Drives, independent_axes
 from teleop_core.robots.planar_3r import (
     NEAR,
@@ -62,12 +62,12 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     Source:
         Ghosal 2020, lecture 6, 0_4T of the SCARA.
     """
-    turn = q[0] + q[1] + q[3]
+    angle = q[0] + q[1] + q[3]
     for i in range(4):
         for j in range(4):
             T[i, j] = 1.0 if i == j else 0.0
-    T[0, 0] = T[1, 1] = math.cos(turn)
-    T[1, 0] = math.sin(turn)
+    T[0, 0] = T[1, 1] = math.cos(angle)
+    T[1, 0] = math.sin(angle)
     T[0, 1] = -T[1, 0]
     T[0, 3] = geometry[0] * math.cos(q[0]) + geometry[1] * math.cos(q[0] + q[1])
     T[1, 3] = geometry[0] * math.sin(q[0]) + geometry[1] * math.sin(q[0] + q[1])
@@ -98,14 +98,6 @@ def _solve(T: Array, geometry: Array, is_other: bool, seed: Array, q: Array) -> 
     return is_reachable
 
 
-@kernel
-def _turn(q: Array, i: int, seed: Array, limits: Array) -> None:
-    """Bring joint i, if it turns, next to the seed or into its limits by whole turns."""
-    if i != 2:
-        is_path = math.isfinite(limits[2, i])
-        q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
-
-
 @inner
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
     """Keep a branch inside limits and steps; each joint makes the best of those before it."""
@@ -114,8 +106,9 @@ def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> 
             q[1] = second_angle(T[0, 3], T[1, 3], geometry[0], q[0], seed[1])
         elif i == 3:
             q[3] = heading(T) - q[0] - q[1]
-        _turn(q, i, seed, limits)
-        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+        if i != 2:  # joint 3 slides
+            turn(q, seed, limits, i, i + 1)
+        hold(q, i, seed, limits)
 
 
 @kernel
@@ -135,8 +128,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     is_reachable = False
     for branch in range(2):
         is_reachable = _solve(T, geometry, branch == 1, seed, trial)
-        for i in range(4):
-            _turn(trial, i, seed, limits)
+        turn(trial, seed, limits, 0, 2)
+        turn(trial, seed, limits, 3, 4)
         cost = move_cost(trial, seed, limits, 0, deciding)
         if cost < best:
             best = cost

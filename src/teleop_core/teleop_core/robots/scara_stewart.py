@@ -23,7 +23,7 @@ from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array
 from teleop_core.robots import scara_stewart_drives
-from teleop_core.robots.branches import bounded, is_allowed, move_cost, slowed, turned
+from teleop_core.robots.branches import bounded, hold, is_allowed, move_cost, slowed, turned
 from teleop_core.robots.robot import (
     IkStatus,
     Kernels,
@@ -237,7 +237,7 @@ def _held_arm(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
             turn = math.atan2(y, x) - q[0]
             q[1] = _swung(turn, seed[1], limits[0, 1], limits[1, 1], is_path)
     for i in range(1, 3):
-        q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
+        hold(q, i, seed, limits)
     return is_reachable
 
 
