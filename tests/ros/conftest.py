@@ -22,11 +22,11 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
 from teleop_core.bags.messages import discover, layout
-from teleop_core.bags.topics import Topic
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.streams import Subscription, message_type, profile
 from teleop_core.robots import load_robot
+from teleop_core.topics import Topic
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # its parser imports a deprecated module of Python

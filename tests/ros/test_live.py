@@ -13,14 +13,14 @@ import pytest
 from rich.console import Console
 from rosbags.highlevel import AnyReader
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.topics import STREAMS
 from teleop_core.errors import ParameterError, RecordingError, SessionError
 from teleop_core.nodes.live import live
 from teleop_core.nodes.play import play
 from teleop_core.session.configuration import configure
 from teleop_core.session.graph import STAGES
+from teleop_core.topics import STREAMS
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 

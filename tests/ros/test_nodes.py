@@ -11,7 +11,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import DescribeParameters, GetParameters
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.nodes.children import environment
 from teleop_core.robots import load_robot

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag
 from teleop_core.geometry import pose_from_transform, rotation, transform

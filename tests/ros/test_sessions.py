@@ -7,7 +7,7 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.messages import write_values
 from teleop_core.robots import load_robot
 from teleop_core.robots.inverse_kinematics import InverseKinematics, InverseKinematicsParameters

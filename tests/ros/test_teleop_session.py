@@ -13,14 +13,14 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rich.console import Console
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.topics import STREAMS
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.live import live
 from teleop_core.nodes.real_time import apply_options
 from teleop_core.session.configuration import RealTimeParameters, configure
 from teleop_core.session.graph import STAGES, Graph
+from teleop_core.topics import STREAMS
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = [stage.name for stage in STAGES]

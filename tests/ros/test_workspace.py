@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.nodes.children import environment
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]

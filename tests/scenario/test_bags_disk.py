@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.errors import RecordingError
 
@@ -21,7 +21,7 @@ LIMIT = 3_000_000  # bytes that a file may have, or a disk holds
 RECORDER = """
 import json, os, resource, signal, sys
 import numpy as np
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.messages import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError

@@ -13,10 +13,10 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.topics import STREAMS
 from teleop_core.bags.writer import BagWriter
+from teleop_core.topics import STREAMS
 
 
 def one_line(done: subprocess.CompletedProcess[str]) -> str:

@@ -11,7 +11,12 @@ import pytest
 
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
-from teleop_core.bags.topics import (
+from teleop_core.bags.writer import BagWriter
+from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.evaluation.figures import figures
+from teleop_core.evaluation.metrics import study
+from teleop_core.signals import STATE_FIELDS, TICK_NS
+from teleop_core.topics import (
     ALL,
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
@@ -22,11 +27,6 @@ from teleop_core.bags.topics import (
     SLAVE_SETPOINT_JS,
     TELEOP_STATE,
 )
-from teleop_core.bags.writer import BagWriter
-from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.figures import figures
-from teleop_core.evaluation.metrics import study
-from teleop_core.signals import STATE_FIELDS, TICK_NS
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.session.configuration import configure

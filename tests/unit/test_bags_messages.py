@@ -16,7 +16,7 @@ from teleop_core.bags.messages import (
     report,
     write_values,
 )
-from teleop_core.bags.topics import Kind
+from teleop_core.topics import Kind
 
 POSE = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
 

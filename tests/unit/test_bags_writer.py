@@ -19,7 +19,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
-from teleop_core.bags import ros_types, topics
+from teleop_core import topics
+from teleop_core.bags import ros_types
 from teleop_core.bags.messages import layout, report
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import RecordingParameters

@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from teleop_core import compiled
+from teleop_core import kernels as compiled
 from teleop_core.geometry import multiply_quaternions
 
 MODULES = {
     "inner.py": """
-from teleop_core.compiled import kernel
+from teleop_core.kernels import kernel
 
 @kernel
 def factor(x: float) -> float:
     return 2.0 * x
 """,
     "middle.py": """
-from teleop_core.compiled import kernel
+from teleop_core.kernels import kernel
 from inner import factor
 
 @kernel
@@ -29,7 +29,7 @@ def plus_one(x: float) -> float:
 """,
     "outer.py": """
 from numba import types
-from teleop_core.compiled import kernel, pointer
+from teleop_core.kernels import kernel, pointer
 from middle import plus_one
 
 @kernel

@@ -11,7 +11,17 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
-from teleop_core.bags.topics import (
+from teleop_core.bags.writer import BagWriter
+from teleop_core.errors import EvaluationError, RecordingError
+from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.evaluation.metrics import evaluate, study
+from teleop_core.evaluation.page import report_page
+from teleop_core.evaluation.score import KEYS, key_table
+from teleop_core.evaluation.streams import STAGES
+from teleop_core.evaluation.table import score_tables
+from teleop_core.evaluation.windows import WINDOW_NS, DisorderError, windows
+from teleop_core.signals import STATE_FIELDS, TICK_NS
+from teleop_core.topics import (
     ALL,
     DIAGNOSTICS,
     MASTER_MEASURED_CF,
@@ -23,16 +33,6 @@ from teleop_core.bags.topics import (
     SLAVE_SETPOINT_JS,
     TELEOP_STATE,
 )
-from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import EvaluationError, RecordingError
-from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.metrics import evaluate, study
-from teleop_core.evaluation.page import report_page
-from teleop_core.evaluation.score import KEYS, key_table
-from teleop_core.evaluation.streams import STAGES
-from teleop_core.evaluation.table import score_tables
-from teleop_core.evaluation.windows import WINDOW_NS, DisorderError, windows
-from teleop_core.signals import STATE_FIELDS, TICK_NS
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 1_000_000_000

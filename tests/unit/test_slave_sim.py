@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from teleop_core.compiled import pointer
 from teleop_core.errors import ParameterError
+from teleop_core.kernels import pointer
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ACCELERATION, independent_acceleration
 from teleop_core.signals import TICK_NS

@@ -28,6 +28,14 @@ class UnknownNameError(ParameterError):
         super().__init__(kind, value, "one of: " + ", ".join(self.alternatives))
 
 
+class PartError(TeleopError):
+    """A part cannot be used: carries its ``kind``, its ``name`` and what was ``expected``."""
+
+    def __init__(self, kind: str, name: str, expected: str) -> None:
+        self.kind, self.name, self.expected = kind, name, expected
+        super().__init__(f"{kind} {name!r} must be {expected}")
+
+
 class ShapeError(TeleopError, ValueError):
     """An array has the wrong shape: carries ``name``, ``expected`` and ``received``."""
 

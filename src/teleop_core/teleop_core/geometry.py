@@ -9,8 +9,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError, ShapeError
+from teleop_core.kernels import inner, kernel
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.bags.topics import STREAMS, Kind
-from teleop_core.compiled import kernel
 from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
+from teleop_core.topics import STREAMS, Kind
 
 TICK_NS = 1_000_000
 """Control period of every stage [ns]."""

@@ -1,6 +1,6 @@
 """Messages: the one place that knows what a message's fields and bytes mean.
 
-Inside the package a message is a stamp and a row of numbers (:class:`~teleop_core.bags.topics.Kind`
+Inside the package a message is a stamp and a row of numbers (:class:`~teleop_core.topics.Kind`
 says which). Three ways lead from one to the other: :func:`layout` for whole streams and for single
 messages of a known stream (fast), :func:`read_values` and :func:`write_values` for messages of any
 other sender, :func:`report` and :func:`read_reports` for reports. Quaternions are w, x, y, z in
@@ -23,7 +23,7 @@ from teleop_core.bags.layouts import (
     layout_of,
 )
 from teleop_core.bags.reports import Report, read_reports, report
-from teleop_core.bags.topics import Kind
+from teleop_core.topics import Kind
 
 __all__ = [
     "SECOND_NS", "Layout", "Refusal", "Report", "Stamps", "Values", "check", "discover", "layout",

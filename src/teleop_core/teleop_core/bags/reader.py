@@ -13,9 +13,9 @@ from teleop_core.bags.ordered import in_order
 from teleop_core.bags.recovery import recover
 from teleop_core.bags.series import Column, Series, join, kind_of
 from teleop_core.bags.source import McapSource, Records
-from teleop_core.bags.topics import Kind, Topic
 from teleop_core.bags.writer import METADATA_NAME
 from teleop_core.errors import RecordingError
+from teleop_core.topics import Kind, Topic
 
 __all__ = ["Bag", "Series", "TopicInfo", "recover"]
 
@@ -35,7 +35,7 @@ def _name(topic: Topic | str) -> str:
 class Bag:
     """A recording, opened for reading.
 
-    Topics are named as in :mod:`teleop_core.bags.topics`, without the leading slash.
+    Topics are named as in :mod:`teleop_core.topics`, without the leading slash.
 
     Args:
         path: Directory of a recording, or one ``.mcap`` file.

@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from teleop_core.bags import compression
-from teleop_core.bags.topics import BY_NAME, Kind, Topic
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.parameters import parameter
+from teleop_core.topics import BY_NAME, Kind, Topic
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from teleop_core.bags import ros_types
 from teleop_core.bags.layouts import SECOND_NS
-from teleop_core.bags.topics import Kind
+from teleop_core.topics import Kind
 
 
 class Report(NamedTuple):

@@ -10,8 +10,8 @@ import yaml
 from mcap.records import Channel, Schema, Statistics
 
 from teleop_core.bags import ros_types
-from teleop_core.bags.topics import Quality, Topic
 from teleop_core.errors import RecordingError
+from teleop_core.topics import Quality, Topic
 
 VERSION = 9
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}

@@ -5,7 +5,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from teleop_core.bags.layouts import Bytes, Stamps
-from teleop_core.compiled import inner, kernel
+from teleop_core.kernels import inner, kernel
 
 Rows = NDArray[np.int64]
 _MESSAGE = int(Opcode.MESSAGE)

@@ -5,12 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.topics import (
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_CP,
-    STREAMS,
-)
 from teleop_core.errors import EvaluationError
 from teleop_core.evaluation.score import Score, Session
 from teleop_core.evaluation.state_history import read_history
@@ -19,6 +13,12 @@ from teleop_core.evaluation.tally import Tally
 from teleop_core.evaluation.ticks import read_counts, tick_score
 from teleop_core.evaluation.traces import Drawing
 from teleop_core.evaluation.windows import DisorderError, whole, windows
+from teleop_core.topics import (
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+    STREAMS,
+)
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
 """Topics without which there is no score; what needs others is None without them."""

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.topics import TELEOP_STATE
 from teleop_core.errors import EvaluationError
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.pairing import NONE, latest
 from teleop_core.geometry import Array
 from teleop_core.signals import STATE, STATE_FIELDS
+from teleop_core.topics import TELEOP_STATE
 
 _CENTER = slice(STATE["fixture_center_x"], STATE["fixture_center_x"] + 3)
 _SIZE = slice(STATE["fixture_size_x"], STATE["fixture_size_x"] + 3)

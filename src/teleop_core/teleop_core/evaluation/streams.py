@@ -4,16 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.bags.topics import (
+from teleop_core.evaluation.accumulators import Delay, Distribution, Integers
+from teleop_core.evaluation.pairing import NONE, same_stamp
+from teleop_core.evaluation.windows import Window
+from teleop_core.topics import (
     MASTER_MEASURED_CP,
     SLAVE_SERVO_CP,
     SLAVE_SERVO_JP,
     SLAVE_SETPOINT_JS,
     Topic,
 )
-from teleop_core.evaluation.accumulators import Delay, Distribution, Integers
-from teleop_core.evaluation.pairing import NONE, same_stamp
-from teleop_core.evaluation.windows import Window
 
 CHAIN = (
     ("haptic_master", MASTER_MEASURED_CP),

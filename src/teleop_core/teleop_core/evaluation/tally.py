@@ -5,13 +5,6 @@ from collections import Counter
 import numpy as np
 
 from teleop_core.bags.reader import Bag, Series
-from teleop_core.bags.topics import (
-    MASTER_MEASURED_CF,
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_CP,
-    STREAMS,
-)
 from teleop_core.evaluation.accumulators import Integers, Moments
 from teleop_core.evaluation.fixture_scores import FixtureTally
 from teleop_core.evaluation.pairing import NONE, latest, same_tick
@@ -22,6 +15,13 @@ from teleop_core.evaluation.streams import DelayTally, StampTally
 from teleop_core.evaluation.traces import Drawing
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array
+from teleop_core.topics import (
+    MASTER_MEASURED_CF,
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+    STREAMS,
+)
 
 
 class PoseTally:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.topics import DIAGNOSTICS
+from teleop_core.topics import DIAGNOSTICS
 
 SLAVE_NODE = "slave_sim"
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.bags.reader import Bag, Series
-from teleop_core.bags.topics import Topic
+from teleop_core.topics import Topic
 
 CONTEXT_NS = 1_000_000_000
 WINDOW_NS = 4_000_000_000

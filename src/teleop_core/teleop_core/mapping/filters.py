@@ -1,6 +1,6 @@
 """Filters: the reference low-pass that keeps gimbal noise off the slave."""
 
-from teleop_core.compiled import kernel
+from teleop_core.kernels import kernel
 
 
 @kernel

@@ -2,8 +2,8 @@
 
 import math
 
-from teleop_core.compiled import kernel
 from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
 
 
 @kernel

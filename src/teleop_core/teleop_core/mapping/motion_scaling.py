@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import bound, inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import (
     Array,
@@ -14,6 +13,7 @@ from teleop_core.geometry import (
     quaternion_from_rotation,
     rotation,
 )
+from teleop_core.kernels import bound, inner, kernel
 from teleop_core.mapping.fixtures import box_penetration, wall_force
 from teleop_core.parameters import parameter
 from teleop_core.signals import STATE, make_signals

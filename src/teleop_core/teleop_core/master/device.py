@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import (
     Array,
     compose,
@@ -14,6 +13,7 @@ from teleop_core.geometry import (
     rotate_by_vector,
     transform_from_pose,
 )
+from teleop_core.kernels import inner, kernel
 from teleop_core.parameters import parameter
 from teleop_core.robots import load_robot_set
 

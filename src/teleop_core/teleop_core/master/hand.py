@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from teleop_core.compiled import inner
 from teleop_core.geometry import Array
+from teleop_core.kernels import inner
 from teleop_core.parameters import parameter
 
 # Coulomb friction of the device grows smoothly up to about this speed [m/s].

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import (
     Array,
@@ -16,6 +15,7 @@ from teleop_core.geometry import (
     rotation,
     transform,
 )
+from teleop_core.kernels import kernel
 from teleop_core.master.device import (
     DeviceParameters,
     make_handle,

@@ -2,9 +2,9 @@
 
 import time
 
-from teleop_core.bags.topics import Topic
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.streams import Waiter
+from teleop_core.topics import Topic
 
 
 class AnsweringNode(CoreNode):

@@ -12,9 +12,8 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.layouts import layout
-from teleop_core.bags.topics import Kind, Topic
 from teleop_core.errors import TeleopError
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
@@ -26,6 +25,7 @@ from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.configuration import RealTimeParameters
 from teleop_core.session.graph import Stage
 from teleop_core.signals import TICK_NS
+from teleop_core.topics import Kind, Topic
 
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE,

@@ -7,9 +7,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from teleop_core.bags.topics import DIAGNOSTICS
 from teleop_core.nodes.rate import Recent, TickCounts
 from teleop_core.nodes.streams import Input, profile
+from teleop_core.topics import DIAGNOSTICS
 
 
 class Reporter:

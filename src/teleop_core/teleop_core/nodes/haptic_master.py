@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.reports import read_reports
 from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.nodes.base import CoreNode

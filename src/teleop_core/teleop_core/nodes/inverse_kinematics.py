@@ -3,7 +3,7 @@
 import sys
 from typing import Any
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.nodes.answering import AnsweringNode
 from teleop_core.nodes.process import run
 from teleop_core.robots.inverse_kinematics import InverseKinematics, InverseKinematicsParameters

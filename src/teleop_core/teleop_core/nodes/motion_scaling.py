@@ -3,7 +3,7 @@
 import sys
 from typing import Any
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.mapping.motion_scaling import MotionScaling, MotionScalingParameters
 from teleop_core.nodes.answering import AnsweringNode
 from teleop_core.nodes.process import run

@@ -7,8 +7,8 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
-from teleop_core.bags.topics import DIAGNOSTICS
 from teleop_core.nodes.streams import Subscription, Waiter
+from teleop_core.topics import DIAGNOSTICS
 
 WARNING = 1
 

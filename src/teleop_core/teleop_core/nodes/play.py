@@ -15,10 +15,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.topics import BY_NAME, Quality
 from teleop_core.errors import ParameterError, RecordingError
 from teleop_core.nodes.discovery import announce_often
 from teleop_core.nodes.streams import message_type, profile
+from teleop_core.topics import BY_NAME, Quality
 
 DISCOVERY_TIME = 1.0
 """Time for subscribers to be found before the first message [s]."""

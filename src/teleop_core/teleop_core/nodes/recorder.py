@@ -9,9 +9,8 @@ from typing import Any
 
 import yaml
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.recording import RecordingParameters
-from teleop_core.bags.topics import Quality, Topic
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 from teleop_core.nodes.base import CoreNode
@@ -21,6 +20,7 @@ from teleop_core.parameters import parameter
 from teleop_core.session.configuration import Configuration, parse_layer
 from teleop_core.session.graph import STAGE
 from teleop_core.session.runner import describe
+from teleop_core.topics import Quality, Topic
 
 DEPTH = 2000
 """Messages of one topic that wait while the disk or another process is slow: two seconds."""

@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterable
 from typing import Any
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.process import run
 from teleop_core.session.graph import STAGE

@@ -21,8 +21,8 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.serialization import deserialize_message
 
 from teleop_core.bags.messages import Layout, Refusal, Values, check, layout, read_values
-from teleop_core.bags.topics import Quality, Topic
 from teleop_core.geometry import Array
+from teleop_core.topics import Quality, Topic
 
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""

@@ -7,8 +7,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from teleop_core.compiled import kernel
 from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
 
 _ROW = types.float64[::1]
 # Signatures that let one compiled slave move any robot: see Dynamics for the arguments.

@@ -10,8 +10,8 @@ Source:
 
 import math
 
-from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
+from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import bounded, turned, wrapped
 
 # Sine of phi of a straight finger: shortens it by less than rounding, and has a sign, so that a

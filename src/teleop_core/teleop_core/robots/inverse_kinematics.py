@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import bound, kernel
 from teleop_core.geometry import transform_from_pose
+from teleop_core.kernels import bound, kernel
 from teleop_core.parameters import parameter
 from teleop_core.robots import load_robot_set
 from teleop_core.signals import DT, copy, make_signals

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import kernel
 from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
 from teleop_core.robots.drives import Drives, Dynamics
 
 # Symbols as in the source: moments about the link-frame origins [kg·m²], centres of mass G [m].

@@ -11,9 +11,9 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from teleop_core.compiled import inner, kernel, pointer
 from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import Array, checked_array, is_rigid, rotation_angle_between
+from teleop_core.kernels import inner, kernel, pointer
 from teleop_core.robots.drives import Drives, Dynamics
 
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]

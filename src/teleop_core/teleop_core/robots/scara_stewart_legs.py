@@ -16,8 +16,8 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
+from teleop_core.kernels import inner, kernel
 from teleop_core.robots.stewart_legs import direct, leg_system
 
 # Sine of sigma_b + sigma_m under which the layout counts as similar hexagons.

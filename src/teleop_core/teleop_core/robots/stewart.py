@@ -24,9 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.compiled import kernel
 from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.geometry import Array, checked_array, is_rigid
+from teleop_core.kernels import kernel
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.damped import is_near_singular
 from teleop_core.robots.drives import electric_cylinders, independent_axes

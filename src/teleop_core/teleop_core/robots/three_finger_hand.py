@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from teleop_core.compiled import inner, kernel
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
+from teleop_core.kernels import inner, kernel
 from teleop_core.robots.drives import finger_motors, independent_axes
 from teleop_core.robots.hand_fingers import Triple, finger_branch, finger_joints
 from teleop_core.robots.hand_grasp import (

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.recording import RecordingParameters
-from teleop_core.bags.topics import Topic
-from teleop_core.compiled import kernel
 from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
 from teleop_core.mapping.motion_scaling import (
     MotionScaling,
     MotionScalingParameters,
@@ -25,6 +24,7 @@ from teleop_core.robots.inverse_kinematics import (
 )
 from teleop_core.signals import TICK_NS, copy, make_signals
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters, slave_step
+from teleop_core.topics import Topic
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,16 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from teleop_core.bags import topics
+from teleop_core import topics
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
-from teleop_core.bags.topics import STREAMS
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 from teleop_core.geometry import Array, rotation_vectors
 from teleop_core.session.configuration import Configuration, Layer, parse_layer
 from teleop_core.session.graph import STAGES, Graph
 from teleop_core.signals import STATE_FIELDS, TICK_NS, make_signals
+from teleop_core.topics import STREAMS
 
 BLOCK = 1000
 """Ticks per block: one second, one chunk of the recording."""

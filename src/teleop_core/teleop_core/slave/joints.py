@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import inner, kernel
 from teleop_core.geometry import Array
+from teleop_core.kernels import inner, kernel
 
 CONTROL_PERIOD = 1e-3
 

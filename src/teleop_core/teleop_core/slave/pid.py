@@ -1,7 +1,7 @@
 """PID: one joint's controller in parallel form, with a clean derivative and no windup."""
 
-from teleop_core.compiled import kernel
 from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
 
 
 def critically_damped_gains(

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.compiled import bound, inner, kernel, pointer
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array, pose_from_transform
+from teleop_core.kernels import bound, inner, kernel, pointer
 from teleop_core.mapping.filters import lag_step
 from teleop_core.parameters import parameter
 from teleop_core.robots import load_robot_set
