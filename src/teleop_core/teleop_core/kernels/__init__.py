@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import types
 from numba.core.caching import NullCache
 from numba.core.ccallback import CFunc
@@ -136,6 +137,19 @@ def pointer(compiled: Any, signature: Any) -> Any:
     _stamp(callback, _sources[function])
     callback.compile()
     return callback
+
+
+def records(fields: Any, count: int = 1) -> Any:
+    """Zeroed records (count,) whose fields are attributes, for kernels and for plain Python.
+
+    Args:
+        fields: What :class:`numpy.dtype` takes: pairs of name and type, or a dtype.
+        count: Number of records.
+
+    Returns:
+        Array of :class:`numpy.record`; take ``[0]`` for one record that shares its memory.
+    """
+    return np.zeros(count, np.dtype((np.record, np.dtype(fields))))
 
 
 def bound(compiled: Any, *arguments: Any) -> Callable[[], Any]:
