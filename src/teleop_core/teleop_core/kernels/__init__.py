@@ -6,20 +6,24 @@ stamp of a cached kernel therefore covers the files of all kernels it calls.
 """
 
 import gc
+import linecache
+import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
 from numba.core import types
-from numba.core.caching import NullCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
+
+from teleop_core import __version__
+from teleop_core.kernels.dependencies import Tokens, digest, hexdigest, source_digest
 
 # Function pointers as arguments are what lets one compiled graph run any robot.
 warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatureWarning)
@@ -29,7 +33,8 @@ warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatu
 _ERRORS: dict[str, Any] = {"error_model": "numpy"}
 _OPTIONS = {"nopython": True, "nogil": True, "no_cfunc_wrapper": True, **_ERRORS}
 
-_sources: dict[Any, frozenset[str]] = {}
+_kernels: set[Any] = set()
+_generated: set[Any] = set()
 
 
 def _roomy(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -50,8 +55,12 @@ class _Kernel(CPUDispatcher):
     compile again for each of their values.
     """
 
+    _has_cache = False
+
     @_roomy
     def compile(self, sig: Any) -> Any:
+        if not self._has_cache:
+            self._cache, self._has_cache = _cache(self.py_func), True
         # Millions of objects are made and kept: looking through them for garbage is for nothing.
         is_enabled = gc.isenabled()
         gc.disable()
@@ -78,27 +87,55 @@ class _InnerKernel(_Kernel):
 
 
 def _compiled(kind: Any, function: Callable[..., Any], **options: bool) -> Any:
-    """Lazily compiled function, whose cache depends on every file its kernels come from."""
-    compiled = kind(function, targetoptions={**_OPTIONS, **options})
-    compiled.enable_caching()
-    code, names = function.__code__, function.__globals__
-    called: list[Any] = [names.get(name) for name in code.co_names]
-    inner = [_sources[value.py_func] for value in called if _is_kernel(value)]
-    files = frozenset([code.co_filename, __file__]).union(*inner)
-    _sources[function] = files
-    _stamp(compiled, files)
-    return compiled
+    """Lazily compiled function; its cache is opened when it is first compiled."""
+    _kernels.add(function)
+    return kind(function, targetoptions={**_OPTIONS, **options})
 
 
-def _stamp(compiled: Any, files: frozenset[str]) -> None:
-    if not isinstance(compiled._cache, NullCache):
-        stats = [Path(file).stat() for file in sorted(files)]
-        stamp = tuple((s.st_mtime, s.st_size) for s in stats)  # older files count as changed too
-        compiled._cache._cache_file._source_stamp = stamp
+def _cache(function: Callable[..., Any]) -> Any:
+    """Cache on disk of a function, none where it has no file to stand beside."""
+    stamp = (numba.__version__, __version__, source_digest(__file__), digest(function))
+    if function in _generated:
+        name = f"generated.{function.__qualname__}-py{sys.version_info[0]}{sys.version_info[1]}"
+        cache = FunctionCache(_cache)  # beside this package's own
+        cache._py_func = function
+        cache._cache_file = IndexDataCacheFile(cache.cache_path, name, stamp)
+        return cache
+    try:
+        cache = FunctionCache(function)
+    except RuntimeError:  # no source file: typed in, or python -c
+        return NullCache()
+    cache._cache_file._source_stamp = stamp
+    return cache
+
+
+def kernel_from_source(text: str, name: str, names: Mapping[str, Any]) -> Any:
+    """Kernel from source text that the program wrote itself.
+
+    It is cached on disk like others: the same text, calling the same kernels on the same constants,
+    is compiled once. Tracebacks show its lines.
+
+    Args:
+        text: Python source that defines a function.
+        name: Name of that function.
+        names: What the text refers to: kernels, constants, modules.
+    """
+    tokens = Tokens()
+    values = [f"{key}={tokens.of(value)}" for key, value in sorted(names.items())]
+    values += [f"{f.__module__}.{f.__qualname__}" for f in tokens.functions]
+    key = hexdigest((text, name, *values))
+    file = f"<{name} {key}>"
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+    space: dict[str, Any] = {**names, "__name__": __name__}
+    exec(compile(text, file, "exec"), space)
+    function = space[name]
+    function.__qualname__ = f"{name}_{key}"  # names the machine code: one for each text
+    _generated.add(function)
+    return kernel(function)
 
 
 def _is_kernel(value: object) -> bool:
-    return callable(value) and getattr(value, "py_func", None) in _sources
+    return callable(value) and getattr(value, "py_func", None) in _kernels
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -133,8 +170,7 @@ def pointer(compiled: Any, signature: Any) -> Any:
     # stamps each would throw the other away.
     function = compiled.py_func
     callback = CFunc(function, normalize_signature(signature), locals={}, options=_ERRORS)
-    callback.enable_caching()
-    _stamp(callback, _sources[function])
+    callback._cache = _cache(function)
     callback.compile()
     return callback
 

@@ -129,3 +129,35 @@ def test_inner_kernel_refuses_a_call_from_python_and_serves_kernels():
 def test_numbers_written_in_a_call_share_one_compilation():
     polynomial(2.0)
     assert len(power.overloads) == 1
+
+
+GENERATED = {
+    "constant.py": "OFFSET = 1.0",
+    "part.py": """
+import constant
+from teleop_core.kernels import kernel
+
+@kernel
+def moved(x: float) -> float:
+    return x + constant.OFFSET
+""",
+    "outer.py": """
+from part import moved
+from teleop_core.kernels import kernel_from_source
+
+tick = kernel_from_source(
+    "def tick(x):\\n    return moved(x) * SCALE", "tick", {"moved": moved, "SCALE": 3.0}
+)
+print(tick(2.0))
+print(sum(tick.stats.cache_hits.values()))
+""",
+}
+
+
+def test_kernel_from_generated_source_is_compiled_once_for_all_processes(tmp_path):
+    for name, text in GENERATED.items():
+        write(tmp_path / name, text, age=100)
+    assert run(tmp_path) == ([9.0], 0)
+    assert run(tmp_path) == ([9.0], 1)
+    write(tmp_path / "constant.py", "OFFSET = 2.0", age=100)
+    assert run(tmp_path) == ([12.0], 0)

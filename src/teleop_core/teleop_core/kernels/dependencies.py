@@ -1,0 +1,166 @@
+"""Dependencies of a kernel: one digest over everything that its compiled form is made from.
+
+A compiled kernel on the disk is as good as the sources and values it was made from. Its digest
+covers the text of its file and the values of all global constants that its code refers to, and the
+same for every kernel that it calls, directly or through others.
+"""
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+_PLAIN = (type(None), bool, int, float, complex, str, bytes)
+# Their functions are known to numba by name, and change with numba's version only.
+_FOREIGN = frozenset(["builtins", "math", "cmath", "numpy", "numba", "llvmlite"])
+
+
+def digest(function: FunctionType) -> str:
+    """Hexadecimal digest of a function and all it depends on, through any number of calls.
+
+    Constants count with the value they have when the function is first asked for, which is when
+    numba compiles it or the first of its callers.
+    """
+    reached, waiting = {function: _own(function)}, [function]
+    while waiting:
+        for called in reached[waiting.pop()].called:
+            if called not in reached:
+                reached[called] = _own(called)
+                waiting.append(called)
+    first = reached.pop(function).digest
+    return hexdigest((first, *sorted(own.digest for own in reached.values())))
+
+
+def hexdigest(parts: Iterable[str]) -> str:
+    """Digest of strings in their order."""
+    sums = hashlib.blake2b(digest_size=16)
+    for part in parts:
+        sums.update(part.encode(errors="surrogatepass") + b"\0")
+    return sums.hexdigest()
+
+
+@dataclass(frozen=True)
+class _Own:
+    """A function by itself: digest of its source and constants, and the functions it names."""
+
+    digest: str
+    called: tuple[FunctionType, ...]
+
+
+@cache
+def _own(function: FunctionType) -> _Own:
+    tokens = Tokens()
+    code = function.__code__
+    parts = [function.__qualname__, source_digest(code.co_filename) or _code_digest(code)]
+    parts.append(tokens.of(function.__defaults__))
+    parts.extend(tokens.of(cell.cell_contents) for cell in function.__closure__ or ())
+    names = frozenset(_names_in(code))
+    for name in sorted(names & function.__globals__.keys()):
+        # Attributes of records are among the names too; one that is also a global does no harm.
+        parts.append(f"{name}={tokens.of(function.__globals__[name], names - {name})}")
+    return _Own(hexdigest(parts), tuple(tokens.functions))
+
+
+def source_digest(file: str) -> str | None:
+    """Digest of a file's bytes; None when there is no such file (a notebook, ``python -c``)."""
+    try:
+        stat = Path(file).stat()
+    except OSError:
+        return None
+    return _bytes_digest(file, stat.st_mtime_ns, stat.st_size)
+
+
+@cache
+def _bytes_digest(file: str, _time_ns: int, _size: int) -> str:
+    return hashlib.blake2b(Path(file).read_bytes(), digest_size=16).hexdigest()
+
+
+def _code_digest(code: CodeType) -> str:
+    """Digest of the instructions and literals of a code object and of those nested in it."""
+    parts = [code.co_code.hex(), repr((code.co_names, code.co_varnames, code.co_freevars))]
+    for constant in code.co_consts:
+        parts.append(_code_digest(constant) if isinstance(constant, CodeType) else repr(constant))
+    return hexdigest(parts)
+
+
+def _names_in(code: CodeType) -> Iterator[str]:
+    """Names of globals and attributes in a code object and in those nested in it."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names_in(constant)
+
+
+@dataclass(frozen=True)
+class Tokens:
+    """Texts that differ when constants differ; keeps the functions that it meets on the way."""
+
+    functions: dict[FunctionType, None] = field(default_factory=dict)
+
+    def of(self, value: Any, names: frozenset[str] = frozenset()) -> str:
+        """Token of a value.
+
+        Args:
+            value: A number, text, array, dtype, enumeration, kernel, module or a collection.
+            names: Attributes that count when the value is a module.
+        """
+        if isinstance(value, Enum):
+            return f"{type(value).__qualname__}.{value.name}={self.of(value.value)}"
+        if isinstance(value, _PLAIN):
+            return f"{type(value).__name__}:{value!r}"
+        if isinstance(value, np.generic | np.ndarray):
+            return _array_token(value)
+        if isinstance(value, ModuleType):
+            return self._of_module(value, names)
+        if isinstance(value, type):
+            members = [self.of(member) for member in value] if issubclass(value, Enum) else []
+            return f"{value.__module__}.{value.__qualname__}{members}"
+        if isinstance(value, tuple | list | dict | set | frozenset):
+            return self._of_collection(value)
+        return self._of_callable(value) if callable(value) else _other_token(value)
+
+    def _of_collection(self, value: Any) -> str:
+        items = value.items() if isinstance(value, dict) else value
+        found = [self.of(item) for item in items]
+        if isinstance(value, set | frozenset):
+            found.sort()
+        fields = getattr(value, "_fields", "")
+        return f"{type(value).__qualname__}{fields}({','.join(found)})"
+
+    def _of_module(self, module: ModuleType, names: frozenset[str]) -> str:
+        """Name of a module, with those of its values that are among the names of the code."""
+        if _is_foreign(module.__name__):
+            return module.__name__
+        values = vars(module)
+        found = [f"{n}={self.of(values[n], names - {n})}" for n in sorted(names & values.keys())]
+        return f"{module.__name__}({','.join(found)})"
+
+    def _of_callable(self, value: Callable[..., Any]) -> str:
+        """Name of a kernel or Python function, which is kept; of anything else the type's name."""
+        function = getattr(value, "py_func", getattr(value, "__wrapped__", value))
+        place = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', '')}"
+        if isinstance(function, FunctionType) and not _is_foreign(function.__module__ or ""):
+            self.functions[function] = None
+        return f"{type(value).__qualname__}:{place}"
+
+
+def _is_foreign(module: str) -> bool:
+    return module.partition(".")[0] in _FOREIGN
+
+
+def _array_token(value: Any) -> str:
+    content = hashlib.blake2b(value.tobytes(), digest_size=16).hexdigest()
+    return f"{value.dtype!r}{value.shape}{value.flags.c_contiguous}:{content}"
+
+
+def _other_token(value: object) -> str:
+    """Text of a dtype or of a type of numba; of an object that has no text of its own its type."""
+    if type(value).__repr__ is object.__repr__:
+        return f"{type(value).__module__}.{type(value).__qualname__}"
+    return repr(value)
