@@ -214,11 +214,11 @@ def test_home_is_inside_the_limits_and_far_from_singular(name):
 @arms
 def test_the_drive_table_is_complete_and_the_model_runs(name):
     arm = ARMS[name]
-    for entry in vars(arm.drives).values():
+    for entry in arm.drives.entries().values():
         assert entry.shape == (arm.n,)
         assert (entry > 0.0).all()
     out = np.empty(arm.n)
     arm.dynamics.acceleration(
-        arm.home.copy(), np.zeros(arm.n), np.ones(arm.n), arm.dynamics.parameters, out
+        arm.home.copy(), np.zeros(arm.n), np.ones(arm.n), arm.dynamics.parameters.copy(), out
     )
     assert np.array_equal(out, 1.0 / arm.drives.inertia)

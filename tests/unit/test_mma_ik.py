@@ -10,7 +10,7 @@ from teleop_core.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.damped import is_near_singular, pose_error
 from teleop_core.robots.mma_branches import branch, unwrapped
-from teleop_core.robots.robot import REACHED
+from teleop_core.robots.kinematics import REACHED
 
 DT = 0.001
 SOLVED = {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}

@@ -339,7 +339,7 @@ def test_it_is_a_slave_with_nine_actuators_and_a_home_it_can_hold():
     assert robot.n == 9
     assert robot.drives is not None
     assert robot.dynamics is not None
-    assert all(np.shape(table) == (9,) for table in vars(robot.drives).values())
+    assert all(np.shape(table) == (9,) for table in robot.drives.entries().values())
     for options in ROBOTS:
         arm = load_robot("scara_stewart", **options)
         result = arm.ik(arm.fk(arm.home), seed=arm.home)

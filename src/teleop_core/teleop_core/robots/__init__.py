@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from importlib import import_module
 
 from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.robots.robot import IkResult, IkStatus, Robot
+from teleop_core.robots.kinematics import IkResult, IkStatus
+from teleop_core.robots.robot import Robot
 
 __all__ = ["IkResult", "IkStatus", "Robot", "list_robots", "load_robot", "load_robot_set"]
 

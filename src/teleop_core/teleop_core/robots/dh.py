@@ -33,7 +33,8 @@ import yaml
 from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import Array, checked_array, rotation, transform
 from teleop_core.robots import dh_kernels
-from teleop_core.robots.robot import Kernels, Robot
+from teleop_core.robots.kinematics import DIRECTIONS, Kernels
+from teleop_core.robots.robot import Robot
 
 # Elementary motions of one row, left to right: what, along or about which axis, by which symbol.
 CONVENTIONS = {
@@ -45,7 +46,6 @@ CONVENTIONS = {
                      ("turn", "x", "alpha"), ("slide", "x", "a"),
                      ("turn", "z", "beta"), ("slide", "z", "b")),
 }  # fmt: skip
-DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _EXPRESSION = re.compile(r"([+-]?)\s*q\s*(?:([+-])\s*([0-9.eE]+))?")
 _JOINT_KEYS = ("name", "lower", "upper", "home")
 

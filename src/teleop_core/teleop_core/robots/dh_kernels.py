@@ -13,7 +13,7 @@ import numpy as np
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.damped import ZERO, damped_move, factorise, free_joints, gram, pose_error
-from teleop_core.robots.robot import REACHED, IkStatus, is_askable, pose_residual
+from teleop_core.robots.kinematics import REACHED, IkStatus, is_askable, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of one search
 _DAMPING, _HOPELESS = 1e-2, 1e10  # per squared error: at the start, and where no step helps

@@ -1,12 +1,14 @@
 """Drives and dynamics of slaves; the motors at the end are assumed, for sources that name none."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 
@@ -14,15 +16,51 @@ _ROW = types.float64[::1]
 # Signatures that let one compiled slave move any robot: see Dynamics for the arguments.
 ACCELERATION = types.void(_ROW, _ROW, _ROW, _ROW, _ROW)
 GRAVITY = types.void(_ROW, _ROW, _ROW)
+AccelerationKernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
+GravityKernel: TypeAlias = Callable[[Array, Array, Array], None]
+
+ENTRIES = (
+    "inertia", "viscous", "coulomb", "friction_speed", "effort_limit", "speed_limit",
+    "encoder_step", "bandwidth",
+)  # fmt: skip
+_MAY_BE_ZERO = ("viscous", "coulomb")
+
+
+def read_only(name: str, values: object, shape: tuple[int, ...] | None = None) -> Array:
+    """Copy of finite numbers that nobody can write.
+
+    Raises:
+        ShapeError: Not a vector, or another shape than the wanted one.
+        ParameterError: A value is NaN or infinite.
+    """
+    array = np.array(values, dtype=np.float64)
+    if array.ndim != 1 or (shape is not None and array.shape != shape):
+        raise ShapeError(name, shape or "(n,)", array.shape)
+    if not np.isfinite(array).all():
+        raise ParameterError(name, array.tolist(), "finite")
+    array.setflags(write=False)
+    return array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Drives:
-    """Drive table of a slave, one entry per joint [N·m or N, rad or m].
+    """Drive table of a slave, one entry per joint, (n,) each; the arrays are read-only copies.
 
-    ``bandwidth`` is the triple closed-loop pole of the default PID gains [rad/s];
-    ``friction_speed`` is where Coulomb friction reaches 70 % of its value [rad/s or m/s];
-    ``inertia`` is the reflected motor inertia plus, at home, that of the links.
+    Args:
+        inertia: Reflected motor inertia plus, at home, that of the links [kg·m² or kg], > 0.
+        viscous: Viscous friction [N·m·s/rad or N·s/m], >= 0.
+        coulomb: Dry friction [N·m or N], >= 0.
+        friction_speed: Where dry friction reaches 70 % of its value [rad/s or m/s], > 0.
+        effort_limit: Largest torque or force of the motor at the joint [N·m or N], > 0.
+        speed_limit: Largest speed [rad/s or m/s], > 0.
+        encoder_step: Smallest difference that is measured [rad or m], > 0.
+        bandwidth: Triple closed-loop pole of the default PID gains [rad/s], > 0.
+        assumed: Names of the entries above that no source states, for one joint at least.
+
+    Raises:
+        ShapeError: Entries are not vectors of one length.
+        ParameterError: A value is not possible.
+        UnknownNameError: ``assumed`` names what is no entry.
     """
 
     inertia: Array
@@ -33,21 +71,49 @@ class Drives:
     speed_limit: Array
     encoder_step: Array
     bandwidth: Array
+    assumed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ENTRIES:
+            array = read_only(name, getattr(self, name), np.shape(self.inertia))
+            needed = ">= 0" if name in _MAY_BE_ZERO else "> 0"
+            if not ((array >= 0.0) if name in _MAY_BE_ZERO else (array > 0.0)).all():
+                raise ParameterError(name, array.tolist(), f"{needed} for every joint")
+            object.__setattr__(self, name, array)
+        for name in self.assumed:
+            if name not in ENTRIES:
+                raise UnknownNameError("assumed", name, ENTRIES)
+
+    def entries(self) -> dict[str, Array]:
+        """Entries by name, (n,) each."""
+        return {name: getattr(self, name) for name in ENTRIES}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dynamics:
-    """Rigid-body model of a slave over its ``parameters`` row.
+    """Rigid-body model of a slave over its ``parameters`` row; arrays are read-only copies.
 
     ``acceleration(q, dq, effort, parameters, ddq)`` and ``gravity(q, parameters, effort)`` write
-    their last argument (n,). ``compensated`` (n,) names the axes whose gravity the published
-    controller feeds forward.
+    their last argument (n,); both are compiled. They take writable arrays: hand them a copy of
+    ``parameters``.
+
+    Args:
+        acceleration: Joint accelerations under the net effort.
+        gravity: Effort [N·m or N] that holds the arm at rest.
+        parameters: Numbers that both read, in the model's own order.
+        compensated: Axes (n,) whose gravity the published controller feeds forward.
     """
 
-    acceleration: Any
-    gravity: Any
+    acceleration: AccelerationKernel
+    gravity: GravityKernel
     parameters: Array
     compensated: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", read_only("parameters", self.parameters))
+        compensated = np.array(self.compensated, dtype=np.bool_)
+        compensated.setflags(write=False)
+        object.__setattr__(self, "compensated", compensated)
 
 
 @kernel
@@ -96,6 +162,7 @@ def _alike(
         speed_limit=np.full(count, speed_limit),
         encoder_step=np.full(count, encoder_step),
         bandwidth=np.full(count, bandwidth),
+        assumed=ENTRIES,
     )
 
 

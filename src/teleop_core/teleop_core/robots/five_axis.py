@@ -20,7 +20,8 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import OUTSIDE, hold, is_allowed, move_cost, turn, turned, wrapped
-from teleop_core.robots.drives import Drives, independent_axes
+from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.planar_3r import (
     NEAR,
     elbow_angle,
@@ -28,15 +29,7 @@ from teleop_core.robots.planar_3r import (
     pointing,
     second_angle,
 )
-from teleop_core.robots.robot import (
-    REACHED,
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = tuple(f"theta{i}" for i in range(1, 6))
 GEOMETRY = {"d1": 0.215, "a2": 0.1778, "a3": 0.1778, "d5": 0.1295}
@@ -56,6 +49,7 @@ DRIVES = Drives(  # assumed
     speed_limit=np.array([1.5, 1.5, 2.0, 3.0, 4.0]),
     encoder_step=np.full(5, 5e-5),
     bandwidth=np.full(5, 60.0),
+    assumed=ENTRIES,
 )
 # Below this sine two axes count as one line and a joint keeps its value.
 _COLLINEAR = 1e-10
@@ -266,6 +260,6 @@ def make(**geometry: float | str) -> Robot:
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,
-        dynamics=independent_axes(DRIVES.inertia.copy()),
+        dynamics=independent_axes(DRIVES.inertia),
         task_mask=(True, True, True, False, True, True),
     )

@@ -20,15 +20,8 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import bounded, turned, wrapped
 from teleop_core.robots.drives import geared_motors, independent_axes
 from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar
-from teleop_core.robots.robot import (
-    REACHED,
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.robot import Robot, geometry_of
 
 __all__ = ["GEOMETRY", "Assembly", "Closure", "FourBar", "make"]
 

@@ -25,7 +25,8 @@ from teleop_core.robots.hand_fingers import (
     finger_jacobian,
     finger_point,
 )
-from teleop_core.robots.robot import REACHED, geometry_of
+from teleop_core.robots.kinematics import REACHED
+from teleop_core.robots.robot import geometry_of
 from teleop_core.robots.rps3_loop import COSINES, SINES, frame
 
 FINGERS = 3

@@ -22,16 +22,13 @@ import numpy as np
 
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array
-from teleop_core.robots.drives import Drives, independent_axes
+from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.kinematics import Kernels
 from teleop_core.robots.mma_balance import ShoulderSpring, shoulder_load
 from teleop_core.robots.mma_forward import GEOMETRY, MODEL_A, fk, jacobian
 from teleop_core.robots.mma_ik import ik, ik_all
 from teleop_core.robots.mma_models import MODELS, vector
-from teleop_core.robots.robot import (
-    Kernels,
-    Robot,
-    geometry_of,
-)
+from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = ("theta1", "theta2", "theta3", "theta3_prime", "theta6", "theta8", "theta10")
 HOME = np.radians([0.0, -90.0, 0.0, 90.0, 90.0, 0.0, 0.0])
@@ -46,6 +43,7 @@ DRIVES = Drives(
     speed_limit=np.array([3.0, 3.0, 3.0, 3.0, 8.0, 8.0, 8.0]),
     encoder_step=np.full(7, 2.0 * math.pi / (90 * 4000)),
     bandwidth=np.array([60.0, 60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),
+    assumed=ENTRIES,
 )
 
 

@@ -25,9 +25,9 @@ from teleop_core.robots.damped import (
     pose_error,
     weigh,
 )
+from teleop_core.robots.kinematics import IkStatus, is_askable, pose_residual
 from teleop_core.robots.mma_branches import BRANCHES, branch, least_miss, nearest_branch, unwrapped
 from teleop_core.robots.mma_forward import fk, groups, jacobian_at
-from teleop_core.robots.robot import IkStatus, is_askable, pose_residual
 
 LENGTH = 0.1  # distance [m] that weighs as much as one radian
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the local search

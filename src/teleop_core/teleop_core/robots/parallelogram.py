@@ -17,15 +17,8 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 from teleop_core.robots.branches import bounded, turned
 from teleop_core.robots.drives import geared_motors, independent_axes
-from teleop_core.robots.robot import (
-    REACHED,
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.robot import Robot, geometry_of
 
 # No lengths are published: ground (and coupler), crank (and rocker), coupler point [m].
 GEOMETRY = {"l0": 0.3, "l1": 0.2, "a": 0.15}

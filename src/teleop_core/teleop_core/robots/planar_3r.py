@@ -15,16 +15,9 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import hold, is_allowed, move_cost, turn, wrapped
-from teleop_core.robots.drives import Drives, independent_axes
-from teleop_core.robots.robot import (
-    REACHED,
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = ("theta1", "theta2", "theta3")
 GEOMETRY = {"l1": 1.0, "l2": 0.8, "l3": 0.5}
@@ -41,6 +34,7 @@ DRIVES = Drives(  # assumed
     speed_limit=np.array([3.0, 3.0, 6.0]),
     encoder_step=np.full(3, 1e-5),
     bandwidth=np.full(3, 60.0),
+    assumed=ENTRIES,
 )
 
 # Below this distance [m] a point counts as lying on the axis that turns it, and the joint stays.
@@ -219,6 +213,6 @@ def make(**geometry: float | str) -> Robot:
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,
-        dynamics=independent_axes(DRIVES.inertia.copy()),
+        dynamics=independent_axes(DRIVES.inertia),
         task_mask=(True, True, False, False, False, True),
     )

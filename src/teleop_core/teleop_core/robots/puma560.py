@@ -26,15 +26,9 @@ from teleop_core.robots.branches import (
     turned,
     wrapped,
 )
-from teleop_core.robots.drives import Drives, independent_axes
-from teleop_core.robots.robot import (
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = tuple(f"theta{i}" for i in range(1, 7))
 GEOMETRY = {"a2": 0.4318, "a3": 0.0203, "d3": 0.15005, "d4": 0.4318}
@@ -53,6 +47,7 @@ DRIVES = Drives(  # assumed, of the size of this arm's drives; quoted from memor
     speed_limit=np.array([82.0, 74.0, 122.0, 228.0, 241.0, 228.0]) * _DEGREES,
     encoder_step=np.array([1.0, 0.7, 1.2, 0.9, 0.9, 0.9]) * 1e-4,
     bandwidth=np.full(6, 60.0),
+    assumed=ENTRIES,
 )
 
 # Below this sine axes 4 and 6 count as one line and joint 4 keeps its value; below this distance
@@ -345,5 +340,5 @@ def make(**geometry: float | str) -> Robot:
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,
-        dynamics=independent_axes(DRIVES.inertia.copy()),
+        dynamics=independent_axes(DRIVES.inertia),
     )

@@ -17,14 +17,8 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots import rcrt1_dynamics
 from teleop_core.robots.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped
-from teleop_core.robots.robot import (
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = ("theta1", "theta2", "d3", "theta4", "theta5", "theta6")
 GEOMETRY = {"L6": 0.037, "d2": 0.0}

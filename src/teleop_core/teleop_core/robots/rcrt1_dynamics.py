@@ -132,4 +132,5 @@ DRIVES = Drives(
          2 * math.pi / (141 * 2048), 2 * math.pi / (76 * 2048), 2 * math.pi / (76 * 2048)]
     ),
     bandwidth=np.array([60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),
+    assumed=("inertia", "viscous", "coulomb", "friction_speed"),  # inertia: of the wrist
 )  # fmt: skip

@@ -25,15 +25,8 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.drives import electric_cylinders, independent_axes
-from teleop_core.robots.robot import (
-    REACHED,
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.robot import Robot, geometry_of
 from teleop_core.robots.rps3_loop import COSINES, SINES, constraints, frame, loop, points, settle
 from teleop_core.robots.rps3_modes import (
     Assembly,

@@ -15,7 +15,8 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import hold, is_allowed, move_cost, turn, wrapped
-from teleop_core.robots.drives import Drives, independent_axes
+from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.planar_3r import (
     NEAR,
     elbow_angle,
@@ -23,15 +24,7 @@ from teleop_core.robots.planar_3r import (
     heading,
     second_angle,
 )
-from teleop_core.robots.robot import (
-    REACHED,
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = ("theta1", "theta2", "d3", "theta4")
 GEOMETRY = {"a1": 0.4, "a2": 0.3}
@@ -50,6 +43,7 @@ DRIVES = Drives(  # assumed
     speed_limit=np.array([6.0, 8.0, 1.0, 20.0]),
     encoder_step=np.array([1e-5, 1e-5, 1e-6, 5e-5]),
     bandwidth=np.full(4, 60.0),
+    assumed=ENTRIES,
 )
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
@@ -177,6 +171,6 @@ def make(**geometry: float | str) -> Robot:
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,
-        dynamics=independent_axes(DRIVES.inertia.copy()),
+        dynamics=independent_axes(DRIVES.inertia),
         task_mask=(True, True, True, False, False, True),
     )

@@ -24,14 +24,8 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots import scara_stewart_drives
 from teleop_core.robots.branches import bounded, hold, is_allowed, move_cost, slowed, turned
-from teleop_core.robots.robot import (
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.robot import Robot, geometry_of
 from teleop_core.robots.scara_stewart_legs import (
     TILT,
     is_blind,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from teleop_core.robots.drives import Drives, independent_axes
+from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
 
 # Two joints of a small SCARA with their links, a vertical slide, six electric cylinders; the slide
 # and the tool are balanced.
@@ -15,5 +15,6 @@ DRIVES = Drives(
     speed_limit=np.array([3.0, 4.0, 0.4, *[0.3] * 6]),
     encoder_step=np.array([1e-5, 1e-5, 1e-6, *[1e-6] * 6]),
     bandwidth=np.array([60.0, 60.0, 60.0, *[80.0] * 6]),
+    assumed=ENTRIES,
 )
 DYNAMICS = independent_axes(DRIVES.inertia)

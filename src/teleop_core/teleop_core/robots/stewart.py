@@ -30,15 +30,8 @@ from teleop_core.kernels import kernel
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.damped import is_near_singular
 from teleop_core.robots.drives import electric_cylinders, independent_axes
-from teleop_core.robots.robot import (
-    REACHED,
-    IkStatus,
-    Kernels,
-    Robot,
-    geometry_of,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.robot import Robot, geometry_of
 from teleop_core.robots.stewart_legs import CLOSED, direct, invert, leg_system, moved
 
 # Smallest over largest singular value of the leg Jacobian that counts as zero in every pose.

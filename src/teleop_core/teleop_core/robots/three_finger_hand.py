@@ -33,14 +33,8 @@ from teleop_core.robots.hand_grasp import (
     local_point,
     wanted_contact,
 )
-from teleop_core.robots.robot import (
-    REACHED,
-    IkStatus,
-    Kernels,
-    Robot,
-    is_askable,
-    pose_residual,
-)
+from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.robot import Robot
 from teleop_core.robots.rps3_loop import frame
 
 __all__ = ["GEOMETRY", "Grasp", "GraspResult", "Hand", "make"]

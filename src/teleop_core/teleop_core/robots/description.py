@@ -1,0 +1,63 @@
+"""Description of a robot: one line for the prompt, a page of text, a table for notebooks."""
+
+from collections.abc import Iterator
+from html import escape
+
+import numpy as np
+
+from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.robots.robot import Robot
+
+_MOST_SYMBOLS = 40  # of a geometry that is worth printing: those of chains are matrices
+
+
+def short(robot: Robot) -> str:
+    """One line: name, number of joints, limits [rad, m] of each."""
+    joints = ", ".join(f"{name} {lower:.4g}…{upper:.4g}" for name, lower, upper, _ in rows(robot))
+    return f"Robot {robot.name!r}, {robot.n} joints [rad, m]: {joints}"
+
+
+def text(robot: Robot) -> str:
+    """Page: controlled directions, joints, drives, geometry, pose of the tip at home."""
+    lines = [f"{robot.name}: {robot.n} joints [rad, m], controls {controlled(robot)} of the tip"]
+    for row in rows(robot):
+        lines.append("  {:14} {:9.4f} … {:8.4f}   home {:8.4f}".format(*row))
+    lines.append(f"drives: {drives(robot)}")
+    if len(robot.geometry) <= _MOST_SYMBOLS:
+        lines.append("geometry: " + ", ".join(f"{k} = {v:g}" for k, v in robot.geometry.items()))
+    tip = np.array2string(robot.fk(robot.home), precision=4, suppress_small=True)
+    return "\n".join([*lines, "T_base_tip at home:", tip])
+
+
+def html(robot: Robot) -> str:
+    """Small table of the joints with their limits and home [rad, m]."""
+    head = "".join(f"<th>{name}</th>" for name in ("joint", "lower", "upper", "home"))
+    body = "".join(
+        f"<tr><td>{escape(name)}</td>" + "".join(f"<td>{v:.4f}</td>" for v in values) + "</tr>"
+        for name, *values in rows(robot)
+    )
+    caption = f"{escape(robot.name)}: {robot.n} joints [rad, m]; drives {escape(drives(robot))}"
+    return f"<table><caption>{caption}</caption><tr>{head}</tr>{body}</table>"
+
+
+def rows(robot: Robot) -> Iterator[tuple[str, float, float, float]]:
+    """Name, lower, upper and home [rad, m] of each joint."""
+    columns = (robot.lower.tolist(), robot.upper.tolist(), robot.home.tolist())
+    return zip(robot.joint_names, *columns, strict=True)
+
+
+def controlled(robot: Robot) -> str:
+    """Directions of the tip that the robot controls."""
+    pairs = zip(DIRECTIONS, robot.task_mask, strict=True)
+    return ", ".join(name for name, is_controlled in pairs if is_controlled)
+
+
+def drives(robot: Robot) -> str:
+    """Whether the robot can be a slave, and which entries of its drive table are assumed."""
+    if robot.drives is None:
+        return "none, not a slave"
+    if not robot.drives_are_assumed:
+        return "as stated"
+    assumed, entries = robot.drives.assumed, robot.drives.entries()
+    which = "all" if set(assumed) == set(entries) else ", ".join(assumed)
+    return f"assumed ({which})"
