@@ -36,6 +36,14 @@ class PartError(TeleopError):
         super().__init__(f"{kind} {name!r} must be {expected}")
 
 
+class KernelError(TeleopError):
+    """A kernel cannot be compiled: carries its ``place``, file:line, and the ``reason``."""
+
+    def __init__(self, place: str, reason: str) -> None:
+        self.place, self.reason = place, reason
+        super().__init__(f"{place}: {reason}")
+
+
 class ShapeError(TeleopError, ValueError):
     """An array has the wrong shape: carries ``name``, ``expected`` and ``received``."""
 

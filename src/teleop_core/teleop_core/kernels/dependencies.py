@@ -15,6 +15,7 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
+from numba import types
 
 _PLAIN = (type(None), bool, int, float, complex, str, bytes)
 # Their functions are known to numba by name, and change with numba's version only.
@@ -112,26 +113,18 @@ class Tokens:
         """
         if isinstance(value, Enum):
             return f"{type(value).__qualname__}.{value.name}={self.of(value.value)}"
-        if isinstance(value, _PLAIN):
-            return f"{type(value).__name__}:{value!r}"
-        if isinstance(value, np.generic | np.ndarray):
-            return _array_token(value)
         if isinstance(value, ModuleType):
             return self._of_module(value, names)
-        if isinstance(value, type):
-            members = [self.of(member) for member in value] if issubclass(value, Enum) else []
-            return f"{value.__module__}.{value.__qualname__}{members}"
-        if isinstance(value, tuple | list | dict | set | frozenset):
-            return self._of_collection(value)
-        return self._of_callable(value) if callable(value) else _other_token(value)
+        if isinstance(value, tuple):
+            fields = getattr(value, "_fields", "")
+            return f"{type(value).__qualname__}{fields}({','.join(map(self.of, value))})"
+        if callable(value):
+            return self._of_type(value) if isinstance(value, type) else self._of_callable(value)
+        return _plain_token(value)
 
-    def _of_collection(self, value: Any) -> str:
-        items = value.items() if isinstance(value, dict) else value
-        found = [self.of(item) for item in items]
-        if isinstance(value, set | frozenset):
-            found.sort()
-        fields = getattr(value, "_fields", "")
-        return f"{type(value).__qualname__}{fields}({','.join(found)})"
+    def _of_type(self, value: type) -> str:
+        members = [self.of(member) for member in value] if issubclass(value, Enum) else []
+        return f"{value.__module__}.{value.__qualname__}{members}"
 
     def _of_module(self, module: ModuleType, names: frozenset[str]) -> str:
         """Name of a module, with those of its values that are among the names of the code."""
@@ -154,13 +147,14 @@ def _is_foreign(module: str) -> bool:
     return module.partition(".")[0] in _FOREIGN
 
 
-def _array_token(value: Any) -> str:
-    content = hashlib.blake2b(value.tobytes(), digest_size=16).hexdigest()
-    return f"{value.dtype!r}{value.shape}{value.flags.c_contiguous}:{content}"
+def _plain_token(value: Any) -> str:
+    """Text of a number, string, array, dtype or type of numba.
 
-
-def _other_token(value: object) -> str:
-    """Text of a dtype or of a type of numba; of an object that has no text of its own its type."""
-    if type(value).__repr__ is object.__repr__:
-        return f"{type(value).__module__}.{type(value).__qualname__}"
-    return repr(value)
+    No compiled code reads other objects, as dictionaries and sets are: their type does for them.
+    """
+    if isinstance(value, np.generic | np.ndarray):
+        content = hashlib.blake2b(value.tobytes(), digest_size=16).hexdigest()
+        return f"{value.dtype!r}{value.shape}{value.flags.c_contiguous}:{content}"
+    if isinstance(value, (*_PLAIN, np.dtype, types.Type)):
+        return f"{type(value).__name__}:{value!r}"
+    return f"{type(value).__module__}.{type(value).__qualname__}"

@@ -1,0 +1,136 @@
+"""Plain Python callables in the place of a kernel: slower, and called like any other.
+
+Compiled code calls back through ctypes, which takes the interpreter's lock for the time of the
+call. An exception cannot travel through compiled code: it waits until :func:`raise_pending`.
+"""
+
+import ctypes
+import inspect
+import math
+import operator
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from teleop_core.errors import KernelError
+
+Array = NDArray[np.float64]
+
+_MOST_VIEWS = 256  # arrays remembered for each callable
+_SCALARS: dict[Any, Any] = {
+    types.float64: ctypes.c_double,
+    types.int64: ctypes.c_int64,
+    types.boolean: ctypes.c_bool,
+}
+_ARRAYS = (types.float64[::1], types.float64[:, ::1])
+_RESULTS: dict[Any, tuple[Any, Callable[[Any], Any]]] = {
+    types.void: (None, lambda _: None),
+    types.float64: (ctypes.c_double, float),
+    types.int64: (ctypes.c_int64, operator.index),
+}
+
+# C has no arrays that know their lengths: an array travels as its address and its lengths.
+_TEXT = """
+def callback({flat}):
+    try:
+        return converted(function({seen}))
+    except BaseException as error:
+        keep(error)
+        return 0
+
+call = c_type(callback)
+
+def entry({names}):
+    return call({passed})
+"""
+
+_pending = threading.local()
+
+
+def raise_pending() -> None:
+    """Raise the first exception of a plain callable since the last time, if there was one.
+
+    To be called after each block of ticks, in the thread that ran it: every thread has its own.
+    In pure-Python mode exceptions need not wait, and this does nothing.
+    """
+    error: BaseException | None = getattr(_pending, "error", None)
+    if error is not None:
+        _pending.error = None
+        raise error
+
+
+def entry_of(function: Callable[..., Any], arguments: tuple[Any, ...], result: Any) -> Any:
+    """Function for the compiler that calls a plain Python one.
+
+    Args:
+        function: Gets scalars as they are and arrays as writable views of the kernel's memory,
+            good for the time of the call. When it raises, the kernel gets 0.
+        arguments: numba types: float64, int64, boolean, C-contiguous float64 arrays (n,), (n, m).
+        result: numba type: void, float64 or int64.
+
+    Raises:
+        KernelError: Another type, or a function that takes another number of arguments.
+    """
+    _check(function, arguments, result)
+    c_result, converted = _RESULTS[result]
+    c_arguments, flat, seen, passed = [], [], [], []
+    for i, kind in enumerate(arguments):
+        sizes = [f"n{i}_{axis}" for axis in range(getattr(kind, "ndim", 0))]
+        c_arguments += [_SCALARS.get(kind, ctypes.c_size_t), *[ctypes.c_ssize_t] * len(sizes)]
+        flat += [f"a{i}", *sizes]
+        seen.append(f"view(a{i}, {', '.join(sizes)})" if sizes else f"a{i}")
+        passed.append(f"a{i}.ctypes.data" if sizes else f"a{i}")
+        passed += [f"a{i}.shape[{axis}]" for axis in range(len(sizes))]
+    lists = {"flat": flat, "seen": seen, "passed": passed}
+    lists["names"] = [f"a{i}" for i in range(len(arguments))]
+    space = {
+        "function": function, "converted": converted, "keep": _keep, "view": _views(),
+        "c_type": ctypes.CFUNCTYPE(c_result, *c_arguments),
+    }  # fmt: skip
+    exec(_TEXT.format(**{key: ", ".join(items) for key, items in lists.items()}), space)
+    return space["entry"]
+
+
+def _keep(error: BaseException) -> None:
+    if getattr(_pending, "error", None) is None:
+        _pending.error = error
+
+
+def _views() -> Callable[..., Array]:
+    """Maker of arrays at an address, which are the same ones when asked again.
+
+    A kernel hands over the same few arrays tick after tick; to make one costs 2 µs.
+    """
+    known: dict[tuple[int, ...], Array] = {}
+
+    def view(*place: int) -> Array:
+        found = known.get(place)
+        if found is None:
+            if len(known) >= _MOST_VIEWS:
+                known.clear()
+            address, *shape = place
+            memory = (ctypes.c_double * math.prod(shape)).from_address(address)
+            found = known[place] = np.ndarray(shape, np.float64, memory)
+        return found
+
+    return view
+
+
+def _check(function: Callable[..., Any], arguments: tuple[Any, ...], result: Any) -> None:
+    name = getattr(function, "__qualname__", repr(function))
+    for i, kind in enumerate(arguments, 1):
+        if kind not in _SCALARS and kind not in _ARRAYS:
+            reason = f"argument {i} is {kind}, must be float64, int64, bool or a C-contiguous array"
+            raise KernelError(f"signature of {name}", f"{reason} of float64, 1-D or 2-D")
+    if result not in _RESULTS:
+        raise KernelError(f"signature of {name}", f"returns {result}, must be void, float64, int64")
+    try:
+        inspect.signature(function).bind(*arguments)
+    except TypeError as error:
+        raise KernelError(name, f"must take {len(arguments)} arguments ({error})") from error
+    except ValueError:  # a builtin, which does not say what it takes
+        return

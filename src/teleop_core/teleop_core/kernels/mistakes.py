@@ -1,0 +1,105 @@
+"""Mistakes in kernels: what the compiler says in a page, in one line with file and line number."""
+
+import re
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+from numba.core import ir, types
+
+from teleop_core.errors import KernelError
+
+_PACKAGE = Path(__file__).parents[1]
+_LONGEST = 300  # characters of a reason: two lines of a terminal or three
+
+# A record is named by all its fields with types and offsets; a literal by its type and value.
+_RECORD = re.compile(r"Record\(\[.*?\)\], \d+, (?:True|False)\)")
+_LITERAL = re.compile(r"Literal\[(\w+)\]\(([^()]*)\)")
+_MISSING = re.compile(r"No implementation of function .*?>>> (.*?)\n", re.DOTALL)
+_REJECTED = re.compile(r"raised a specific error:\s+\w+: (.*?)\n")
+_UNBOUND = re.compile(r'Cannot bind .* due to "\w+: (.*?)"\.')
+
+
+def kernel_error(
+    error: BaseException, function: Callable[..., Any], arguments: Sequence[Any]
+) -> KernelError:
+    """Error that says in one line what is wrong with a kernel, and where.
+
+    Args:
+        error: What numba raised.
+        function: The Python function that it compiled.
+        arguments: Types it was compiled for.
+    """
+    code = function.__code__
+    place = _location(error) or (code.co_filename, code.co_firstlineno)
+    reason = _unknown_field(error)
+    if reason is None:
+        reason = f"kernel {code.co_name!r}: " + (_bad_argument(code, arguments) or _reason(error))
+    return KernelError(f"{_shown(place[0])}:{place[1]}", reason)
+
+
+def _shown(file: str) -> str:
+    """Path of a file from the package or the working directory on, if it is in there."""
+    for folder in (_PACKAGE, Path.cwd()):
+        if Path(file).is_relative_to(folder):
+            return Path(file).relative_to(folder).as_posix()
+    return file
+
+
+def _frames(error: BaseException) -> Iterator[dict[str, Any]]:
+    """Local variables of the frames that the error came through, from the innermost out."""
+    frames, trace = [], error.__traceback__
+    while trace is not None:
+        frames.append(trace.tb_frame.f_locals)
+        trace = trace.tb_next
+    return reversed(frames)
+
+
+def _location(error: BaseException) -> tuple[str, int] | None:
+    """File and line that numba was at: the error's own, else that of the statement it looked at."""
+    places = [getattr(error, "loc", None)]
+    places += [getattr(frame.get("self"), "loc", None) for frame in _frames(error)]
+    for place in places:
+        if isinstance(place, ir.Loc) and place.line is not None:
+            return place.filename, place.line
+    return None
+
+
+def _unknown_field(error: BaseException) -> str | None:
+    """Reason for a field that a record does not have: with the fields it has."""
+    if not isinstance(error, KeyError):
+        return None
+    record = next(
+        (f["self"] for f in _frames(error) if isinstance(f.get("self"), types.Record)), None
+    )
+    if record is None:
+        return None
+    wanted, fields = str(error.args[0]), list(record.fields)
+    close = get_close_matches(wanted, fields, 1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    return f"record has no field {wanted!r}{hint} (fields: {', '.join(fields)})"
+
+
+def _bad_argument(code: CodeType, arguments: Sequence[Any]) -> str | None:
+    """Reason for an argument that no kernel can take."""
+    for name, kind in zip(code.co_varnames, arguments, strict=False):
+        if isinstance(kind, types.PyObject):
+            return f"argument {name!r} must be a number, array, record, function or tuple of them"
+    return None
+
+
+def _reason(error: BaseException) -> str:
+    """Shortest part of numba's message that says what is wrong."""
+    text = re.sub(r"^Failed in \w+ mode pipeline \(step: .*?\)\n", "", str(error).strip())
+    text = _LITERAL.sub(r"\1 \2", _RECORD.sub("record", text))
+    if found := _MISSING.match(text):
+        rejected = _REJECTED.search(text)
+        reason = f"no {found[1].strip()}" + (f": {rejected[1]}" if rejected else "")
+    elif found := _UNBOUND.match(text):
+        reason = f"wrong call of a kernel: {found[1]}"
+    else:
+        reason = re.split(r"\n\n|\nDuring: |\.\.? Raised from |, defined at ", text)[0]
+    return textwrap.shorten(reason or type(error).__name__, _LONGEST, placeholder=" …")

@@ -1,0 +1,169 @@
+"""Everything taken from inside numba, which it may change in any version: here and nowhere else.
+
+The public part of numba has no way to stamp a cache, to compile without a wrapper for Python, to
+count literals as plain numbers, or to say in one line what is wrong with a function.
+"""
+
+import gc
+import sys
+import warnings
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any
+
+import numba
+from numba.core import types
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+from numba.core.ccallback import CFunc
+from numba.core.errors import (
+    ForceLiteralArg,
+    NumbaError,
+    NumbaExperimentalFeatureWarning,
+    UnsupportedBytecodeError,
+)
+from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
+
+from teleop_core import __version__
+from teleop_core.kernels.callables import entry_of
+from teleop_core.kernels.dependencies import digest, source_digest
+from teleop_core.kernels.mistakes import kernel_error
+
+SUPPORTED = ((0, 68), (0, 69))
+"""First version of numba that this module was written for, and the first that may differ."""
+
+_found = tuple(int(part) for part in numba.__version__.split(".")[:2])
+if not SUPPORTED[0] <= _found < SUPPORTED[1]:
+    _first, _last = (".".join(map(str, version)) for version in SUPPORTED)
+    raise ImportError(f"numba is {numba.__version__}, must be >= {_first} and < {_last}")
+
+# Function pointers as arguments are what lets one compiled graph run any robot.
+warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatureWarning)
+
+# Division by zero gives infinity or NaN as in NumPy, not an exception in the middle of a loop;
+# pointers (below) make their own C wrapper, so kernels compile faster without one.
+_ERRORS: dict[str, Any] = {"error_model": "numpy"}
+_OPTIONS = {"nopython": True, "nogil": True, "no_cfunc_wrapper": True, **_ERRORS}
+
+# What numba raises about a function that it cannot compile: seldom one of its own errors alone.
+_MISTAKES = (
+    NumbaError, UnsupportedBytecodeError, LookupError, AttributeError, TypeError, ValueError,
+    NotImplementedError, AssertionError,
+)  # fmt: skip
+
+_generated: set[FunctionType] = set()
+
+
+def _roomy(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Function whose frame is so large that all it calls finds room beside it.
+
+    CPython keeps frames in chunks of 16 KiB. A deep compiler crosses the end of a chunk thousands
+    of times, each time with a system call: a quarter of its time. A large frame gets a large
+    chunk, the rest of which serves the frames after it.
+    """
+    function.__code__ = function.__code__.replace(co_stacksize=70_000)  # 560 KB of 1 MiB
+    return function
+
+
+class Dispatcher(CPUDispatcher):
+    """Compiles a kernel once, in as little time as numba lets it.
+
+    Numbers that are written in a call count as any number of their type, where numba would
+    compile again for each of their values. The cache is opened when the kernel is first compiled:
+    by then all constants of its module have their values.
+    """
+
+    _has_cache = False
+
+    @_roomy
+    def compile(self, sig: Any) -> Any:
+        """Compile for one signature, or load that from the disk."""
+        # Millions of objects are made and kept: looking through them for garbage is for nothing.
+        is_enabled = gc.isenabled()
+        gc.disable()
+        try:
+            if not self._has_cache:
+                self._cache, self._has_cache = _cache(self.py_func), True
+            return super().compile(sig)
+        except ForceLiteralArg:  # no mistake: numba asks itself to compile again
+            raise
+        except _MISTAKES as error:
+            raise kernel_error(error, self.py_func, normalize_signature(sig)[0]) from error
+        finally:
+            if is_enabled:
+                gc.enable()
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Type of a call from another kernel."""
+        plain = [types.unliteral(kind) for kind in args]
+        return super().get_call_template(
+            plain, {name: types.unliteral(kind) for name, kind in kws.items()}
+        )
+
+
+class InnerDispatcher(Dispatcher):
+    """Has no way in from Python; numba would crash where this raises."""
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        """Refuse."""
+        raise TypeError(
+            f"{self.py_func.__name__} is called by kernels only: decorate it with kernel"
+        )
+
+
+def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Dispatcher:
+    """Kernel that is compiled when it is first called."""
+    if is_inner:
+        return InnerDispatcher(function, targetoptions={**_OPTIONS, "no_cpython_wrapper": True})
+    return Dispatcher(function, targetoptions=_OPTIONS)
+
+
+def generated_dispatcher(function: FunctionType) -> Dispatcher:
+    """Kernel without a source file, whose qualified name alone says under what it is cached."""
+    _generated.add(function)
+    return dispatcher(function)
+
+
+def c_function(function: Callable[..., Any], signature: Any) -> Any:
+    """Function of a fixed signature, kernel or not, as a value that kernels call.
+
+    What :func:`numba.cfunc` does, but with our stamp: it shares a cache file with the kernel of
+    the same function, and with different stamps each would throw the other away.
+    """
+    arguments, result = normalize_signature(signature)
+    is_compiled = isinstance(function, CPUDispatcher)
+    target = function.py_func if is_compiled else entry_of(function, arguments, result)
+    callback: Any = CFunc(target, (arguments, result), locals={}, options=_ERRORS)
+    if is_compiled:
+        callback._cache = _cache(target)
+    try:
+        callback.compile()
+    except _MISTAKES as error:
+        raise kernel_error(error, target, arguments) from error
+    if not is_compiled:
+        callback._entry, callback._pyfunc = target, function  # keeps the way in alive
+    return callback
+
+
+def entry(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+    """Compiled function behind a kernel for one tuple of types."""
+    found: Callable[..., Any] = kernel.compile(arguments)
+    return found
+
+
+def _cache(function: Any) -> Any:
+    """Cache on disk of a function; none where it has no source file to stand beside."""
+    own = [source_digest(file) for file in (__file__, digest.__code__.co_filename)]
+    stamp = (numba.__version__, __version__, *own, digest(function))
+    if function in _generated:
+        cache: Any = FunctionCache(_cache)  # beside this package's own
+        name = f"generated.{function.__qualname__}-py{sys.version_info[0]}{sys.version_info[1]}"
+        cache._py_func = function
+        cache._cache_file = IndexDataCacheFile(cache.cache_path, name, stamp)
+        return cache
+    try:
+        cache = FunctionCache(function)
+    except RuntimeError:  # typed in, or given to python -c
+        return NullCache()
+    cache._cache_file._source_stamp = stamp
+    return cache
