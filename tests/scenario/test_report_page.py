@@ -13,8 +13,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.figures import figures
-from teleop_core.evaluation.metrics import study
+from teleop_core.evaluation.scoring import study
 from teleop_core.signals import STATE_FIELDS, TICK_NS
 from teleop_core.topics import (
     ALL,
@@ -122,7 +121,7 @@ def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path):
 @pytest.mark.slow
 def test_page_of_three_recordings_draws_everything_without_asking_the_network(browser, tmp_path):
     bags = [record(tmp_path / f"live_{seed}", seed) for seed in (1, 2, 3)]
-    expected = sum(len(figures(study(Bag(path)))) for path in bags)
+    expected = sum(len(study(Bag(path)).figures()) for path in bags)
     assert expected == 21
     page = tmp_path / "report.html"
     evaluate_bags(bags, None, page, _Silent())

@@ -13,11 +13,11 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import EvaluationError, RecordingError
+from teleop_core.evaluation.chain import STAGES
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.metrics import evaluate, study
 from teleop_core.evaluation.page import report_page
-from teleop_core.evaluation.score import KEYS, key_table
-from teleop_core.evaluation.streams import STAGES
+from teleop_core.evaluation.score import key_table, keys
+from teleop_core.evaluation.scoring import evaluate, study
 from teleop_core.evaluation.table import score_tables
 from teleop_core.evaluation.windows import WINDOW_NS, DisorderError, windows
 from teleop_core.signals import STATE_FIELDS, TICK_NS
@@ -339,16 +339,16 @@ def test_json_has_exactly_the_documented_keys(recipe, path):
     at = START_NS + 5 * TICK_NS
     recipe.singles.append((DIAGNOSTICS, at, report(at, "slave_sim", 0, "", {"ticks": "5"})))
     found = set(leaves(evaluate(recipe.write(path)).to_json()))
-    patterns = [re.compile(pattern(key.path)) for key in KEYS]
+    patterns = [re.compile(pattern(key.path)) for key in keys()]
     for leaf in found:
         assert any(p.fullmatch(leaf) for p in patterns), f"{leaf} is not documented"
-    for key, p in zip(KEYS, patterns, strict=True):
+    for key, p in zip(keys(), patterns, strict=True):
         assert any(p.fullmatch(leaf) for leaf in found), f"{key.path} does not occur"
 
 
 def test_documentation_of_the_keys_is_a_table_with_all_of_them():
     lines = key_table().splitlines()
-    assert len(lines) == len(KEYS) + 2
+    assert len(lines) == len(keys()) + 2
     assert {line.count("|") for line in lines} == {4}
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from teleop_core.evaluation.accumulators import Distribution, Moments
-from teleop_core.evaluation.fixture_scores import penetration
+from teleop_core.evaluation.fixture_depth import penetration
 from teleop_core.evaluation.pairing import NONE, latest, same_stamp, same_tick
 from teleop_core.evaluation.pose_errors import pose_errors
 from teleop_core.evaluation.published import COARSE, FINE, published_for

@@ -8,8 +8,8 @@ from rich.console import Console
 
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import EvaluationError
-from teleop_core.evaluation.metrics import Study, study
 from teleop_core.evaluation.score import Score
+from teleop_core.evaluation.scoring import Study, studies
 from teleop_core.evaluation.table import score_tables
 
 
@@ -22,12 +22,12 @@ def evaluate_bags(
 
     Args:
         paths: Recordings.
-        json_file: Where the scores go: a list with one entry per recording.
+        json_file: Where the scores go: a list with one entry per recording and arm.
         html_file: Where the page goes.
         console: Where the table and the paths of the files are shown.
 
     Returns:
-        One score per recording.
+        One score per recording and arm.
 
     Raises:
         EvaluationError: A recording cannot be scored, or a file not be written.
@@ -36,8 +36,8 @@ def evaluate_bags(
     for file in (json_file, html_file):
         if file is not None:
             _check_place(file)
-    studies = [study(Bag(path)) for path in paths]
-    scores = [found.score for found in studies]
+    found = [study for path in paths for study in studies(Bag(path))]
+    scores = [study.score for study in found]
     for table in score_tables(scores, console.width):
         console.print(table)
     if json_file is not None:
@@ -45,15 +45,15 @@ def evaluate_bags(
         _write(json_file, text + "\n")
         console.print(f"scores: {json_file}", markup=False, highlight=False, soft_wrap=True)
     if html_file is not None:
-        _write(html_file, _page(studies))
+        _write(html_file, _page(found))
         console.print(f"page: {html_file}", markup=False, highlight=False, soft_wrap=True)
     return scores
 
 
-def _page(studies: Sequence[Study]) -> str:
+def _page(found: Sequence[Study]) -> str:
     from teleop_core.evaluation.page import report_page  # carries plotly, which few calls need
 
-    return report_page(studies)
+    return report_page(found)
 
 
 def _check_place(file: Path) -> None:

@@ -1,5 +1,6 @@
 """Figure: one plot of the report page, before it is encoded."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +19,8 @@ DRAWN_BOXES = 4
 class Figure:
     """A plot: what it is, one sentence on what one sees, and plotly.js' traces and layout.
 
-    Arrays among the traces stand as they are; the page encodes them.
+    Arrays among the traces stand as they are; the page encodes them. Without traces it is a line of
+    text.
     """
 
     title: str
@@ -41,6 +43,24 @@ def line(
 def time_axis() -> dict[str, Any]:
     """Axis of time from the start of the recording."""
     return {"title": {"text": "time [s]"}}
+
+
+def axis_suffix(row: int) -> str:
+    """What plotly.js appends to the names of the axes of a row."""
+    return "" if row == 0 else str(row + 1)
+
+
+def stacked_axes(names: Sequence[str], unit: str) -> dict[str, Any]:
+    """Layout of plots on top of each other with one time axis, at the lowest of them."""
+    count = len(names)
+    layout: dict[str, Any] = {"xaxis": {**time_axis(), "anchor": f"y{axis_suffix(count - 1)}"}}
+    for row, name in enumerate(names):
+        top = 1.0 - row / count
+        layout[f"yaxis{axis_suffix(row)}"] = {
+            "title": {"text": f"{name} [{unit}]"},
+            "domain": [max(0.0, top - 1.0 / count + 0.03), top],
+        }
+    return layout
 
 
 def span(values: Array) -> list[float] | None:

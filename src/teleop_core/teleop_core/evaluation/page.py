@@ -10,14 +10,11 @@ import numpy as np
 from plotly.offline import get_plotlyjs
 
 from teleop_core.evaluation.figure import Figure
-from teleop_core.evaluation.figures import figures
-from teleop_core.evaluation.metrics import Study
+from teleop_core.evaluation.html_table import html_table
 from teleop_core.evaluation.page_template import PAGE, POLICY, SCRIPT, STYLE
-from teleop_core.evaluation.published import SOURCE, published_for
-from teleop_core.evaluation.score import Score, Session
-from teleop_core.evaluation.summary import summary
-
-_CLASSES = {True: "met", False: "missed", None: "plain"}
+from teleop_core.evaluation.published import SOURCE
+from teleop_core.evaluation.score import Score, facts
+from teleop_core.evaluation.scoring import Study
 
 
 def report_page(studies: Sequence[Study]) -> str:
@@ -28,10 +25,12 @@ def report_page(studies: Sequence[Study]) -> str:
     """
     sections, drawn, arrays = [], [], _Arrays()
     for number, study in enumerate(studies):
-        plots = figures(study)
+        plots = study.figures()
         places = [f"plot-{number}-{i}" for i in range(len(plots))]
         sections.append(_section(f"recording-{number}", study, plots, places))
         for place, plot in zip(places, plots, strict=True):
+            if not plot.traces:
+                continue
             traces = [arrays.named(trace) for trace in plot.traces]
             layout = {**plot.layout, "height": plot.height}
             drawn.append({"id": place, "traces": traces, "layout": layout})
@@ -41,7 +40,9 @@ def report_page(studies: Sequence[Study]) -> str:
         policy=POLICY,
         title=escape("Teleoperation: " + ", ".join(score.session.title for score in scores)),
         style=STYLE,
-        body="\n".join((_header(scores), _table(scores), *sections)),
+        body="\n".join(
+            (_header(scores), f'<div class="card">{html_table(scores)}</div>', *sections)
+        ),
         data=data.replace("<", "\\u003c"),  # nothing inside can end the script element
         plotly=get_plotlyjs().replace("</script", "<\\/script"),
         script=SCRIPT,
@@ -70,21 +71,9 @@ class _Arrays:
         return self._places[data]
 
 
-def facts(session: Session) -> str:
-    """Scenario, robot, seed, duration and gain in one line."""
-    found = [
-        session.scenario and f"scenario {session.scenario}",
-        session.robot and f"robot {session.robot}",
-        None if session.seed is None else f"seed {session.seed}",
-        f"{session.duration_s:.1f} s",
-        None if session.gain is None else f"gain {session.gain:g}",
-    ]
-    return " · ".join(fact for fact in found if fact)
-
-
 def _header(scores: Sequence[Score]) -> str:
     links = "".join(
-        f'<a href="#recording-{i}">{escape(score.session.name)}</a>'
+        f'<a href="#recording-{i}">{escape(score.session.place)}</a>'
         for i, score in enumerate(scores)
     )
     return (
@@ -97,39 +86,19 @@ def _header(scores: Sequence[Score]) -> str:
 
 def _section(anchor: str, study: Study, plots: list[Figure], places: list[str]) -> str:
     session = study.score.session
-    cards = [
-        f'<figure class="card" style="margin-inline:0"><h3>{escape(plot.title)}</h3>'
-        f"<figcaption>{escape(plot.sentence)}</figcaption>"
-        f'<div id="{place}" style="height:{plot.height}px"></div></figure>'
-        for place, plot in zip(places, plots, strict=True)
-    ]
-    longest = [delay.max for delay in study.score.latency_ms.values()]
-    if longest.count(0.0) == len(longest):
-        cards.append('<p class="facts">Latency: none, as in virtual time.</p>')
-    head = f'<h2 id="{anchor}">{escape(session.name)}</h2><p class="facts">{escape(facts(session))}'
+    cards = map(_card, plots, places)
+    told = escape(" · ".join(facts(session)))
+    head = f'<h2 id="{anchor}">{escape(session.place)}</h2><p class="facts">{told}'
     return "\n".join((f"<section>{head}</p>", *cards, "</section>"))
 
 
-def _table(scores: Sequence[Score]) -> str:
-    heads, kinds = "", ""
-    for score in scores:
-        mode = published_for(score.session.gain, score.session.robot)
-        text = escape(score.session.name)
-        heads += f'<th colspan="2">{text}</th>'
-        kinds += "<th><small>measured</small></th>"
-        kinds += f"<th><small>published{f', {mode.mode}' if mode else ''}</small></th>"
-    lines = [f"<thead><tr><th></th><th></th>{heads}</tr><tr><th></th><th></th>{kinds}</tr></thead>"]
-    group = ""
-    for rows in zip(*map(summary, scores), strict=True):
-        if rows[0].group != group:
-            group = rows[0].group
-            lines.append(f'<tr class="group"><th colspan="{2 + 2 * len(scores)}">{group}</th></tr>')
-        cells = "".join(
-            f'<td class="value {_CLASSES[row.is_met]}">{row.value}</td>'
-            f'<td class="published">{row.published and "≤ " + row.published}</td>'
-            for row in rows
-        )
-        lines.append(
-            f'<tr><td>{rows[0].label}</td><td class="unit">{rows[0].unit}</td>{cells}</tr>'
-        )
-    return '<div class="card"><table>' + "\n".join(lines) + "</table></div>"
+def _card(plot: Figure, place: str) -> str:
+    """Place of a plot, or its text if there is nothing to draw."""
+    title, sentence = escape(plot.title), escape(plot.sentence)
+    if not plot.traces:
+        return f'<p class="facts">{title}: {sentence}</p>'
+    return (
+        f'<figure class="card" style="margin-inline:0"><h3>{title}</h3>'
+        f"<figcaption>{sentence}</figcaption>"
+        f'<div id="{place}" style="height:{plot.height}px"></div></figure>'
+    )

@@ -1,78 +1,56 @@
-"""Score: everything that is measured on one recording, and its keys in JSON."""
+"""Score: everything that is measured on one arm of a recording, and its keys in JSON."""
 
-import math
-from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeVar, cast
 
+from teleop_core.errors import EvaluationError, UnknownNameError
 from teleop_core.evaluation.accumulators import Delay, Spread
-from teleop_core.evaluation.fixture_scores import FixtureScore
-from teleop_core.evaluation.streams import TopicScore
-from teleop_core.evaluation.ticks import Ticks
+from teleop_core.evaluation.metric import Key
+from teleop_core.evaluation.metrics.fixture import FixtureScore
+from teleop_core.evaluation.metrics.nodes import Counts
+from teleop_core.evaluation.metrics.orientation_error import OrientationError
+from teleop_core.evaluation.metrics.samples import Samples
+from teleop_core.evaluation.metrics.ticks import Ticks
+from teleop_core.evaluation.metrics.topics import TopicScore
+from teleop_core.evaluation.plain import Leaf, Plain, Values, leaves, plain
+from teleop_core.evaluation.registry import METRICS, SESSION
+from teleop_core.evaluation.rows import Row, number
 
-
-class Key(NamedTuple):
-    """A JSON key: path with dots (<…> stands for any name), unit, and meaning."""
-
-    path: str
-    unit: str
-    meaning: str
-
-
-_ERROR = "rms, sample S.D. (n − 1), largest"
-KEYS = (
-    Key("session.name", "", "name of the recording"),
-    Key("session.scenario", "", "scenario it was made with; null if unknown"),
-    Key("session.robot", "", "robot; null if unknown"),
-    Key("session.seed", "", "random seed; null if unknown"),
+SESSION_KEYS = (
+    Key("session.name", "1", "name of the recording"),
+    Key("session.scenario", "1", "scenario it was made with; null if unknown"),
+    Key("session.robot", "1", "robot; null if unknown"),
+    Key("session.seed", "1", "random seed; null if unknown"),
     Key("session.duration_s", "s", "first to last message"),
     Key("session.gain", "m/m", "gain that was in force most of the time; null if unknown"),
-    Key("samples.scored", "", "slave poses with their reference"),
-    Key("samples.unpaired", "", "slave poses whose reference was lost on the way"),
-    Key("samples.invalid", "", "slave poses or references with NaN or without a direction"),
-    Key("position_error_mm.rms|sd|max", "mm",
-        f"slave/measured_cp to slave/setpoint_cp of the same tick: {_ERROR}"),
-    Key("orientation_error_deg.roll|pitch|yaw.rms|sd|max", "deg",
-        f"difference of the fixed angles of the same two, wrapped to ±180: {_ERROR}"),
-    Key("orientation_error_deg.angle.rms|sd|max", "deg",
-        f"angle of the one rotation between the same two: {_ERROR}"),
-    Key("orientation_error_deg.degenerate_share", "1",
-        "share of samples with pitch within 1° of ±90°, left out of roll and yaw"),
-    Key("command_error_mm.rms|sd|max", "mm",
-        f"slave/measured_cp to the latest slave/servo_cp at its stamp: {_ERROR}"),
-    Key("command_orientation_error_deg.roll|pitch|yaw.rms|sd|max", "deg",
-        f"difference of the fixed angles of the same two: {_ERROR}"),
-    Key("command_orientation_error_deg.angle.rms|sd|max", "deg",
-        f"angle of the one rotation between the same two: {_ERROR}"),
-    Key("command_orientation_error_deg.degenerate_share", "1", "as above"),
-    Key("fixture.on_s", "s", "time with the box on"),
-    Key("fixture.outside_share", "1", "share of that time with the slave's tip outside"),
-    Key("fixture.penetration_max_mm", "mm", "largest distance of the slave's tip from the box"),
-    Key("fixture.penetration_rms_mm", "mm", "root mean square of it, zero inside"),
-    Key("fixture.hand_penetration_max_mm", "mm", "largest distance of the hand from its box"),
-    Key("force_n.rms|sd|max", "N", f"magnitude of the force on the hand: {_ERROR}"),
-    Key("latency_ms.<stage>.median|p99|max", "ms",
-        "own delay of haptic_master, motion_scaling, inverse_kinematics, slave_sim: from the "
-        "arrival at the recorder of what it answers to that of its answer; haptic_master and "
-        "total: from the stamp of the sample to the arrival of measured_cp and setpoint_js"),
-    Key("ticks.executed|late|missed", "", "control ticks of the slave; late is null if uncounted"),
-    Key("nodes.<node>.<name>", "", "counts that the nodes reported last on diagnostics"),
-    Key("topics.<name>.count", "", "messages"),
-    Key("topics.<name>.gaps", "",
-        "messages missing by their stamps, lost or passed over by a stage that takes only the "
-        "newest; null if not a stream"),
-)  # fmt: skip
-"""Every key of the JSON, in its order. Numbers are finite; null stands for not applicable."""
+    Key("session.arm", "1", "arm that was scored; empty if the recording names no arms"),
+)
+"""Keys of what is told about a recording, beside those of its metrics."""
+Record = TypeVar("Record")
+
+
+def keys() -> tuple[Key, ...]:
+    """Every key of the JSON, in its order. Numbers are finite; null stands for not applicable.
+
+    Raises:
+        PartError: An added metric is no metric.
+    """
+    return (*SESSION_KEYS, *(key for name in METRICS for key in METRICS.find(name).keys))
 
 
 def key_table() -> str:
     """The keys as a Markdown table, for documents."""
-    rows = (f"| `{key.path.replace('|', ', ')}` | {key.unit} | {key.meaning} |" for key in KEYS)
+    rows = (f"| `{key.path.replace('|', ', ')}` | {key.unit} | {key.meaning} |" for key in keys())
     return "\n".join(("| key | unit | meaning |", "|---|---|---|", *rows))
 
 
 @dataclass(frozen=True)
 class Session:
-    """Which recording was scored; texts as in its metadata, None if it has none."""
+    """Which recording was scored; texts as in its metadata, None if it has none.
+
+    ``arm`` is empty for the default arm of a recording that names no arms.
+    """
 
     name: str
     scenario: str | None
@@ -80,62 +58,172 @@ class Session:
     seed: int | None
     duration_s: float
     gain: float | None
+    arm: str = ""
 
     @property
     def title(self) -> str:
         """Name for people."""
         return self.scenario or self.name
 
-
-@dataclass(frozen=True)
-class Samples:
-    """How many slave poses were scored, and why others were not."""
-
-    scored: int
-    unpaired: int
-    invalid: int
+    @property
+    def place(self) -> str:
+        """Name of the recording, and of the arm if it has one."""
+        return f"{self.name} · {self.arm}" if self.arm else self.name
 
 
 @dataclass(frozen=True)
-class OrientationError:
-    """Spread of the orientation errors, [deg]; see :data:`KEYS`."""
+class Result:
+    """What one metric found.
 
-    roll: Spread
-    pitch: Spread
-    yaw: Spread
-    angle: Spread
-    degenerate_share: float | None
+    Attributes:
+        name: The metric.
+        values: What its ``values()`` returned.
+        json: The same as plain dictionaries; None for a metric without keys.
+        rows: What tables show.
+    """
+
+    name: str
+    values: Values
+    json: dict[str, Plain] | None
+    rows: tuple[Row, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Score:
-    """Score of one recording; :data:`KEYS` says what each entry means."""
+    """Score of one arm of a recording; :func:`keys` says what each entry means.
+
+    Values of the metrics of this package are attributes; :meth:`value` has those of any metric.
+
+    Attributes:
+        session: Which recording and arm it is of.
+        results: What each metric found, in the order of the metrics.
+    """
 
     session: Session
-    samples: Samples
-    position_error_mm: Spread
-    orientation_error_deg: OrientationError
-    command_error_mm: Spread
-    command_orientation_error_deg: OrientationError
-    fixture: FixtureScore
-    force_n: Spread
-    latency_ms: dict[str, Delay]
-    ticks: Ticks
-    nodes: dict[str, dict[str, int]]
-    topics: dict[str, TopicScore]
+    results: tuple[Result, ...]
 
-    def to_json(self) -> dict[str, Any]:
-        """The score as plain dictionaries with the keys of :data:`KEYS`."""
-        plain: dict[str, Any] = _plain(self)
-        return plain
+    def value(self, key: str) -> float | None:
+        """Number under a key, such as ``"fixture.penetration_max_mm"``; None if not applicable.
+
+        Raises:
+            UnknownNameError: There is no such key; the alternatives are listed.
+            EvaluationError: A text stands there.
+        """
+        found = self._leaves()
+        if key not in found:
+            metric = key.partition(".")[0]
+            near = [name for name in found if name.startswith(f"{metric}.")]
+            raise UnknownNameError("key of a score", key, near or found)
+        value = found[key]
+        if isinstance(value, str):
+            raise EvaluationError(f"{key} of {self.session.place} is {value!r}, must be a number")
+        return value
+
+    def record(self, metric: str, kind: type[Record]) -> Record:
+        """What a metric's ``values()`` returned.
+
+        Args:
+            metric: Its name.
+            kind: What it returns: ``Spread``, a dataclass of the metric's own, ``dict``.
+
+        Raises:
+            UnknownNameError: There is no such metric; the alternatives are listed.
+            EvaluationError: It returns something else.
+        """
+        for result in self.results:
+            if result.name == metric:
+                if isinstance(result.values, kind):
+                    return result.values
+                found = type(result.values).__name__
+                raise EvaluationError(f"{metric} gives a {found}, must be a {kind.__name__}")
+        raise UnknownNameError("metric", metric, [result.name for result in self.results])
+
+    def to_json(self) -> dict[str, Plain]:
+        """The score as plain dictionaries with the keys of :func:`keys`."""
+        found = {result.name: result.json for result in self.results if result.json is not None}
+        return {SESSION: plain(self.session), **found}
+
+    def _leaves(self) -> dict[str, Leaf]:
+        return {".".join(path): value for path, value in leaves(self.to_json()).items()}
+
+    def __repr__(self) -> str:
+        error = self.position_error_mm
+        return (
+            f"Score of {self.session.place}: {', '.join(facts(self.session))}\n"
+            f"position error {number(error.rms)} mm RMS, {number(error.max)} mm at most"
+        )
+
+    def _repr_html_(self) -> str:
+        from teleop_core.evaluation.html_table import compact_table
+
+        return compact_table(self)
+
+    # -- the metrics of this package, typed ------------------------------------------------------
+
+    @property
+    def samples(self) -> Samples:
+        """How many slave poses were scored."""
+        return self.record("samples", Samples)
+
+    @property
+    def position_error_mm(self) -> Spread:
+        """Distance of the slave's tip from its reference, [mm]."""
+        return self.record("position_error_mm", Spread)
+
+    @property
+    def orientation_error_deg(self) -> OrientationError:
+        """Angles between the slave's tip and its reference, [deg]."""
+        return self.record("orientation_error_deg", OrientationError)
+
+    @property
+    def command_error_mm(self) -> Spread:
+        """Distance of the slave's tip from the newest command, [mm]."""
+        return self.record("command_error_mm", Spread)
+
+    @property
+    def command_orientation_error_deg(self) -> OrientationError:
+        """Angles between the slave's tip and the newest command, [deg]."""
+        return self.record("command_orientation_error_deg", OrientationError)
+
+    @property
+    def fixture(self) -> FixtureScore:
+        """How far hand and slave got out of the virtual fixture."""
+        return self.record("fixture", FixtureScore)
+
+    @property
+    def force_n(self) -> Spread:
+        """Magnitude of the force on the hand, [N]."""
+        return self.record("force_n", Spread)
+
+    @property
+    def latency_ms(self) -> dict[str, Delay]:
+        """Delay of each stage and of the whole chain, [ms]."""
+        return cast(dict[str, Delay], self.record("latency_ms", dict))
+
+    @property
+    def ticks(self) -> Ticks:
+        """Control ticks of the slave."""
+        return self.record("ticks", Ticks)
+
+    @property
+    def nodes(self) -> Counts:
+        """Counts that the nodes reported last."""
+        return cast(Counts, self.record("nodes", dict))
+
+    @property
+    def topics(self) -> dict[str, TopicScore]:
+        """Messages of each topic and how many are missing."""
+        return cast(dict[str, TopicScore], self.record("topics", dict))
 
 
-def _plain(value: Any) -> Any:
-    """Dictionaries, texts and numbers; what is not finite becomes None."""
-    if is_dataclass(value):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, dict):
-        return {str(name): _plain(entry) for name, entry in value.items()}
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value
+def facts(session: Session) -> Iterator[str]:
+    """Scenario, robot, arm, seed, duration and gain, as far as they are known."""
+    found = (
+        session.scenario and f"scenario {session.scenario}",
+        session.robot and f"robot {session.robot}",
+        session.arm and f"arm {session.arm}",
+        None if session.seed is None else f"seed {session.seed}",
+        f"{session.duration_s:.1f} s",
+        None if session.gain is None else f"gain {session.gain:g}",
+    )
+    return (fact for fact in found if fact)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import EvaluationError
@@ -47,6 +48,15 @@ class States:
         return self.rows[:, STATE[name]]
 
     @property
+    def is_fixture_on(self) -> NDArray[np.bool_]:
+        """Whether a fixture holds the slave, shape (N,)."""
+        return self.column("is_fixture_on") > 0.0
+
+    def only(self, is_kept: NDArray[np.bool_]) -> "States":
+        """States of some of the times; ``is_kept`` has the shape (N,)."""
+        return States(self.rows[is_kept])
+
+    @property
     def center(self) -> Array:
         """Centre of the box in the slave's base, shape (N, 3), [m]."""
         return self.rows[:, _CENTER]
@@ -55,6 +65,10 @@ class States:
     def size(self) -> Array:
         """Wall to wall on the slave's x, y, z, shape (N, 3), [m]."""
         return self.rows[:, _SIZE]
+
+
+NO_HISTORY = StateHistory(np.empty(0, np.int64), np.empty((0, len(STATE_FIELDS))))
+"""That of a recording without teleop/state."""
 
 
 def read_history(bag: Bag) -> StateHistory:

@@ -1,15 +1,18 @@
 """Table: scores on the terminal, side by side and beside the published figures."""
 
 from collections.abc import Sequence
+from itertools import groupby
 
 from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
 from teleop_core.evaluation.published import SOURCE, published_for
+from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Score, Session
-from teleop_core.evaluation.summary import MET, NOT_MET, Row, summary
+from teleop_core.evaluation.summary import side_by_side
 
+MET, NOT_MET = "✓", "✗"
 LABEL_WIDTH, COLUMN_WIDTH = 26, 18
 
 
@@ -33,29 +36,32 @@ def score_table(scores: Sequence[Score]) -> Table:
     table.add_column("", no_wrap=True)
     for score in scores:
         table.add_column(escape(heading(score.session)), justify="left", no_wrap=True)
-    group = ""
-    for rows in zip(*map(summary, scores), strict=True):
-        if rows[0].group != group:
-            group = rows[0].group
-            table.add_section()
-            table.add_row(f"[bold]{group}[/bold]")
-        unit = f" [dim]{rows[0].unit}[/dim]" if rows[0].unit else ""
-        table.add_row(f"  {rows[0].label}{unit}", *map(_cell, rows))
+    for group, lines in groupby(side_by_side(scores), key=lambda line: line.group):
+        table.add_section()
+        table.add_row(f"[bold]{escape(group)}[/bold]")
+        for line in lines:
+            unit = f" [dim]{escape(line.unit)}[/dim]" if line.unit else ""
+            table.add_row(f"  {escape(line.label)}{unit}", *map(_cell, line.rows))
     return table
 
 
 def heading(session: Session) -> str:
-    """Name of a recording and what it was, in three lines."""
+    """Name of a recording, what it was, and its mode and arm, in three lines or more."""
     gain = "" if session.gain is None else f"gain {session.gain:g}, "
     mode = published_for(session.gain, session.robot)
     seed = "" if session.seed is None else f", seed {session.seed}"
-    return "\n".join(
-        (session.title, f"{gain}{session.duration_s:.3g} s", f"{session.robot or 'unknown'}{seed}")
-    ) + (f"\nmode {mode.mode}" if mode else "")
+    lines = (
+        session.title,
+        f"{gain}{session.duration_s:.3g} s",
+        f"{session.robot or 'unknown'}{seed}",
+        mode and f"mode {mode.mode}",
+        session.arm and f"arm {session.arm}",
+    )
+    return "\n".join(line for line in lines if line)
 
 
 def _cell(row: Row) -> str:
     if row.is_met is None:
-        return row.value
+        return escape(row.value)
     mark = f"[green]{MET}[/green]" if row.is_met else f"[red]{NOT_MET}[/red]"
-    return f"{row.value:>6}{mark} [dim]≤{row.published}[/dim]"
+    return f"{escape(row.value):>6}{mark} [dim]≤{escape(row.published)}[/dim]"

@@ -1,13 +1,9 @@
 """Traces: what a page draws of a recording, thinned while it is read."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
-from teleop_core.evaluation.accumulators import Distribution, Integers
-from teleop_core.evaluation.state_history import StateHistory, States
+from teleop_core.evaluation.accumulators import Integers
 from teleop_core.geometry import Array
-from teleop_core.signals import STATE
 
 BUCKETS = 1500
 """Stretches of time with a smallest and a largest value each: about one per pixel."""
@@ -77,80 +73,3 @@ class Thinned:
     def rows(self) -> Array:
         """Rows that were kept, shape (M, columns)."""
         return np.concatenate(self._parts) if self._parts else np.empty((0, 0))
-
-
-@dataclass(frozen=True)
-class Box:
-    """A box that was on for a while.
-
-    Attributes:
-        begin_s: When it came on, from the start of the recording, [s].
-        end_s: When it went, [s].
-        center: Middle in the slave's base, [mm].
-        size: Wall to wall, [mm].
-    """
-
-    begin_s: float
-    end_s: float
-    center: tuple[float, float, float]
-    size: tuple[float, float, float]
-
-    def walls(self, axis: int) -> tuple[float, float]:
-        """Places of the two walls across an axis, [mm]."""
-        half = 0.5 * self.size[axis]
-        return self.center[axis] - half, self.center[axis] + half
-
-
-@dataclass(eq=False)
-class Drawing:
-    """Everything a page draws of one recording.
-
-    Attributes:
-        position: Envelope of x, y, z of command, setpoint and measured, 9 columns, [mm].
-        error: Envelope of position error, command error [mm], roll, pitch, yaw, angle [deg].
-        force: Envelope of x, y, z and magnitude, [N].
-        path: Setpoint x, y, z and measured x, y, z [mm], and whether the box was on, 7 columns.
-        history: State over time.
-        delays: Distribution per stage.
-        start_ns: Time that is drawn as 0, [ns].
-        end_ns: Last log time, [ns].
-    """
-
-    start_ns: int
-    end_ns: int
-    expected: int
-    history: StateHistory
-    delays: dict[str, Distribution]
-    position: Envelope = field(init=False)
-    error: Envelope = field(init=False)
-    force: Envelope = field(init=False)
-    path: Thinned = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Empty traces for the whole time."""
-        self.position, self.error, self.force = (
-            Envelope(self.start_ns, self.end_ns, columns) for columns in (9, 6, 4)
-        )
-        self.path = Thinned(self.expected)
-
-    @property
-    def duration_s(self) -> float:
-        """Time that is drawn, [s]."""
-        return (self.end_ns - self.start_ns) / _SECOND_NS
-
-    def boxes(self) -> list[Box]:
-        """Boxes in the order of time; one per place, size and stretch of time."""
-        stamps, rows = self.history.stamp_ns, self.history.rows
-        is_on = rows[:, STATE["is_fixture_on"]] > 0.0
-        states = States(rows)
-        corners = np.concatenate((states.center, states.size, is_on[:, None]), axis=1)
-        begins = np.flatnonzero((np.diff(corners, axis=0, prepend=np.nan) != 0.0).any(axis=1))
-        ends = np.append(stamps[begins[1:]], self.end_ns)
-        out = []
-        for row, end_ns in zip(begins.tolist(), ends.tolist(), strict=True):
-            if is_on[row]:
-                begin = max(0.0, (int(stamps[row]) - self.start_ns) / _SECOND_NS)
-                x, y, z, a, b, c = (1e3 * place for place in corners[row, :6].tolist())
-                end = (end_ns - self.start_ns) / _SECOND_NS
-                out.append(Box(begin, end, (x, y, z), (a, b, c)))
-        return out

@@ -5,17 +5,20 @@ holds its own stretch of log time and a second of context on both sides, so that
 across its ends.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import TypeVar, cast
 
 import numpy as np
 
 from teleop_core.bags.reader import Bag, Series
+from teleop_core.evaluation.state_history import NO_HISTORY, StateHistory, States
 from teleop_core.topics import Topic
 
 CONTEXT_NS = 1_000_000_000
 WINDOW_NS = 4_000_000_000
 _FOREVER = 2**62
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +28,45 @@ class Window:
     Attributes:
         series: Per topic name, in the order of log times; at least the sample before the window
             is in it, if there is one. Topics without samples are left out.
+        history: What teleop/state said at any time.
     """
 
     after_ns: int
     until_ns: int
     series: dict[str, Series]
+    history: StateHistory = NO_HISTORY
+    _known: dict[object, object] = field(default_factory=dict, repr=False)
+
+    def samples(self, topic: Topic) -> Series:
+        """Samples of a topic inside of the window; none if the recording has no such topic."""
+        own, series = self.own(topic), self.around(topic)
+        return Series(
+            series.stamp_ns[own], series.log_ns[own], series.values[own],
+            series.names, series.frame_id,
+        )  # fmt: skip
+
+    def around(self, topic: Topic) -> Series:
+        """The same with the context; :meth:`own` says which of them are inside."""
+        series = self.series.get(topic.name)
+        if series is None:
+            none = np.empty(0, np.int64)
+            return Series(none, none, np.empty((0, topic.kind.width(0))))
+        return series
+
+    def states(self, topic: Topic) -> States:
+        """State in force at the stamp of each of a topic's samples inside of the window."""
+        return self._once(
+            ("states", topic.name), lambda: self.history.at(self.samples(topic).stamp_ns)
+        )
+
+    def once(self, compute: Callable[["Window"], Found]) -> Found:
+        """What a function finds in this window; computed for the first metric that asks."""
+        return self._once(compute, lambda: compute(self))
+
+    def _once(self, name: object, compute: Callable[[], Found]) -> Found:
+        if name not in self._known:
+            self._known[name] = compute()
+        return cast(Found, self._known[name])
 
     def own(self, topic: Topic) -> slice:
         """Samples of a topic inside of the window; the rest is context."""
@@ -44,12 +81,16 @@ class DisorderError(Exception):
     """Samples stand further out of order in the file than the context of a window reaches."""
 
 
-def whole(bag: Bag, topics: Iterable[Topic]) -> Iterator[Window]:
+def whole(
+    bag: Bag, topics: Iterable[Topic], history: StateHistory = NO_HISTORY
+) -> Iterator[Window]:
     """The recording as one window, whatever the order in its file."""
-    yield Window(-_FOREVER, _FOREVER, bag.read_many(topics))
+    yield Window(-_FOREVER, _FOREVER, bag.read_many(topics), history)
 
 
-def windows(bag: Bag, topics: Iterable[Topic]) -> Iterator[Window]:
+def windows(
+    bag: Bag, topics: Iterable[Topic], history: StateHistory = NO_HISTORY
+) -> Iterator[Window]:
     """Windows of a recording in the order of time; memory does not grow with its length.
 
     Raises:
@@ -69,10 +110,10 @@ def windows(bag: Bag, topics: Iterable[Topic]) -> Iterator[Window]:
         until_ns = newest_ns - CONTEXT_NS
         if until_ns - after_ns >= WINDOW_NS:
             pending = _joined(pending, waiting)
-            yield Window(after_ns, until_ns, pending)
+            yield Window(after_ns, until_ns, pending, history)
             pending = {name: _since(series, until_ns) for name, series in pending.items()}
             waiting, after_ns = [], until_ns
-    yield Window(after_ns, _FOREVER, _joined(pending, waiting))
+    yield Window(after_ns, _FOREVER, _joined(pending, waiting), history)
 
 
 def _joined(pending: dict[str, Series], waiting: list[dict[str, Series]]) -> dict[str, Series]:

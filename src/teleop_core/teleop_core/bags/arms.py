@@ -1,0 +1,132 @@
+"""Arms: a recording of several arms, seen as one recording per arm.
+
+Topics of the default arm have the plain names; those of an arm called ``left`` are below ``left/``.
+The metadata name the arms under ``arms``, with blanks between them and the default one first; robot
+and seed of a further arm are in ``left/robot`` and ``left/seed``. All arms share ``diagnostics``,
+in which the nodes of an arm are called ``left/slave_sim``.
+"""
+
+from collections.abc import Iterable, Iterator
+
+from teleop_core.bags.reader import Bag, Series, TopicInfo
+from teleop_core.bags.reports import Report
+from teleop_core.errors import RecordingError, UnknownNameError
+from teleop_core.topics import DIAGNOSTICS, Topic
+
+ARMS_KEY = "arms"
+_OF_ONE_ARM = {"robot", "seed"}
+
+
+def arm_names(bag: Bag) -> tuple[str, ...]:
+    """Arms of a recording, the default one first; ``("",)`` if the recording does not name them.
+
+    Raises:
+        RecordingError: Its metadata name an arm twice.
+    """
+    names = tuple(bag.metadata.get(ARMS_KEY, "").split()) or ("",)
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        raise RecordingError(bag.path, f"names the arm {twice[0]} twice: {' '.join(names)}")
+    return names
+
+
+def of_arm(bag: Bag, arm: str = "") -> Bag:
+    """View of a recording that holds one arm only, under the plain names.
+
+    Args:
+        bag: The recording, which stays open as long as the view is used.
+        arm: Name of an arm; empty for the default one.
+
+    Raises:
+        UnknownNameError: The recording has no such arm.
+        RecordingError: Its metadata name an arm twice.
+    """
+    arms = arm_names(bag)
+    if arm and arm not in arms:
+        raise UnknownNameError(f"arm of {bag.path}", arm, filter(None, arms))
+    if len(arms) == 1:
+        return bag
+    return _ArmBag(bag, "" if arm in {"", arms[0]} else f"{arm}/", arms[1:])
+
+
+class _ArmBag(Bag):
+    """View of one arm.
+
+    Args:
+        bag: The whole recording.
+        prefix: What stands before the names of the arm; empty for the default one.
+        further: Names of all arms but the default one.
+    """
+
+    def __init__(self, bag: Bag, prefix: str, further: tuple[str, ...]) -> None:
+        self._bag, self._prefix = bag, prefix
+        self._others = tuple(f"{arm}/" for arm in further if f"{arm}/" != prefix)
+        self.path, self.start_ns, self.end_ns = bag.path, bag.start_ns, bag.end_ns
+        self.topics: dict[str, TopicInfo] = {}
+        for name, info in bag.topics.items():
+            if name == DIAGNOSTICS.name:
+                self.topics[name] = info
+            elif (plain := self._plain(name)) is not None:
+                self.topics[plain] = info
+        common = {} if not prefix else bag.metadata
+        self.metadata = {name: text for name, text in common.items() if name not in _OF_ONE_ARM}
+        for name, text in bag.metadata.items():
+            if (plain := self._plain(name)) is not None:
+                self.metadata[plain] = text
+
+    def _plain(self, name: str) -> str | None:
+        """Name below the arm; None if it is of another arm."""
+        if not name.startswith(self._prefix) or (
+            not self._prefix and name.startswith(self._others)
+        ):
+            return None
+        return name.removeprefix(self._prefix)
+
+    def _recorded(self, topic: Topic | str) -> str:
+        """Name of a topic in the whole recording."""
+        name = topic.name if isinstance(topic, Topic) else topic.removeprefix("/")
+        return name if name == DIAGNOSTICS.name else self._prefix + name
+
+    def require(self, topics: Iterable[Topic | str]) -> None:
+        """As for the whole recording; the message names the arm."""
+        try:
+            super().require(topics)
+        except RecordingError as error:
+            arm = f"arm {self._prefix.rstrip('/')}" if self._prefix else "the default arm"
+            raise RecordingError(self.path, f"{arm} {error.reason}") from None
+
+    def read_many(
+        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
+    ) -> dict[str, Series]:
+        """As for the whole recording."""
+        return self._renamed(self._bag.read_many(self._wanted(topics), joint_names))
+
+    def blocks(
+        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
+    ) -> Iterator[dict[str, Series]]:
+        """As for the whole recording."""
+        yield from map(self._renamed, self._bag.blocks(self._wanted(topics), joint_names))
+
+    def reports(self, topic: Topic | str) -> list[Report]:
+        """As for the whole recording; of ``diagnostics`` those of the arm's own nodes."""
+        self.require([topic])
+        found = self._bag.reports(self._recorded(topic))
+        if self._recorded(topic) != DIAGNOSTICS.name:
+            return found
+        named = [(self._plain(report.name.strip("/")), report) for report in found]
+        return [report._replace(name=name) for name, report in named if name is not None]
+
+    def raw(
+        self, topics: Iterable[Topic | str] | None = None
+    ) -> Iterator[tuple[str, str, int, bytes]]:
+        """As for the whole recording."""
+        wanted = self._wanted(self.topics if topics is None else topics)
+        for name, ros_type, log_ns, data in self._bag.raw(wanted):
+            yield name.removeprefix(self._prefix), ros_type, log_ns, data
+
+    def _wanted(self, topics: Iterable[Topic | str]) -> list[str]:
+        wanted = list(topics)
+        self.require(wanted)
+        return [self._recorded(topic) for topic in wanted]
+
+    def _renamed(self, block: dict[str, Series]) -> dict[str, Series]:
+        return {name.removeprefix(self._prefix): series for name, series in block.items()}

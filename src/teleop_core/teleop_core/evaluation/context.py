@@ -1,0 +1,66 @@
+"""Context: what a metric knows of the recording when it is made, and what metrics share."""
+
+from collections.abc import Callable
+from typing import Protocol, TypeVar, cast
+
+from teleop_core.bags.reader import Bag
+from teleop_core.errors import EvaluationError
+from teleop_core.evaluation.state_history import StateHistory
+from teleop_core.evaluation.windows import Window
+from teleop_core.topics import Topic
+
+
+class Accumulator(Protocol):
+    """Takes a recording window by window."""
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+
+
+Shared = TypeVar("Shared", bound=Accumulator)
+
+
+class Context:
+    """One arm of one recording.
+
+    Attributes:
+        bag: The recording; it holds this arm only, under the plain names.
+        arm: Name of the arm; empty for the default arm of a recording that names none.
+        history: What teleop/state said at any time.
+        robot: Name of the robot; None if unknown.
+    """
+
+    def __init__(self, bag: Bag, arm: str, history: StateHistory) -> None:
+        self.bag, self.arm, self.history = bag, arm, history
+        self.robot = bag.metadata.get("robot") or None
+        self._parts: dict[Callable[[Context], Accumulator], Accumulator] = {}
+        self._has_begun = False
+
+    def expected(self, topic: Topic) -> int:
+        """Messages of a topic in the recording."""
+        info = self.bag.topics.get(topic.name)
+        return 0 if info is None else info.count
+
+    def shared(self, kind: Callable[["Context"], Shared]) -> Shared:
+        """The one accumulator of a kind, metrics included, that all metrics of a score share.
+
+        It is made when it is first asked for, gets every window once, and gets it before those
+        who asked for it.
+
+        Args:
+            kind: Its class, or another maker.
+
+        Raises:
+            EvaluationError: It would miss windows; ask for it while a metric is made.
+        """
+        if kind not in self._parts:
+            if self._has_begun:
+                name = getattr(kind, "__name__", str(kind))
+                raise EvaluationError(f"{name} is asked for too late, must be in __init__")
+            self._parts[kind] = kind(self)
+        return cast(Shared, self._parts[kind])
+
+    def begin(self) -> list[Accumulator]:
+        """All accumulators in the order in which they take windows; no more are made."""
+        self._has_begun = True
+        return list(self._parts.values())

@@ -1,0 +1,103 @@
+"""Metric: one thing that is measured on a recording; each is one file, ours or a user's."""
+
+from abc import ABC, abstractmethod
+from itertools import product
+from typing import ClassVar, NamedTuple
+
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.figure import Figure
+from teleop_core.evaluation.plain import Leaf, Values, leaves, plain
+from teleop_core.evaluation.rows import Row, row
+from teleop_core.evaluation.windows import Window
+from teleop_core.topics import Topic
+
+SPREAD_MEANING = "rms, sample S.D. (n − 1), largest"
+"""What the keys ``rms``, ``sd`` and ``max`` of a :class:`Spread` mean, for texts of keys."""
+
+
+class Key(NamedTuple):
+    """A JSON key: path with dots, unit, and meaning.
+
+    In a path ``<…>`` stands for any name, and ``|`` between the names that may stand there. The
+    unit of counts and shares is 1.
+    """
+
+    path: str
+    unit: str
+    meaning: str
+
+    def names(self) -> list[str]:
+        """Every single key; ``<…>`` stays."""
+        return [".".join(parts) for parts in product(*self._choices())]
+
+    def covers(self, path: tuple[str, ...]) -> bool:
+        """Whether a value's path is one of this key's."""
+        choices = self._choices()
+        return len(choices) == len(path) and all(
+            choice[0].startswith("<") or name in choice
+            for choice, name in zip(choices, path, strict=True)
+        )
+
+    def _choices(self) -> list[list[str]]:
+        return [part.split("|") for part in self.path.split(".")]
+
+
+class Metric(ABC):
+    """One thing that is measured on one arm of a recording, made anew for each.
+
+    A metric takes the recording window by window and must keep little of each, so that a recording
+    of any length can be scored. What other metrics compute too comes from
+    :meth:`~teleop_core.evaluation.context.Context.shared` (over the recording) and
+    :meth:`~teleop_core.evaluation.windows.Window.once` (of a window).
+
+    Attributes:
+        name: What it is called, in JSON too.
+        keys: Its keys in JSON; each path begins with the name and a dot. Without keys a metric
+            is not in JSON and only draws.
+        topics: Streams it reads. Those that a recording lacks have no samples in its windows.
+    """
+
+    name: ClassVar[str]
+    keys: ClassVar[tuple[Key, ...]] = ()
+    topics: ClassVar[tuple[Topic, ...]] = ()
+
+    def __init__(self, context: Context) -> None:
+        """Make it for one arm of a recording."""
+        super().__init__()
+
+    @abstractmethod
+    def add(self, window: Window) -> None:
+        """Take one window; ``window.samples(topic)`` are its samples."""
+
+    @abstractmethod
+    def values(self) -> Values:
+        """What was found: names and values below the metric's name, as its keys say.
+
+        None stands for what does not apply, such as a mean without samples.
+        """
+
+    def rows(self) -> list[Row]:
+        """What tables show: the same groups and labels for every recording.
+
+        Unless a metric says otherwise, this is one row per key without ``<…>``.
+        """
+        found = {".".join(path): value for path, value in leaves(plain(self.values())).items()}
+        out = []
+        for key in self.keys:
+            for name in key.names():
+                label = name.removeprefix(f"{self.name}.")
+                if "<" not in label:
+                    out.append(_row(self.name, label, key.unit, found.get(label)))
+        return out
+
+    def figures(self) -> list[Figure]:
+        """Plots for the page, in their order; none unless a metric says otherwise."""
+        return []
+
+
+def _row(name: str, label: str, unit: str, value: Leaf) -> Row:
+    group, text = name.replace("_", " "), label.replace("_", " ").replace(".", " ")
+    unit = "" if unit == "1" else unit
+    if isinstance(value, float) or value is None:
+        return row(group, text, unit, value)
+    return Row(group, text, unit, str(value))

@@ -1,0 +1,66 @@
+"""Force: how hard the device pushed the hand."""
+
+import numpy as np
+
+from teleop_core.evaluation.accumulators import Moments, Spread
+from teleop_core.evaluation.boxes import boxes_of
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
+from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
+from teleop_core.evaluation.metrics.fixture import GROUP
+from teleop_core.evaluation.rows import Row, number, row
+from teleop_core.evaluation.traces import Envelope
+from teleop_core.evaluation.windows import Window
+from teleop_core.topics import MASTER_MEASURED_CF
+
+
+class ForceMetric(Metric):
+    """Spread of the magnitude of the force on the hand, [N]."""
+
+    name = "force_n"
+    keys = (
+        Key("force_n.rms|sd|max", "N", f"magnitude of the force on the hand: {SPREAD_MEANING}"),
+    )
+    topics = (MASTER_MEASURED_CF,)
+
+    def __init__(self, context: Context) -> None:
+        self._context, self._magnitude = context, Moments()
+        # x, y, z and magnitude, [N].
+        self._trace = Envelope(context.bag.start_ns, context.bag.end_ns, columns=4)
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        samples = window.samples(MASTER_MEASURED_CF)
+        force = samples.values[:, :3]
+        magnitude = np.sqrt(np.einsum("ij,ij->i", force, force))
+        self._magnitude.add(magnitude)
+        self._trace.add(samples.log_ns, np.column_stack((force, magnitude)))
+
+    def values(self) -> Spread:
+        """Spread so far, [N]."""
+        return self._magnitude.spread()
+
+    def rows(self) -> list[Row]:
+        """The maximum, beside the penetration that caused it."""
+        return [row(GROUP, "force on hand, max", "N", self.values().max)]
+
+    def figures(self) -> list[Figure]:
+        """Force against time; none if it was not recorded."""
+        times, values = self._trace.line()
+        if not len(times):
+            return []
+        traces = [
+            line(times, values[:, i], f"{axis} (master)", color, 1.2, "N")
+            for i, (axis, color) in enumerate(zip("xyz", (FIRST, SECOND, THIRD), strict=True))
+        ]
+        traces.append(line(times, values[:, 3], "magnitude", DARK, 1.4, "N"))
+        has_box = bool(boxes_of(self._context))
+        sentence = f"The device pushes the hand with {number(self.values().max)} N at most"
+        sentence += "; the box pushes back only where the hand is beyond a wall." * has_box
+        sentence += "." * (not has_box)
+        layout = {
+            "xaxis": time_axis(),
+            "yaxis": {"title": {"text": "force [N]"}},
+            "hovermode": "x unified",
+        }
+        return [Figure("Force on the hand", sentence, traces, layout, 340)]

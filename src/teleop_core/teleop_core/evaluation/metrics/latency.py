@@ -1,0 +1,126 @@
+"""Latency: what each stage of the chain adds to the way from the hand's sample to the slave."""
+
+from itertools import cycle
+
+import numpy as np
+
+from teleop_core.evaluation.accumulators import Delay, Distribution, Integers
+from teleop_core.evaluation.chain import CHAIN, COMMAND, STAGES, TOTAL
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line
+from teleop_core.evaluation.metric import Key, Metric
+from teleop_core.evaluation.pairing import NONE, same_stamp
+from teleop_core.evaluation.rows import MISSING, Row, number
+from teleop_core.evaluation.windows import Window
+from teleop_core.topics import Topic
+
+_NEVER = 2**62
+_BINS = 150
+_COLORS = (FIRST, "#e69f00", SECOND, THIRD, DARK)
+_LAST = CHAIN[-1][1].name.partition("/")[2]
+
+
+class LatencyMetric(Metric):
+    """Delays of every stage.
+
+    A stage's own delay is the time between the first arrivals, at the recorder, of what it
+    answers and of its answer; both carry the same stamp. Transport to the recorder is in the first
+    stage, the only one that is measured against the stamp itself.
+    """
+
+    name = "latency_ms"
+    keys = (
+        Key("latency_ms.<stage>.median|p99|max", "ms",
+            f"own delay of {', '.join(stage for stage, _ in CHAIN)}: from the arrival at the "
+            "recorder of what it answers to that of its answer; "
+            f"{CHAIN[0][0]} and {TOTAL}: from the stamp of the sample to the arrival of "
+            f"measured_cp and {_LAST}"),
+    )  # fmt: skip
+    topics = (*(topic for _, topic in CHAIN), COMMAND)
+
+    def __init__(self, context: Context) -> None:
+        self._delays = {stage: Distribution() for stage in STAGES}
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        before: Topic | None = None
+        for stage, topic in CHAIN:
+            stamps, logs = _first_arrivals(window, topic)
+            arrivals = logs - (stamps if before is None else _arrivals(window, before, stamps))
+            self._delays[stage].add(arrivals[arrivals > -_NEVER // 2])
+            before = topic
+        # The last stage holds what nobody sent when it starts: only commands count.
+        is_command = same_stamp(stamps, window.around(COMMAND).stamp_ns) != NONE
+        self._delays[TOTAL].add((logs - stamps)[is_command])
+
+    def values(self) -> dict[str, Delay]:
+        """Delay of each stage."""
+        return {stage: distribution.delay() for stage, distribution in self._delays.items()}
+
+    def rows(self) -> list[Row]:
+        """One row per stage."""
+        rows = []
+        for stage, delay in self.values().items():
+            known = (delay.median, delay.p99, delay.max)
+            text = MISSING if delay.max is None else "/".join(map(_short, known))
+            rows.append(Row("latency: median/p99/max", stage.replace("_", " "), "ms", text))
+        return rows
+
+    def figures(self) -> list[Figure]:
+        """Distribution of each stage's delay; a line of text where all are zero."""
+        known = {stage: delay for stage, delay in self._delays.items() if delay.count}
+        if len(known) == len(STAGES) and not any(d.values_us.any() for d in known.values()):
+            return [Figure("Latency", "none, as in virtual time.", [])]
+        if not any(delay.values_us.any() for delay in known.values()):
+            return []
+        width_us = _bin_width(list(known.values()))
+        traces = []
+        for (stage, delay), color in zip(self._delays.items(), cycle(_COLORS), strict=False):
+            if stage in known:
+                middles, shares = delay.histogram(width_us)
+                trace = line(middles, shares, stage.replace("_", " "), color, 1.8, "%")
+                traces.append({**trace, "line": {**trace["line"], "shape": "hvh"}})
+        layout = {
+            "xaxis": {"title": {"text": "delay [ms]"}},
+            "yaxis": {"title": {"text": f"share per {width_us * 1e-3:g} ms [%]"}},
+        }
+        return [Figure("Latency per stage", _sentence(self.values()[TOTAL]), traces, layout, 340)]
+
+
+def _first_arrivals(window: Window, topic: Topic) -> tuple[Integers, Integers]:
+    """Stamps and log times [ns] of the window's samples, each stamp once."""
+    series, own = window.around(topic), window.own(topic)
+    if not len(series):
+        return series.stamp_ns, series.log_ns
+    is_first = np.diff(series.stamp_ns, prepend=series.stamp_ns[0] - 1)[own] != 0
+    return series.stamp_ns[own][is_first], series.log_ns[own][is_first]
+
+
+def _arrivals(window: Window, topic: Topic, stamps: Integers) -> Integers:
+    """Log times [ns] of another topic's samples with these stamps; never is far in the future."""
+    series = window.around(topic)
+    if not len(series):
+        return np.full(len(stamps), _NEVER)
+    partner = same_stamp(stamps, series.stamp_ns)
+    return np.where(partner == NONE, _NEVER, series.log_ns[partner])
+
+
+def _short(value: float | None) -> str:
+    """Text of a few milliseconds."""
+    if not value:
+        return "0"
+    return f"{value:.2f}" if abs(value) < 10.0 else f"{value:.1f}"
+
+
+def _bin_width(delays: list[Distribution]) -> int:
+    """Width of bins [µs] that is the same for all, so that their heights compare."""
+    spans = [(delay.quantile_us(0.99) or 0) - int(delay.values_us[0]) for delay in delays]
+    return max(1, -(-max(spans) // _BINS))
+
+
+def _sentence(total: Delay) -> str:
+    return (
+        f"From the sample of the hand to the slave's setpoint: {number(total.median)} ms median, "
+        f"{number(total.p99)} ms for 99 of 100. Other lines: what each stage adds. "
+        "The last step of a line holds all that took longer."
+    )

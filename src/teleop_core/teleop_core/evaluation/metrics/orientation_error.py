@@ -1,0 +1,165 @@
+"""Orientation error: by which angles the slave's tip is off, from reference and from command."""
+
+from dataclasses import dataclass
+
+from teleop_core.evaluation.accumulators import Moments, Spread
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.figure import (
+    FIRST,
+    SECOND,
+    THIRD,
+    Figure,
+    axis_suffix,
+    line,
+    stacked_axes,
+)
+from teleop_core.evaluation.gains import Gains
+from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
+from teleop_core.evaluation.metrics import command_error, position_error
+from teleop_core.evaluation.pose_errors import PoseErrors
+from teleop_core.evaluation.rows import Row, number, row, spread_rows
+from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, tracked
+from teleop_core.evaluation.windows import Window
+
+TURNS = ("roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True)
+class OrientationError:
+    """Spread of the orientation errors, [deg].
+
+    Attributes:
+        roll: Of the difference of the fixed angles about x; None near pitch ±90°.
+        pitch: The same about y.
+        yaw: The same about z; None near pitch ±90°.
+        angle: Of the angle of the one rotation between the two.
+        degenerate_share: Share of samples with pitch near ±90°, 0 to 1.
+    """
+
+    roll: Spread
+    pitch: Spread
+    yaw: Spread
+    angle: Spread
+    degenerate_share: float | None
+
+
+class _Orientation:
+    """Accumulator of an :class:`OrientationError`."""
+
+    def __init__(self) -> None:
+        self._angle = Moments()
+        self._turns = [Moments() for _ in TURNS]
+        self._degenerate = 0
+
+    def add(self, errors: PoseErrors) -> None:
+        """Take the errors of N poses."""
+        self._angle.add(errors.angle_deg)
+        self._degenerate += int(errors.is_degenerate.sum())
+        for moments, column in zip(self._turns, errors.roll_pitch_yaw_deg.T, strict=True):
+            moments.add(column)
+
+    def error(self) -> OrientationError:
+        """Spread of all angles so far."""
+        count = self._angle.count
+        share = self._degenerate / count if count else None
+        roll, pitch, yaw = (moments.spread() for moments in self._turns)
+        return OrientationError(roll, pitch, yaw, self._angle.spread(), share)
+
+
+class OrientationErrorMetric(Metric):
+    """Errors against the reference of the same tick."""
+
+    name = "orientation_error_deg"
+    keys = (
+        Key("orientation_error_deg.roll|pitch|yaw.rms|sd|max", "deg",
+            "difference of the fixed angles of slave/measured_cp and slave/setpoint_cp of the "
+            f"same tick, wrapped to ±180: {SPREAD_MEANING}"),
+        Key("orientation_error_deg.angle.rms|sd|max", "deg",
+            f"angle of the one rotation between the same two: {SPREAD_MEANING}"),
+        Key("orientation_error_deg.degenerate_share", "1",
+            "share of samples with pitch within 1° of ±90°, left out of roll and yaw"),
+    )  # fmt: skip
+    topics = TRACKED
+
+    def __init__(self, context: Context) -> None:
+        self._error, self._gains = _Orientation(), context.shared(Gains)
+        self._trace = context.shared(ErrorTrace)
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        self._error.add(tracked(window).against)
+
+    def values(self) -> OrientationError:
+        """Spread so far, [deg]."""
+        return self._error.error()
+
+    def rows(self) -> list[Row]:
+        """The spreads beside the published figures of the mode."""
+        error, mode, group = self.values(), self._gains.published, position_error.GROUP
+        published = (mode.roll_deg, mode.pitch_deg, mode.yaw_deg) if mode else (None, None, None)
+        spreads = (error.roll, error.pitch, error.yaw)
+        rows = []
+        for turn, spread, figures in zip(TURNS, spreads, published, strict=True):
+            rows += spread_rows(group, turn, "deg", spread, figures)
+        return rows + spread_rows(group, "rotation", "deg", error.angle)
+
+    def figures(self) -> list[Figure]:
+        """Roll, pitch and yaw of the tip against the reference, against time."""
+        times, values = self._trace.envelope.line()
+        traces = [
+            {
+                **line(times, values[:, 2 + row], name, color, 1.2, "deg"),
+                "yaxis": f"y{axis_suffix(row)}", "showlegend": False,
+            }
+            for row, (name, color) in enumerate(zip(TURNS, (FIRST, SECOND, THIRD), strict=True))
+        ]  # fmt: skip
+        layout = stacked_axes(TURNS, "deg") | {"hovermode": "x unified"}
+        return [Figure("Orientation error", _sentence(self.values()), traces, layout, 480)]
+
+
+def _sentence(error: OrientationError) -> str:
+    turns = (error.roll, error.pitch, error.yaw)
+    largest = max((turn.max for turn in turns if turn.max is not None), default=None)
+    sentence = (
+        f"No angle is off by more than {number(largest)} deg; the rotation as "
+        f"a whole by {number(error.angle.rms)} deg RMS, {number(error.angle.max)} deg at most."
+    )
+    if error.degenerate_share:
+        share = 100.0 * error.degenerate_share
+        sentence += f" For {share:.1f} % of the time pitch is near ±90°: no roll, no yaw there."
+    return sentence
+
+
+class CommandOrientationErrorMetric(Metric):
+    """Errors against the newest command."""
+
+    name = "command_orientation_error_deg"
+    keys = (
+        Key("command_orientation_error_deg.roll|pitch|yaw.rms|sd|max", "deg",
+            "difference of the fixed angles of slave/measured_cp and the latest slave/servo_cp at "
+            f"its stamp: {SPREAD_MEANING}"),
+        Key("command_orientation_error_deg.angle.rms|sd|max", "deg",
+            f"angle of the one rotation between the same two: {SPREAD_MEANING}"),
+        Key("command_orientation_error_deg.degenerate_share", "1",
+            "as in orientation_error_deg"),
+    )  # fmt: skip
+    topics = TRACKED
+
+    def __init__(self, context: Context) -> None:
+        self._error = _Orientation()
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        self._error.add(tracked(window).behind)
+
+    def values(self) -> OrientationError:
+        """Spread so far, [deg]."""
+        return self._error.error()
+
+    def rows(self) -> list[Row]:
+        """Root mean square and maximum of the one rotation."""
+        angle, group = self.values().angle, command_error.GROUP
+        return [
+            row(group, "rotation, RMS", "deg", angle.rms),
+            row(group, "rotation, max", "deg", angle.max),
+        ]

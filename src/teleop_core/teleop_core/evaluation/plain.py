@@ -1,0 +1,55 @@
+"""Plain: values of metrics as dictionaries of numbers and texts, ready for JSON."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Values: TypeAlias = "Mapping[str, object] | DataclassInstance"
+"""What a metric found: names to values, which may be such mappings again; or a dataclass."""
+Leaf: TypeAlias = float | int | str | None
+Plain: TypeAlias = "dict[str, Plain] | Leaf"
+
+
+def plain(values: Values) -> dict[str, Plain]:
+    """Dictionaries, texts and numbers; what is not finite becomes None.
+
+    Raises:
+        TypeError: Something is neither.
+    """
+    entries: Iterator[tuple[object, object]]
+    if isinstance(values, Mapping):
+        entries = iter(values.items())
+    elif is_dataclass(values) and not isinstance(values, type):
+        entries = ((field.name, getattr(values, field.name)) for field in fields(values))
+    else:
+        raise TypeError(f"a {type(values).__name__} stands where names and values must")
+    return {str(name): _plain(str(name), value) for name, value in entries}
+
+
+def _plain(name: str, value: object) -> Plain:
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if value is None or isinstance(value, str | int):
+        return value
+    if isinstance(value, Mapping) or (is_dataclass(value) and not isinstance(value, type)):
+        return plain(value)
+    raise TypeError(f"{name} is a {type(value).__name__}, must be a number, a text or None")
+
+
+def leaves(tree: Mapping[str, Plain], before: tuple[str, ...] = ()) -> dict[tuple[str, ...], Leaf]:
+    """Values at the ends of a tree, by their paths."""
+    found: dict[tuple[str, ...], Leaf] = {}
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            found |= leaves(value, (*before, name))
+        else:
+            found[*before, name] = value
+    return found

@@ -1,0 +1,98 @@
+"""Registry of metrics: those of this package, of installed packages and of the running program.
+
+An installed package adds a metric through the entry-point group ``teleop_core.metrics``; a program
+through ``METRICS.add("jerk", JerkMetric)``. Every metric of the registry is in every score.
+"""
+
+import inspect
+from collections.abc import Callable
+
+from teleop_core.errors import PartError
+from teleop_core.evaluation.metric import Key, Metric
+from teleop_core.registry import Registry
+from teleop_core.topics import Kind, Topic
+
+SESSION = "session"
+"""Name in JSON that no metric may have."""
+_FOLDER = "teleop_core.evaluation.metrics"
+
+
+def check_metric(name: str, part: object) -> type[Metric]:
+    """The part, if it is a metric.
+
+    Raises:
+        PartError: It is none; the text says what is missing.
+    """
+    if not (isinstance(part, type) and issubclass(part, Metric)):
+        raise _refusal(name, f"a class below teleop_core.evaluation.Metric, is {part!r}")
+    if missing := sorted(getattr(part, "__abstractmethods__", ())):
+        raise _refusal(name, f"a class with the methods add and values, lacks {missing[0]}")
+    own = getattr(part, "name", None)
+    if own != name or name == SESSION or not name or "." in name:
+        raise _refusal(name, f"registered under its own name without dots, which is {own!r}")
+    for method, names in (("__init__", "self, context"), ("add", "self, window"),
+                          ("values", "self"), ("rows", "self"), ("figures", "self")):  # fmt: skip
+        if not _takes(getattr(part, method, None), names.count(",") + 1):
+            raise _refusal(name, f"a class with {method}({names})")
+    _check_keys(name, part.keys)
+    if not isinstance(part.topics, tuple) or not all(map(_is_stream, part.topics)):
+        raise _refusal(name, f"a class with a tuple of streams as topics, not {part.topics!r}")
+    return part
+
+
+def _is_stream(topic: object) -> bool:
+    return isinstance(topic, Topic) and topic.kind is not Kind.REPORT
+
+
+def _takes(method: Callable[..., object] | None, count: int) -> bool:
+    """Whether a method can be called with so many arguments."""
+    if not callable(method):
+        return False
+    try:
+        inspect.signature(method).bind(*range(count))
+    except TypeError:
+        return False
+    return True
+
+
+def _check_keys(name: str, keys: object) -> None:
+    if not isinstance(keys, tuple):
+        raise _refusal(name, f"a class with a tuple of Key as keys, not {keys!r}")
+    known: set[str] = set()
+    for key in keys:
+        is_key = isinstance(key, Key) and all(isinstance(text, str) and text for text in key)
+        if not is_key:
+            raise _refusal(name, f"a class whose keys are Key(path, unit, meaning), not {key!r}")
+        if not key.path.startswith(f"{name}."):
+            raise _refusal(name, f"a class whose keys begin with '{name}.', not {key.path!r}")
+        for single in key.names():
+            if single in known:
+                raise _refusal(name, f"a class with each key once, has {single!r} twice")
+            known.add(single)
+
+
+def _refusal(name: str, expected: str) -> PartError:
+    return PartError("metric", name, expected)
+
+
+METRICS: Registry[type[Metric]] = Registry(
+    "metric",
+    "metrics",
+    {
+        "samples": f"{_FOLDER}.samples:SamplesMetric",
+        "path": f"{_FOLDER}.path:PathMetric",
+        "position_error_mm": f"{_FOLDER}.position_error:PositionErrorMetric",
+        "orientation_error_deg": f"{_FOLDER}.orientation_error:OrientationErrorMetric",
+        "command_error_mm": f"{_FOLDER}.command_error:CommandErrorMetric",
+        "command_orientation_error_deg":
+            f"{_FOLDER}.orientation_error:CommandOrientationErrorMetric",
+        "fixture": f"{_FOLDER}.fixture:FixtureMetric",
+        "force_n": f"{_FOLDER}.force:ForceMetric",
+        "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
+        "ticks": f"{_FOLDER}.ticks:TicksMetric",
+        "nodes": f"{_FOLDER}.nodes:NodesMetric",
+        "topics": f"{_FOLDER}.topics:TopicsMetric",
+    },
+    check_metric,
+)  # fmt: skip
+"""All metrics, in the order of the score."""

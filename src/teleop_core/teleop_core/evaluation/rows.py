@@ -1,0 +1,50 @@
+"""Rows: what a table shows of a metric, beside the published figures."""
+
+from dataclasses import dataclass
+
+from teleop_core.evaluation.accumulators import Spread
+
+MISSING = "–"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row: what it is, its unit, the value, the published value, and whether it is met.
+
+    Rows of one group stand together under its name. ``is_met`` is None where nothing was
+    published.
+    """
+
+    group: str
+    label: str
+    unit: str
+    value: str
+    published: str = ""
+    is_met: bool | None = None
+
+
+def row(
+    group: str, label: str, unit: str, value: float | None, published: float | None = None
+) -> Row:
+    """Row of a number, which is met if it is at most what was published."""
+    is_met = None if value is None or published is None else value <= published
+    return Row(group, label, unit, number(value), number(published, ""), is_met)
+
+
+def spread_rows(
+    group: str, label: str, unit: str, spread: Spread, figures: tuple[float, float] | None = None
+) -> list[Row]:
+    """Three rows of a spread; ``figures`` are the published root mean square and maximum."""
+    rms, largest = figures or (None, None)
+    return [
+        row(group, f"{label}, RMS", unit, spread.rms, rms),
+        row(group, f"{label}, S.D.", unit, spread.sd),
+        row(group, f"{label}, max", unit, spread.max, largest),
+    ]
+
+
+def number(value: float | None, missing: str = MISSING) -> str:
+    """Text with three decimals, two significant digits for small values; ``missing`` for None."""
+    if value is None:
+        return missing
+    return f"{value:.3f}" if value == 0.0 or abs(value) >= 0.0995 else f"{value:#.2g}"

@@ -1,0 +1,175 @@
+"""Scoring: a recording becomes a score, in one pass and in memory that does not grow with it."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.bags.arms import arm_names, of_arm
+from teleop_core.bags.reader import Bag
+from teleop_core.errors import EvaluationError, PartError, RecordingError
+from teleop_core.evaluation.context import Accumulator, Context
+from teleop_core.evaluation.figure import Figure
+from teleop_core.evaluation.gains import Gains
+from teleop_core.evaluation.metric import Metric
+from teleop_core.evaluation.plain import Plain, leaves, plain
+from teleop_core.evaluation.registry import METRICS
+from teleop_core.evaluation.rows import Row
+from teleop_core.evaluation.score import Result, Score, Session
+from teleop_core.evaluation.state_history import read_history
+from teleop_core.evaluation.windows import DisorderError, Window, whole, windows
+from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP
+
+REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
+"""Topics without which there is no score; what needs others is None without them."""
+
+
+class Study(NamedTuple):
+    """A score, and the metrics that a page asks for what it draws."""
+
+    score: Score
+    metrics: tuple[Metric, ...]
+
+    def figures(self) -> list[Figure]:
+        """Plots in the order of the metrics.
+
+        Raises:
+            EvaluationError: A metric cannot draw; the text names it.
+        """
+        place, found = self.score.session.place, []
+        for metric in self.metrics:
+            with _named(place, metric):
+                figures = metric.figures()
+                _insist(metric, figures, Figure)
+                found += figures
+        return found
+
+
+def evaluate(bag: Bag, arm: str = "") -> Score:
+    """Score of one arm of a recording.
+
+    Args:
+        bag: The recording.
+        arm: Name of the arm; empty for the default one.
+
+    Raises:
+        PartError: An added metric is no metric.
+        EvaluationError: Nothing in the recording can be compared, or a metric fails.
+        RecordingError: It lacks one of :data:`REQUIRED`, or is damaged.
+        UnknownNameError: It has no such arm.
+    """
+    return study(bag, arm).score
+
+
+def scores(bag: Bag) -> list[Score]:
+    """Scores of all arms of a recording, the default arm first; raises as :func:`evaluate`."""
+    return [evaluate(bag, arm) for arm in arm_names(bag)]
+
+
+def study(bag: Bag, arm: str = "") -> Study:
+    """Score of one arm with its metrics; raises as :func:`evaluate`."""
+    makers = [METRICS.find(name) for name in METRICS]
+    view = of_arm(bag, arm)
+    view.require(REQUIRED)
+    context, metrics = _run(view, arm or arm_names(bag)[0], makers)
+    results = tuple(_result(context, metric) for metric in metrics)
+    score = Score(_session(context), results)
+    if not score.samples.scored:
+        raise EvaluationError(
+            f"{bag.path}: no {SLAVE_MEASURED_CP.name}{f' of arm {arm}' * bool(arm)} has a valid "
+            f"{SLAVE_SETPOINT_CP.name} of the same tick; they must be recorded together"
+        )
+    return Study(score, tuple(metrics))
+
+
+def studies(bag: Bag) -> list[Study]:
+    """All arms of a recording, the default arm first; raises as :func:`evaluate`."""
+    return [study(bag, arm) for arm in arm_names(bag)]
+
+
+def _run(bag: Bag, arm: str, makers: Sequence[type[Metric]]) -> tuple[Context, list[Metric]]:
+    """Metrics after the whole recording."""
+    wanted = dict.fromkeys(topic for maker in makers for topic in maker.topics)
+    topics = [
+        topic for topic in wanted if topic.name in bag.topics and bag.topics[topic.name].count
+    ]
+    history = read_history(bag)
+    try:
+        context = Context(bag, arm, history)
+        return context, _feed(context, makers, windows(bag, topics, history))
+    except DisorderError:
+        context = Context(bag, arm, history)
+        return context, _feed(context, makers, whole(bag, topics, history))
+
+
+def _feed(
+    context: Context, makers: Sequence[type[Metric]], parts: Iterable[Window]
+) -> list[Metric]:
+    place, metrics = str(context.bag.path), []
+    for maker in makers:
+        with _named(place, maker):
+            metrics.append(context.shared(maker))
+    context.shared(Gains)
+    accumulators = context.begin()
+    # What foreign devices record may be infinite; such samples are left out and counted.
+    with np.errstate(invalid="ignore", over="ignore"):
+        for window in parts:
+            for accumulator in accumulators:
+                with _named(place, accumulator):
+                    accumulator.add(window)
+    return metrics
+
+
+@contextmanager
+def _named(place: str, part: Accumulator | type[Metric]) -> Iterator[None]:
+    """Whatever a metric raises becomes one line that names it; damage of a recording stays."""
+    try:
+        yield
+    except (RecordingError, PartError):
+        raise
+    except Exception as error:  # a metric may be anybody's
+        name = getattr(part, "name", type(part).__name__)
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise EvaluationError(f"{place}: the metric {name!r} failed with {reason}") from error
+
+
+def _result(context: Context, metric: Metric) -> Result:
+    with _named(str(context.bag.path), metric):
+        values, rows = metric.values(), metric.rows()
+        _insist(metric, rows, Row)
+        tree = _checked(metric, plain(values))
+        return Result(metric.name, values, tree if metric.keys else None, tuple(rows))
+
+
+def _insist(metric: Metric, found: object, kind: type[object]) -> None:
+    if not isinstance(found, list) or not all(isinstance(entry, kind) for entry in found):
+        expected = f"a metric whose {kind.__name__.lower()}s() is a list of {kind.__name__}"
+        raise PartError("metric", metric.name, f"{expected}, not {found!r}")
+
+
+def _checked(metric: Metric, tree: dict[str, Plain]) -> dict[str, Plain]:
+    """The values, if they are just under the metric's keys."""
+    paths = [(metric.name, *path) for path in leaves(tree)]
+    given = {".".join(path) for path in paths if any(key.covers(path) for key in metric.keys)}
+    names = {name for key in metric.keys for name in key.names() if "<" not in name}
+    foreign = {".".join(path) for path in paths} - given
+    if foreign or names - given:
+        fault = f"gives {min(foreign)}" if foreign else f"lacks {min(names - given)}"
+        expected = ", ".join(key.path for key in metric.keys) or "none"
+        raise PartError("metric", metric.name, f"true to its keys ({expected}), {fault}")
+    return tree
+
+
+def _session(context: Context) -> Session:
+    bag = context.bag
+    seed = bag.metadata.get("seed", "")
+    return Session(
+        name=bag.path.resolve().name,
+        scenario=bag.metadata.get("scenario") or None,
+        robot=context.robot,
+        seed=int(seed) if seed.isascii() and seed.isdigit() else None,
+        duration_s=(bag.end_ns - bag.start_ns) * 1e-9,
+        gain=context.shared(Gains).gain,
+        arm=context.arm,
+    )

@@ -1,0 +1,61 @@
+"""Stamps: steps between the stamps of every stream, for what counts and what measures time."""
+
+import numpy as np
+
+from teleop_core.evaluation.accumulators import Distribution
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.windows import Window
+from teleop_core.topics import STREAMS, Topic
+
+
+class StampTally:
+    """Accumulator of the steps between the stamps of one topic."""
+
+    def __init__(self) -> None:
+        self._steps = Distribution()
+        self._repeats = 0
+
+    def add(self, window: Window, topic: Topic) -> None:
+        """Take the topic's samples of a window."""
+        own = window.own(topic)
+        if own.stop > own.start:
+            stamps = window.series[topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
+            # A slave without any command yet holds its pose under the stamp 0.
+            steps = np.diff(stamps)[stamps[:-1] > 0]
+            self._repeats += int((steps == 0).sum())
+            self._steps.add(steps[steps > 0])
+
+    @property
+    def period_us(self) -> int | None:
+        """Nominal period: the median step, [µs]; None with fewer than two samples."""
+        return self._steps.quantile_us(0.5)
+
+    def gaps(self) -> int:
+        """Samples that are missing at the nominal period.
+
+        A stamp that came again makes up for one that was passed over: the slave holds a command
+        when none came, and takes the newest when several did.
+        """
+        period = self.period_us
+        if not period:
+            return 0
+        lost = np.maximum(np.round(self._steps.values_us / period) - 1, 0)
+        return max(0, int((lost * self._steps.counts).sum()) - self._repeats)
+
+
+class StampTallies:
+    """Accumulator of the steps of all streams of a recording.
+
+    Attributes:
+        of: Tally per topic name; only of streams that were recorded.
+    """
+
+    def __init__(self, context: Context) -> None:
+        topics = context.bag.topics
+        self._topics = [topic for topic in STREAMS if topic.name in topics]
+        self.of = {topic.name: StampTally() for topic in self._topics}
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        for topic in self._topics:
+            self.of[topic.name].add(window, topic)

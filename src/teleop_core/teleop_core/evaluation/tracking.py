@@ -1,0 +1,84 @@
+"""Tracking: the slave's poses beside those it should have had, shared by all metrics of errors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.bags.reader import Series
+from teleop_core.evaluation.accumulators import Integers
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.pairing import NONE, latest, same_tick
+from teleop_core.evaluation.pose_errors import PoseErrors, pose_errors
+from teleop_core.evaluation.traces import Envelope
+from teleop_core.evaluation.windows import Window
+from teleop_core.geometry import Array
+from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
+
+TRACKED: tuple[Topic, ...] = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
+"""Topics that :func:`tracked` compares."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """Poses of a window, rows x, y, z [m] and quaternion w, x, y, z; NaN without a partner.
+
+    Attributes:
+        log_ns: When they were recorded, shape (N,), [ns].
+        poses: slave/measured_cp, shape (N, 7).
+        setpoints: slave/setpoint_cp of the same tick, shape (N, 7).
+        commands: Latest slave/servo_cp at the stamp of the pose, shape (N, 7).
+        is_paired: Whether the setpoint of the same tick was recorded, shape (N,).
+        against: Errors against the setpoints.
+        behind: Errors against the commands.
+    """
+
+    log_ns: Integers
+    poses: Array
+    setpoints: Array
+    commands: Array
+    is_paired: NDArray[np.bool_]
+    against: PoseErrors
+    behind: PoseErrors
+
+
+def tracked(window: Window) -> Tracked:
+    """The slave's poses of a window with their errors, computed once."""
+    return window.once(_track)
+
+
+def _track(window: Window) -> Tracked:
+    measured, setpoint = window.samples(SLAVE_MEASURED_CP), window.around(SLAVE_SETPOINT_CP)
+    command, all_measured = window.around(SLAVE_SERVO_CP), window.around(SLAVE_MEASURED_CP)
+    partner = same_tick(all_measured.log_ns, setpoint.log_ns)[window.own(SLAVE_MEASURED_CP)]
+    poses, setpoints = measured.values, _rows(setpoint, partner)
+    commands = _rows(command, latest(measured.stamp_ns, command.stamp_ns))
+    return Tracked(
+        measured.log_ns, poses, setpoints, commands, partner != NONE,
+        pose_errors(poses, setpoints), pose_errors(poses, commands),
+    )  # fmt: skip
+
+
+def _rows(series: Series, index: Integers) -> Array:
+    """Rows of poses by index, shape (N, 7); NaN for those without a partner."""
+    if not len(series):
+        return np.full((len(index), 7), np.nan)
+    return np.where((index == NONE)[:, None], np.nan, series.values[index])
+
+
+class ErrorTrace:
+    """Envelope of all errors, for drawing.
+
+    Attributes:
+        envelope: Position error, command error [mm], roll, pitch, yaw, angle [deg]; 6 columns.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self.envelope = Envelope(context.bag.start_ns, context.bag.end_ns, columns=6)
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        found = tracked(window)
+        turns = (*found.against.roll_pitch_yaw_deg.T, found.against.angle_deg)
+        errors = np.stack((found.against.position_mm, found.behind.position_mm, *turns), axis=1)
+        self.envelope.add(found.log_ns, errors)
