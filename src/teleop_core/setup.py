@@ -29,7 +29,7 @@ setup(
     python_requires=">=3.11",
     install_requires=[
         "numpy",
-        "numba",
+        "numba>=0.68,<0.69",
         "mcap",
         "rosbags",
         "lz4",

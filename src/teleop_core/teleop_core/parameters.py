@@ -5,9 +5,12 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import UnionType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from teleop_core.errors import ParameterError, UnknownNameError
+
+if TYPE_CHECKING:
+    from teleop_core.registry import Registry
 
 Group = TypeVar("Group")
 Scalar = bool | int | float | str
@@ -45,6 +48,58 @@ def parameter(
         "choices": choices, "length": length, "fixed": fixed,
     }  # fmt: skip
     return field(default=default, metadata=meta)
+
+
+@dataclass(frozen=True)
+class NoParameters:
+    """Group of a part that has nothing to set."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which part of a registry a group uses, and the parameters of every part there is.
+
+    Attributes:
+        kind: Name of the part.
+        groups: Parameters of each part by its name; those of parts that are not used wait.
+    """
+
+    kind: str
+    groups: Mapping[str, Any]
+
+    @property
+    def parameters(self) -> Any:
+        """Parameters of the part that is used."""
+        return self.groups[self.kind]
+
+
+def choice(registry: "Registry[Any]", default: str, *, doc: str, fixed: bool = False) -> Any:
+    """Dataclass field, to be called ``kind``, that chooses a part by name.
+
+    Beside ``kind`` the group then has the parameters of every part, each below the part's name:
+    ``fixture.kind`` and ``fixture.sphere.diameter``. Parts have a group in ``parameters``.
+
+    Args:
+        registry: Where the parts are.
+        default: Part when nothing else is said.
+        doc: One line for tables and the ROS descriptor.
+        fixed: Whether it can only be set before the stage is built.
+    """
+    meta = {"registry": registry, "default": default, "doc": doc, "fixed": fixed}
+    return field(default_factory=lambda: _make_choice(registry, default, {}), metadata=meta)
+
+
+def _make_choice(registry: "Registry[Any]", kind: str, values: Mapping[str, object]) -> Choice:
+    groups = {
+        name: _make(registry.find(name).parameters, _below(name, values)) for name in registry
+    }
+    return Choice(kind, groups)
+
+
+def _below(name: str, values: Mapping[str, object]) -> dict[str, object]:
+    """Values of a nested group, without its name."""
+    start = name + "."
+    return {key[len(start) :]: value for key, value in values.items() if key.startswith(start)}
 
 
 @dataclass(frozen=True)
@@ -110,6 +165,9 @@ def specs(group: type, prefix: str = "") -> Iterator[Spec]:
     hints = get_type_hints(group)
     for entry in dataclasses.fields(group):
         hint = hints[entry.name]
+        if hint is Choice:
+            yield from _choice_specs(entry, prefix)
+            continue
         if dataclasses.is_dataclass(hint):
             yield from specs(hint, f"{prefix}{entry.name}.")  # type: ignore[arg-type]
             continue
@@ -119,6 +177,17 @@ def specs(group: type, prefix: str = "") -> Iterator[Spec]:
         element = get_args(hint)[0] if kind is tuple else kind
         default: Any = entry.default
         yield Spec(prefix + entry.name, kind, element, default, **entry.metadata)
+
+
+def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
+    meta = entry.metadata
+    names, kind = meta["registry"].names(), prefix + entry.name
+    text: dict[str, Any] = {"unit": "", "doc": meta["doc"], "lower": None, "upper": None}
+    yield Spec(
+        kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"]
+    )
+    for name in names:
+        yield from specs(meta["registry"].find(name).parameters, f"{prefix}{name}.")
 
 
 def build(group: type[Group], values: Mapping[str, object], prefix: str = "") -> Group:
@@ -150,10 +219,11 @@ def _make(group: type[Group], values: Mapping[str, object]) -> Group:
     made: dict[str, object] = {}
     for entry in dataclasses.fields(group):  # type: ignore[arg-type]
         inner = hints[entry.name]
-        if dataclasses.is_dataclass(inner):
-            start = entry.name + "."
-            nested = {k[len(start) :]: v for k, v in values.items() if k.startswith(start)}
-            made[entry.name] = _make(inner, nested)  # type: ignore[arg-type]
+        if inner is Choice:
+            kind = str(values.get(entry.name, entry.metadata["default"]))
+            made[entry.name] = _make_choice(entry.metadata["registry"], kind, values)
+        elif dataclasses.is_dataclass(inner):
+            made[entry.name] = _make(inner, _below(entry.name, values))  # type: ignore[arg-type]
         elif entry.name in values:
             value = values[entry.name]
             made[entry.name] = tuple(value) if isinstance(value, list) else value
@@ -165,7 +235,11 @@ def values_of(group: object, prefix: str = "") -> dict[str, Value]:
     out: dict[str, Value] = {}
     for entry in dataclasses.fields(group):  # type: ignore[arg-type]
         value = getattr(group, entry.name)
-        if dataclasses.is_dataclass(value):
+        if isinstance(value, Choice):
+            out[prefix + entry.name] = value.kind
+            for name, inner in value.groups.items():
+                out |= values_of(inner, f"{prefix}{name}.")
+        elif dataclasses.is_dataclass(value):
             out |= values_of(value, f"{prefix}{entry.name}.")
         else:
             out[prefix + entry.name] = value

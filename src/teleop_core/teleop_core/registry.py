@@ -28,6 +28,7 @@ class Registry(Generic[Part]):
         builtin: Names to places ``module:attribute`` in this package.
         check: Raises :class:`~teleop_core.errors.PartError` for what is no such part, else returns
             it.
+        trial: Tries a part that is not of this package, and raises as ``check`` does.
     """
 
     def __init__(
@@ -36,9 +37,10 @@ class Registry(Generic[Part]):
         kinds: str,
         builtin: Mapping[str, str],
         check: Callable[[str, object], Part],
+        trial: Callable[[Part], None] | None = None,
     ) -> None:
         self.kind, self.group = kind, f"teleop_core.{kinds}"
-        self._builtin, self._check = dict(builtin), check
+        self._builtin, self._check, self._trial = dict(builtin), check, trial
         self._parts: dict[str, Part] = {}
         self._own: set[str] = set()
         self._installed: dict[str, EntryPoint] | None = None
@@ -58,7 +60,10 @@ class Registry(Generic[Part]):
             PartError: An installed part cannot be loaded, or is no such part.
         """
         if name not in self._parts:
-            self._parts[name] = self._check(name, self._load(name))
+            part = self._check(name, self._load(name))
+            if name not in self._builtin and self._trial is not None:
+                self._trial(part)
+            self._parts[name] = part
         return self._parts[name]
 
     def add(self, name: str, part: object, *, replace: bool = False) -> Part:
@@ -79,6 +84,8 @@ class Registry(Generic[Part]):
         is_ours = replace and name in self._own
         if not is_ours and name in self.names():
             raise PartError(self.kind, name, "a name that is free; this one is used already")
+        if self._trial is not None:
+            self._trial(checked)
         self._own.add(name)
         self._parts[name] = checked
         return checked

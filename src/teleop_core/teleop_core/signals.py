@@ -1,60 +1,65 @@
-"""Signals: the newest value of every topic, as one record that all stages read and write.
+"""Signals: one record per stage with the newest value and stamp of every topic at its ports.
 
-In virtual time the stages share one record, so a stage reads what the stages before it wrote in
-this tick and what the stages after it wrote in the last one. As a node, each stage has a record of
-its own that its subscriptions fill and its publishers empty. The arithmetic is the same.
+A stage knows nothing of the others: it reads and writes the fields of its own record. In virtual
+time the composed tick copies values from record to record; as a node, subscriptions fill the
+record and publishers empty it. The arithmetic is the same.
+
+Every topic has two fields, as :attr:`Topic.field <teleop_core.topics.Topic.field>` names them: the
+columns of its kind, and ``<field>_ns``, its stamp [ns].
 """
 
+from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
-
 from teleop_core.geometry import Array
-from teleop_core.kernels import kernel
-from teleop_core.topics import STREAMS, Kind
+from teleop_core.kernels import kernel, records
+from teleop_core.topics import TELEOP_STATE, Kind, Topic
 
 TICK_NS = 1_000_000
-"""Control period of every stage [ns]."""
-DT = 1e-3
-"""Control period of every stage [s]."""
+"""Control period of every stage unless a session says otherwise [ns]."""
+DT = TICK_NS / 1e9
+"""The same in seconds."""
 
-# What teleop/state reports, beside the streams; f8 so that a change is one comparison of rows.
-STATE_FIELDS = (
-    "is_following", "is_clutched", "is_fine", "gain", "is_fixture_on",
-    "fixture_center_x", "fixture_center_y", "fixture_center_z",
-    "fixture_size_x", "fixture_size_y", "fixture_size_z",
-)  # fmt: skip
+STATE_FIELDS = TELEOP_STATE.columns
 STATE = {name: index for index, name in enumerate(STATE_FIELDS)}
+Field = tuple[str, str] | tuple[str, str, tuple[int, ...]]
 
 
-def signals_dtype(joints: int) -> np.dtype[Any]:
-    """Record type for a slave with this many joints.
+def topic_fields(topics: Iterable[Topic], joints: int) -> list[Field]:
+    """Fields of values and stamps of some topics, for a robot with this many joints."""
+    fields: list[Field] = []
+    for topic in topics:
+        fields.append((topic.field, "f8", (topic.width(joints),)))
+        fields.append((f"{topic.field}_ns", "i8"))
+    return fields
 
-    One field per stream, named as :attr:`Topic.field`, with the columns of its kind; ``stamp_ns``
-    of the master sample in force; ``now_ns``, the time of the slave's tick; ``servo_stamp_ns``
-    and ``setpoint_stamp_ns``, the stamps that slave/servo_jp and slave/setpoint_js carry;
-    ``teleop_state``, the columns :data:`STATE_FIELDS`; and how inverse kinematics and the slave
-    took the command.
+
+def make_signals(
+    topics: Iterable[Topic], joints: int, notes: Iterable[Field] = (), count: int = 1
+) -> Any:
+    """Zeroed signals (count,) with unit quaternions, so that every pose is valid from the start.
+
+    Args:
+        topics: What the record has ports for.
+        joints: Number of joints of the arm; 0 if no topic has joints.
+        notes: Further fields, which are recorded by nobody.
+        count: Number of records.
+
+    Returns:
+        Records with ``now_ns``, the time of the tick [ns], the topics' fields, and the notes.
     """
-    streams = [(topic.field, "f8", (topic.kind.width(joints),)) for topic in STREAMS]
-    names = ("stamp_ns", "now_ns", "servo_stamp_ns", "setpoint_stamp_ns")
-    stamps = [(name, "i8") for name in names]
-    report = [
-        ("teleop_state", "f8", (len(STATE_FIELDS),)),
-        ("ik_residual", "f8", (2,)),
-        ("ik_status", "i8"),
-        ("command_status", "i8"),
-    ]
-    return np.dtype([*stamps, *streams, *report])
-
-
-def make_signals(joints: int, count: int = 1) -> Any:
-    """Zeroed signals (count,) with unit quaternions, so that every pose is valid from the start."""
-    signals = np.zeros(count, signals_dtype(joints))
-    for topic in STREAMS:
+    ports = list(topics)
+    signals = records([("now_ns", "i8"), *topic_fields(ports, joints), *notes], count)
+    for topic in ports:
         if topic.kind is Kind.POSE:
             signals[topic.field][:, 3] = 1.0
     return signals
+
+
+def assign(target: Any, source: Any) -> None:
+    """Give a record the values of another of its type, or 0 for all of its fields."""
+    for name in target.dtype.names:
+        target[name] = source if isinstance(source, int) else source[name]
 
 
 @kernel
@@ -62,3 +67,10 @@ def copy(source: Array, target: Array) -> None:
     """Copy a row, element by element: numba cannot pass fields of records to typed pointers."""
     for i in range(target.shape[0]):
         target[i] = source[i]
+
+
+@kernel
+def add(source: Array, target: Array) -> None:
+    """Add a row to another, element by element."""
+    for i in range(target.shape[0]):
+        target[i] += source[i]

@@ -1,6 +1,10 @@
-"""Topics: the single list of what travels between the stages, with its message and its meaning."""
+"""Topics: the single list of what travels between the stages, with its message and its meaning.
 
-from dataclasses import dataclass
+A topic is described once, below the namespace of its arm: the default arm has the plain names, an
+arm called ``left`` has ``left/slave/servo_cp`` and so on.
+"""
+
+from dataclasses import dataclass, replace
 from enum import Enum
 
 
@@ -48,45 +52,106 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True)
+class Stamp:
+    """Rule for the header's stamp of a topic: which time it means.
+
+    Attributes:
+        text: The rule in words.
+        of: Name of the topic whose stamp is passed on; empty where it is the time of sampling.
+        is_in_force: Whether the writer itself says which command's stamp it is, because it may
+            hold an older one. Such a stamp may come again, and is 0 before the first command.
+    """
+
+    text: str
+    of: str = ""
+    is_in_force: bool = False
+
+
+SAMPLED = Stamp("sampling time")
+
+
+def passed_on(topic: str) -> Stamp:
+    """Stamp of the message of ``topic`` that is answered."""
+    return Stamp(f"of the {topic} it answers", topic)
+
+
+def in_force(topic: str) -> Stamp:
+    """Stamp of the message of ``topic`` that is in force."""
+    return Stamp(f"of the {topic} in force", topic, is_in_force=True)
+
+
+@dataclass(frozen=True)
 class Topic:
-    """One topic; ``stamp`` says in words what the header's stamp means."""
+    """One topic of an arm.
+
+    Attributes:
+        name: Name below the arm's namespace, such as ``slave/servo_cp``.
+        kind: What its values are.
+        stamp: Which time its header carries.
+        frame_id: Frame of the header, below the arm's namespace.
+        quality: How it is transported.
+        columns: Names of the numbers of a report; empty for streams.
+        adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
+            another source of force; empty for a topic of its own.
+        arm: Namespace; empty for the default arm.
+    """
 
     name: str
     kind: Kind
-    stamp: str
+    stamp: Stamp = SAMPLED
     frame_id: str = ""
     quality: Quality = Quality.STREAM
+    columns: tuple[str, ...] = ()
+    adds_to: str = ""
+    arm: str = ""
+
+    def of_arm(self, arm: str) -> "Topic":
+        """The same topic of a named arm: in its namespace, with its frames."""
+        if not arm or self.arm == arm:
+            return self
+        frame = f"{arm}/{self.frame_id}" if self.frame_id else ""
+        return replace(self, name=f"{arm}/{self.name}", frame_id=frame, arm=arm)
 
     @property
     def field(self) -> str:
-        """Name of the topic's column in the signals of a session."""
+        """Name of the topic's column in records; its stamp is in ``<field>_ns``."""
         return self.name.replace("/", "_")
 
+    def width(self, joints: int) -> int:
+        """Number of its numbers for a robot with this many joints."""
+        return len(self.columns) if self.kind is Kind.REPORT else self.kind.width(joints)
 
-MASTER_MEASURED_CP = Topic("master/measured_cp", Kind.POSE, "sampling time", "master_base")
-MASTER_MEASURED_CV = Topic("master/measured_cv", Kind.TWIST, "as measured_cp", "master_base")
-MASTER_MEASURED_CF = Topic(
-    "master/measured_cf", Kind.WRENCH, "force really applied at this sample", "master_base"
+
+MASTER_MEASURED_CP = Topic("master/measured_cp", Kind.POSE, SAMPLED, "master_base")
+MASTER_MEASURED_CV = Topic("master/measured_cv", Kind.TWIST, SAMPLED, "master_base")
+MASTER_MEASURED_CF = Topic("master/measured_cf", Kind.WRENCH, SAMPLED, "master_base")
+MASTER_BUTTONS = Topic("master/buttons", Kind.BUTTONS, SAMPLED, "master_base")
+MASTER_SERVO_CF = Topic(
+    "master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base"
 )
-MASTER_BUTTONS = Topic("master/buttons", Kind.BUTTONS, "time of the sample", "master_base")
-MASTER_SERVO_CF = Topic("master/servo_cf", Kind.WRENCH, "the measured_cp it answers", "master_base")
-SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, "the measured_cp used", "slave_base")
-SLAVE_SERVO_JP = Topic("slave/servo_jp", Kind.JOINTS, "passed on from servo_cp", "slave_base")
+SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, passed_on("master/measured_cp"), "slave_base")
+SLAVE_SERVO_JP = Topic("slave/servo_jp", Kind.JOINTS, passed_on("slave/servo_cp"), "slave_base")
 SLAVE_SETPOINT_JS = Topic(
-    "slave/setpoint_js", Kind.JOINTS, "passed on from the servo_jp in force", "slave_base"
+    "slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base"
 )
-SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, "as setpoint_js", "slave_base")
-SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, "sampling time", "slave_base")
-SLAVE_MEASURED_CP = Topic("slave/measured_cp", Kind.POSE, "as measured_js", "slave_base")
+SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, in_force("slave/servo_jp"), "slave_base")
+SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, SAMPLED, "slave_base")
+SLAVE_MEASURED_CP = Topic("slave/measured_cp", Kind.POSE, SAMPLED, "slave_base")
 TELEOP_STATE = Topic(
-    "teleop/state", Kind.REPORT, "the sample that changed it", quality=Quality.LATCHED
-)
-DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, "time of the report", quality=Quality.REPORT)
+    "teleop/state", Kind.REPORT, passed_on("master/measured_cp"), quality=Quality.LATCHED,
+    columns=(
+        "is_following", "is_clutched", "is_fine", "gain", "is_fixture_on",
+        "fixture_center_x", "fixture_center_y", "fixture_center_z",
+        "fixture_size_x", "fixture_size_y", "fixture_size_z",
+    ),
+)  # fmt: skip
+DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (
     MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_SERVO_CF,
     SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP, SLAVE_MEASURED_JS,
     SLAVE_MEASURED_CP,
 )  # fmt: skip
+"""Topics of the built-in stages that carry one message per tick."""
 ALL = (*STREAMS, TELEOP_STATE, DIAGNOSTICS)
 BY_NAME = {topic.name: topic for topic in ALL}

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from teleop_core.bags import compression
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.parameters import parameter
+from teleop_core.stage import Stage
 from teleop_core.topics import BY_NAME, Kind, Topic
 
 
@@ -33,20 +34,31 @@ class RecordingParameters:
             raise UnknownNameError("compression", self.compression, compression.NAMES)
         if self.every < 1:
             raise ParameterError("every", self.every, "at least 1")
-        for name in (*self.topics, *(entry.partition("=")[0] for entry in self.every_of)):
-            if name not in BY_NAME:
-                raise UnknownNameError("recorded topic", name, BY_NAME)
         for entry in self.every_of:
             number = entry.partition("=")[2]
             if not (number.isascii() and number.isdigit() and int(number) > 0):
                 raise ParameterError("every_of", entry, "topic=n with a whole number n >= 1")
 
     def every_nth(self, topics: Iterable[Topic]) -> dict[str, int]:
-        """Of which samples one is recorded, for each topic; 0 if the topic is not recorded."""
+        """Of which samples one is recorded, for each topic; 0 if the topic is not recorded.
+
+        Raises:
+            UnknownNameError: A wanted topic or exception is none of them.
+        """
         exceptions = dict(entry.split("=") for entry in self.every_of)
+        declared = list(topics)
+        known = {topic.name for topic in declared} | set(BY_NAME)
+        for name in (*self.topics, *exceptions):
+            if name not in known:
+                raise UnknownNameError("recorded topic", name, sorted(known))
         out = {}
-        for topic in topics:
+        for topic in declared:
             number = 1 if topic.kind is Kind.REPORT else self.every
             is_wanted = not self.topics or topic.name in self.topics
             out[topic.name] = int(exceptions.get(topic.name, number)) * is_wanted
         return out
+
+
+RECORDER = Stage("recorder", RecordingParameters, reads=(), writes=(),
+                 node="teleop_core.nodes.recorder:RecorderNode")  # fmt: skip
+"""The recorder; it reads every topic of its graph, of all arms."""

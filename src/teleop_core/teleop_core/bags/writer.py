@@ -50,7 +50,8 @@ class BagWriter:
     Args:
         path: Directory to make.
         topics: Topics that may be written; those that the parameters deselect are passed over.
-        joint_names: Joints of the robot, in the order of the columns.
+        joint_names: Joints of the robot, in the order of the columns; with several arms those of
+            each by its namespace.
         parameters: Which topics are recorded, at what rate and how compressed.
         compression: Takes the place of ``parameters.compression``.
         metadata: Names and texts stored with the recording: configuration, seed.
@@ -64,7 +65,7 @@ class BagWriter:
         self,
         path: Path | str,
         topics: Iterable[Topic],
-        joint_names: tuple[str, ...],
+        joint_names: tuple[str, ...] | Mapping[str, tuple[str, ...]],
         *,
         parameters: RecordingParameters | None = None,
         compression: str | None = None,
@@ -76,13 +77,14 @@ class BagWriter:
         if compression is not None:
             self.parameters = replace(self.parameters, compression=compression)
         declared = list(topics)
+        named = joint_names if isinstance(joint_names, Mapping) else {"": joint_names}
         every = self.parameters.every_nth(declared)
         self._topics = [topic for topic in declared if every[topic.name]]
         numbers = {topic.name: i for i, topic in enumerate(self._topics, start=1)}
         self._channels = {
             topic.name: _Channel(
                 numbers.get(topic.name, 0), every[topic.name],
-                None if topic.kind is Kind.REPORT else layout(topic, joint_names),
+                None if topic.kind is Kind.REPORT else layout(topic, named.get(topic.arm, ())),
             )
             for topic in declared
         }  # fmt: skip

@@ -113,7 +113,7 @@ def _views() -> Callable[..., Array]:
             if len(known) >= _MOST_VIEWS:
                 known.clear()
             address, *shape = place
-            memory = (ctypes.c_double * math.prod(shape)).from_address(address)
+            memory: Any = (ctypes.c_double * math.prod(shape)).from_address(address)
             found = known[place] = np.ndarray(shape, np.float64, memory)
         return found
 

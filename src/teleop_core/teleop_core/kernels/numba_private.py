@@ -111,20 +111,20 @@ class InnerDispatcher(Dispatcher):
         )
 
 
-def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Dispatcher:
+def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Any:
     """Kernel that is compiled when it is first called."""
     if is_inner:
         return InnerDispatcher(function, targetoptions={**_OPTIONS, "no_cpython_wrapper": True})
     return Dispatcher(function, targetoptions=_OPTIONS)
 
 
-def generated_dispatcher(function: FunctionType) -> Dispatcher:
+def generated_dispatcher(function: FunctionType) -> Any:
     """Kernel without a source file, whose qualified name alone says under what it is cached."""
     _generated.add(function)
     return dispatcher(function)
 
 
-def c_function(function: Callable[..., Any], signature: Any) -> Any:
+def c_function(function: Any, signature: Any) -> Any:
     """Function of a fixed signature, kernel or not, as a value that kernels call.
 
     What :func:`numba.cfunc` does, but with our stamp: it shares a cache file with the kernel of

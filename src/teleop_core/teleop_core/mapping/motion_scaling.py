@@ -2,38 +2,41 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from teleop_core.errors import ParameterError
+from teleop_core.fixtures import FIXTURES, shape_of
 from teleop_core.geometry import (
     Array,
     multiply_quaternions,
     quaternion_from_rotation,
     rotation,
 )
-from teleop_core.kernels import bound, inner, kernel
-from teleop_core.mapping.fixtures import box_penetration, wall_force
-from teleop_core.parameters import parameter
-from teleop_core.signals import STATE, make_signals
+from teleop_core.kernels import inner, kernel, records
+from teleop_core.mapping.walls import wall_force
+from teleop_core.parameters import Choice, choice, parameter, values_of
+from teleop_core.signals import DT, STATE
+from teleop_core.stage import RunningStage, Stage
+from teleop_core.topics import (
+    MASTER_BUTTONS,
+    MASTER_MEASURED_CP,
+    MASTER_SERVO_CF,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+    TELEOP_STATE,
+)
 
 MODES = ("coarse", "fine")
-
-# Axes of the master's base in the slave's: x_S = -z_P, y_S = -x_P, z_S = y_P (Vongbunyong 2008,
-# eq. 6.2.3), and of the slave's tool in the stylus.
-R_SLAVE_MASTER = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-R_STYLUS_TOOL = np.diag([1.0, -1.0, -1.0])
+AXES = ("x", "-x", "y", "-y", "z", "-z")
 
 
 @dataclass(frozen=True, kw_only=True)
 class FixtureParameters:
-    """The box that the fixture button puts around the hand."""
+    """What the fixture button puts around the hand."""
 
-    size: tuple[float, ...] = parameter(
-        (0.03, 0.03, 0.03), unit="m", lower=1e-4, upper=0.5, length=3,
-        doc="wall to wall on the master's x, y, z; the slave's box is this times the gain",
-    )  # fmt: skip
+    kind: Choice = choice(FIXTURES, "box", doc="shape of the fixture")
     wall: str = parameter(
         "soft", choices=("soft", "hard"), doc="spring up to max_force, or max_force at once"
     )
@@ -60,6 +63,14 @@ class MotionScalingParameters:
         math.pi / 2, unit="rad", lower=-math.pi, upper=math.pi,
         doc="turn of the slave's tool about its axis; π/2 aligns it with the home pose",
     )  # fmt: skip
+    axes: tuple[str, ...] = parameter(
+        ("-z", "-x", "y"), choices=AXES, length=3,
+        doc="the slave's x, y, z as axes of the master's base; the default is that of the source",
+    )  # fmt: skip
+    tool_axes: tuple[str, ...] = parameter(
+        ("x", "-y", "-z"), choices=AXES, length=3,
+        doc="the tool's x, y, z as axes of the stylus, before tool_roll",
+    )  # fmt: skip
     feedback_timeout: float = parameter(
         0.1, unit="s", lower=0.002, upper=5.0,
         doc="slave counts as not following when its setpoint is older than this",
@@ -69,28 +80,54 @@ class MotionScalingParameters:
     def __post_init__(self) -> None:
         if self.fine_gain > self.coarse_gain:
             raise ParameterError("fine_gain", self.fine_gain, f"<= coarse_gain {self.coarse_gain}")
+        for name in ("axes", "tool_axes"):
+            axis_map(name, getattr(self, name))
 
 
-_PARAMETERS = np.dtype(
-    [("gain", "f8", (2,)), ("stylus_tool", "f8", (4,)), ("slave_master", "f8", (4,)),
-     ("size", "f8", (3,)), ("stiffness", "f8"), ("max_force", "f8"), ("timeout_ns", "i8")]
-)  # fmt: skip
-_STATE = np.dtype(
-    [("buttons", "f8", (3,)), ("is_fine", "i8"), ("is_engaged", "i8"), ("must_latch", "i8"),
-     ("is_fixture_on", "i8"),
-     ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
-     ("alignment", "f8", (4,))]
-)  # fmt: skip
+_PARAMETERS = [
+    ("gain", "f8", (2,)), ("stylus_tool", "f8", (4,)), ("slave_master", "f8", (4,)),
+    ("axis", "i8", (3,)), ("sign", "f8", (3,)),
+    ("size", "f8", (3,)), ("stiffness", "f8"), ("max_force", "f8"), ("timeout_ns", "i8"),
+]  # fmt: skip
+_STATE = [
+    ("buttons", "f8", (3,)), ("is_fine", "i8"), ("is_engaged", "i8"), ("must_latch", "i8"),
+    ("is_fixture_on", "i8"),
+    ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
+    ("alignment", "f8", (4,)),
+]  # fmt: skip
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
 _CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
 
 
+def axis_map(name: str, axes: tuple[str, ...]) -> Array:
+    """Rotation (3, 3) whose rows pick axes by name: ("-z", "-x", "y") maps z to -x and so on.
+
+    Args:
+        name: Of the parameter, for messages.
+        axes: Three of :data:`AXES`.
+
+    Raises:
+        ParameterError: An axis is used twice, or the map would mirror.
+
+    Source:
+        Vongbunyong 2008, eq. 6.2.3, for the defaults.
+    """
+    matrix = np.zeros((3, 3))
+    for row, axis in enumerate(axes):
+        matrix[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
+    if not math.isclose(float(np.linalg.det(matrix)), 1.0):
+        raise ParameterError(name, axes, "three axes at right angles that do not mirror")
+    return matrix
+
+
 @kernel
-def to_slave_axes(master: Array, slave: Array) -> None:
-    """Write a vector (3,) of the master's base in the slave's axes: (-z, -x, y)."""
-    x, y, z = master[0], master[1], master[2]
-    slave[0], slave[1], slave[2] = -z, -x, y
+def to_slave_axes(p: Any, master: Array, slave: Array) -> None:
+    """Write a vector (3,) of the master's base in the slave's axes."""
+    x, y, z = (
+        p.sign[0] * master[p.axis[0]], p.sign[1] * master[p.axis[1]], p.sign[2] * master[p.axis[2]]
+    )  # fmt: skip
+    slave[0], slave[1], slave[2] = x, y, z
 
 
 @kernel
@@ -109,7 +146,7 @@ def _toggle_mode(s: Any, buttons: Array) -> None:
 
 @inner
 def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
-    """Put the box around the present position, or take it away, at the rising edge."""
+    """Put the fixture around the present position, or take it away, at the rising edge."""
     if buttons[1] > s.buttons[1]:
         s.is_fixture_on = 1 - s.is_fixture_on
         for i in range(3):
@@ -120,7 +157,7 @@ def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
 def _latch(s: Any, position: Array, tool: Array) -> None:
     """Hold the command and measure further motion from here: no step, whatever happened before.
 
-    The box goes with the hand, so that it stays where it is around the slave.
+    The fixture goes with the hand, so that it stays where it is around the slave.
     """
     if s.is_engaged:
         for i in range(3):
@@ -133,12 +170,12 @@ def _latch(s: Any, position: Array, tool: Array) -> None:
 
 
 @inner
-def _move(s: Any, gain: float, position: Array, tool: Array) -> None:
+def _move(p: Any, s: Any, gain: float, position: Array, tool: Array) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = np.empty(3)
     for i in range(3):
         step[i] = position[i] - s.master[i]
-    to_slave_axes(step, step)
+    to_slave_axes(p, step, step)
     for i in range(3):
         s.command[i] += gain * step[i]
     multiply_quaternions(s.alignment, tool, s.command[3:7])
@@ -152,7 +189,7 @@ def _move(s: Any, gain: float, position: Array, tool: Array) -> None:
 
 @inner
 def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
-    """Write teleop_state; the box in the slave's base, where it is what the slave is held in."""
+    """Write teleop_state; the fixture in the slave's base, where it holds the slave in."""
     state = row.teleop_state
     state[_FOLLOWING] = 1.0 if is_following else 0.0
     state[_CLUTCHED], state[_FINE] = s.buttons[0], s.is_fine
@@ -163,17 +200,23 @@ def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
         offset = np.empty(3)
         for i in range(3):
             offset[i] = s.center[i] - s.master[i]
-        to_slave_axes(offset, offset)
+        to_slave_axes(p, offset, offset)
         for i in range(3):
-            # Rounded to a nanometre: a box that stands still reports no change.
+            # Rounded to a nanometre: a fixture that stands still reports no change.
             state[_CENTER + i] = round((s.command[i] + gain * offset[i]) * 1e9) / 1e9
-        state[_SIZE], state[_SIZE + 1] = gain * p.size[2], gain * p.size[0]
-        state[_SIZE + 2] = gain * p.size[1]
+            state[_SIZE + i] = gain * p.size[p.axis[i]]
 
 
 @kernel
-def motion_scaling_step(p: Any, s: Any, row: Any) -> None:
+def motion_scaling_step(p: Any, s: Any, fixture: Any, row: Any, dt: float) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        fixture: :class:`Shape`.
+        row: Signals.
+        dt: Tick [s].
 
     Position is incremental (X_S += gain X_P), so a change of gain alone moves nothing;
     orientation follows the stylus absolutely, up to an alignment that is latched whenever the
@@ -186,7 +229,7 @@ def motion_scaling_step(p: Any, s: Any, row: Any) -> None:
     pose, buttons = row.master_measured_cp, row.master_buttons
     _toggle_mode(s, buttons)
     gain = p.gain[s.is_fine]
-    is_following = row.stamp_ns - row.setpoint_stamp_ns <= p.timeout_ns
+    is_following = row.master_measured_cp_ns - row.slave_setpoint_cp_ns <= p.timeout_ns
     tool = np.empty(4)
     mapped_orientation(p, pose[3:7], tool)
     if not (is_following and s.is_engaged):
@@ -196,35 +239,42 @@ def motion_scaling_step(p: Any, s: Any, row: Any) -> None:
     if s.must_latch or buttons[0] > 0.0 or s.buttons[0] > 0.0:
         _latch(s, pose, tool)
     else:
-        _move(s, gain, pose, tool)
+        _move(p, s, gain, pose, tool)
     _toggle_fixture(s, buttons, pose)
     s.is_engaged, s.must_latch = 1, 0
     for i in range(3):
         s.master[i], s.buttons[i] = pose[i], buttons[i]
-    depth = np.zeros(3)
-    length = box_penetration(pose, s.center, p.size, depth) if s.is_fixture_on else 0.0
-    wall_force(depth, length, p.stiffness, p.max_force, row.master_servo_cf)
+    length = 0.0
+    if s.is_fixture_on:
+        for i in range(3):
+            fixture.offset[i] = pose[i] - s.center[i]
+        length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
+    wall_force(fixture.out, length, p.stiffness, p.max_force, row.master_servo_cf)
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
     _report(p, s, gain, is_following, row)
 
 
-class MotionScaling:
-    """Stage that turns master poses into slave poses and fixture forces.
+class Shape(NamedTuple):
+    """The fixture's depth, its numbers, and room to work in."""
 
-    ``signals`` is the record it reads (``stamp_ns``, ``master_measured_cp``, ``master_buttons``,
-    ``slave_setpoint_cp``, ``setpoint_stamp_ns``) and writes (``slave_servo_cp``,
-    ``master_servo_cf``, ``teleop_state``).
-    """
+    depth: Any
+    numbers: Array
+    offset: Array
+    out: Array
 
-    def __init__(self, parameters: MotionScalingParameters, signals: Any = None) -> None:
-        self.signals = make_signals(1)[0] if signals is None else signals
-        self.parameters = np.zeros(1, _PARAMETERS)[0]
-        self.state = np.zeros(1, _STATE)[0]
+
+class MotionScaling(RunningStage):
+    """Stage that turns master poses into slave poses and fixture forces."""
+
+    def __init__(self, parameters: MotionScalingParameters, dt: float = DT) -> None:
+        super().__init__(MOTION_SCALING, 0, dt)
+        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
         self._values = parameters
+        self.kernel = motion_scaling_step
+        self._shape = Shape(None, np.empty(0), np.zeros(3), np.zeros(3))
         self.reset()
         self.retune(parameters)
-        self._step = bound(motion_scaling_step, self.parameters, self.state, self.signals)
 
     def reset(self) -> None:
         """Forget the latched poses: the next sample starts from the slave's setpoint."""
@@ -239,21 +289,49 @@ class MotionScaling:
         """Take new parameters from the next sample on; nothing moves. A new mode is switched to."""
         p, fixture = self.parameters, parameters.fixture
         p["gain"] = parameters.coarse_gain, parameters.fine_gain
-        tool = R_STYLUS_TOOL @ rotation("z", parameters.tool_roll)
+        tool = axis_map("tool_axes", parameters.tool_axes).T @ rotation("z", parameters.tool_roll)
+        axes = axis_map("axes", parameters.axes)
         quaternion = np.empty(4)
-        for name, matrix in (("stylus_tool", tool), ("slave_master", R_SLAVE_MASTER)):
+        for name, matrix in (("stylus_tool", tool), ("slave_master", axes)):
             quaternion_from_rotation(np.ascontiguousarray(matrix), quaternion)
             p[name] = quaternion
-        p["size"] = fixture.size
+        p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
+        self._take_fixture(fixture)
         p["stiffness"] = math.inf if fixture.wall == "hard" else fixture.stiffness
         p["max_force"] = fixture.max_force
         p["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
         if parameters.mode != self._values.mode:
             self.state["is_fine"] = MODES.index(parameters.mode)
-        if parameters.tool_roll != self._values.tool_roll:
+        turned = ("tool_roll", "axes", "tool_axes")
+        if any(getattr(parameters, name) != getattr(self._values, name) for name in turned):
             self.state["must_latch"] = 1  # align anew: the tool does not turn
         self._values = parameters
 
-    def step(self) -> None:
-        """Process one master sample."""
-        self._step()
+    def _take_fixture(self, fixture: FixtureParameters) -> None:
+        kind, numbers = FIXTURES.find(fixture.kind.kind), shape_of(fixture.kind.parameters)
+        self.parameters["size"] = kind.size(fixture.kind.parameters)
+        depth = kind.depth_pointer
+        if depth is self._shape.depth and len(numbers) == len(self._shape.numbers):
+            self._shape.numbers[:] = numbers  # the tick that is composed already goes on
+            return
+        self._shape = self._shape._replace(depth=depth, numbers=numbers)
+        self.arguments = (self.parameters, self.state, self._shape)
+        self._bound = None
+
+    def described(self) -> dict[str, str]:
+        """Kind and numbers of the fixture, as teleop/state reports them beside its columns."""
+        kind = self._values.fixture.kind
+        numbers = values_of(kind.parameters)
+        return {"fixture": kind.kind} | {f"fixture.{n}": repr(v) for n, v in numbers.items()}
+
+
+MOTION_SCALING = Stage(
+    "motion_scaling",
+    MotionScalingParameters,
+    reads=(MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SETPOINT_CP),
+    writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE),
+    late=(SLAVE_SETPOINT_CP,),
+    trigger=MASTER_MEASURED_CP,
+    needs=(SLAVE_SETPOINT_CP,),
+    make=MotionScaling,
+)

@@ -1,7 +1,7 @@
 """Device: what the haptic master reads of the hand, as a Phantom Omni or as a jointed handle."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,6 +47,23 @@ class DeviceParameters:
     )
 
 
+class Handle(NamedTuple):
+    """A jointed handle: its kinematics, where it stands, and room to work in."""
+
+    ik: Any
+    fk: Any
+    limits: Array
+    geometry: Array
+    T_base_handle: Array
+    T_handle_base: Array
+    encoder_step: Array
+    joints: Array
+    T: Array
+    U: Array
+    q: Array
+    residual: Array
+
+
 @kernel
 def read_phantom(p: Any, position: Array, attitude: Array, noise: Array, pose: Array) -> None:
     """Write the pose (7,) that the Phantom reads: place in steps, attitude with noise (3,)."""
@@ -67,29 +84,28 @@ def read_handle(handle: Any, position: Array, attitude: Array, pose: Array) -> N
     The hand moves the tip; the joints that go with it come from the inverse kinematics, next to
     those of the last sample.
     """
-    ik, fk, limits, geometry, T_base_handle, T_handle_base, step, joints, work = handle
-    T, U, q, residual = work
+    T, U, q = handle.T, handle.U, handle.q
     for i in range(3):
         pose[i] = position[i]
     for i in range(4):
         pose[3 + i] = attitude[i]
     transform_from_pose(pose, T)
-    compose(T_handle_base, T, U)
-    ik(U, joints, limits, geometry, q, residual)
+    compose(handle.T_handle_base, T, U)
+    handle.ik(U, handle.joints, handle.limits, handle.geometry, q, handle.residual)
     for i in range(q.shape[0]):
-        joints[i] = q[i]
-        q[i] = round(q[i] / step[i]) * step[i]
-    fk(q, geometry, U)
-    compose(T_base_handle, U, T)
+        handle.joints[i] = q[i]
+        q[i] = round(q[i] / handle.encoder_step[i]) * handle.encoder_step[i]
+    handle.fk(q, handle.geometry, U)
+    compose(handle.T_base_handle, U, T)
     pose_from_transform(T, pose)
 
 
 @inner
-def measure_twist(s: Any, pose: Array, twist: Array) -> None:
+def measure_twist(s: Any, pose: Array, twist: Array, dt: float) -> None:
     """Write the twist (6,) from the readings of two samples through a 5 ms low-pass."""
-    share = 1e-3 / (1e-3 + 5e-3)
+    share = dt / (dt + 5e-3)
     for i in range(3):
-        s.rate[i] += ((pose[i] - s.reading[i]) / 1e-3 - s.rate[i]) * share
+        s.rate[i] += ((pose[i] - s.reading[i]) / dt - s.rate[i]) * share
         s.reading[i] = pose[i]
         twist[i] = s.rate[i]
     back = np.empty(4)
@@ -100,13 +116,13 @@ def measure_twist(s: Any, pose: Array, twist: Array) -> None:
     sign = 1.0 if back[0] >= 0.0 else -1.0
     for i in range(3):
         # Small turn between two samples: twice the vector part, in base axes.
-        s.turning[i] += (sign * 2.0 * back[1 + i] / 1e-3 - s.turning[i]) * share
+        s.turning[i] += (sign * 2.0 * back[1 + i] / dt - s.turning[i]) * share
         twist[3 + i] = s.turning[i]
     for i in range(4):
         s.attitude[i] = pose[3 + i]
 
 
-def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Any:
+def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Handle | None:
     """Arguments of :func:`read_handle` for the wanted handle, None for the Phantom.
 
     The handle's home is laid onto the place where the stylus rests, so that the same paths and
@@ -117,7 +133,7 @@ def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Any:
         T_base_rest: Pose of the resting tip in the master's base (4, 4).
 
     Returns:
-        Tuple of pointers and arrays; its joints start at home.
+        The handle; its joints start at home.
 
     Raises:
         UnknownNameError: No such robot or symbol.
@@ -127,8 +143,8 @@ def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Any:
     robot = load_robot_set(parameters.handle, parameters.handle_geometry)
     T_base_handle = T_base_rest @ np.linalg.inv(robot.fk(robot.home))
     step = np.full(robot.n, 1e-5) if robot.drives is None else robot.drives.encoder_step.copy()
-    work = (np.eye(4), np.eye(4), np.zeros(robot.n), np.zeros(2))
-    return (
-        robot.ik_pointer, robot.fk_pointer, robot.limits(), robot.geometry_row,
-        T_base_handle, np.linalg.inv(T_base_handle), step, robot.home.copy(), work,
+    return Handle(
+        robot.ik_pointer, robot.fk_pointer, robot.limits(), robot.geometry_row.copy(),
+        T_base_handle, np.linalg.inv(T_base_handle), step, robot.home.copy(),
+        np.eye(4), np.eye(4), np.zeros(robot.n), np.zeros(2),
     )  # fmt: skip

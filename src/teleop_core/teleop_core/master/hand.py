@@ -31,26 +31,26 @@ class HandParameters:
 
 
 @inner
-def tremble(p: Any, s: Any, noise: Array, tremor: Array) -> None:
+def tremble(p: Any, s: Any, noise: Array, tremor: Array, dt: float) -> None:
     """Write the wanted tremor (3,) [m]: one line per axis whose frequency wanders in its band."""
     for i in range(3):
         # Ornstein-Uhlenbeck process of unit variance and half a second of memory.
-        s.wander[i] += -s.wander[i] * (1e-3 / 0.5) + noise[i] * math.sqrt(2.0 * 1e-3 / 0.5)
+        s.wander[i] += -s.wander[i] * (dt / 0.5) + noise[i] * math.sqrt(2.0 * dt / 0.5)
         width = min(2.0, p.frequency - 8.0, 12.0 - p.frequency)
-        s.phase[i] += 2.0 * math.pi * 1e-3 * (p.frequency + width * math.tanh(s.wander[i]))
+        s.phase[i] += 2.0 * math.pi * dt * (p.frequency + width * math.tanh(s.wander[i]))
         tremor[i] = p.tremor * math.sin(s.phase[i])
 
 
 @inner
-def move_hand(p: Any, s: Any, wanted: Array, force: Array) -> None:
+def move_hand(p: Any, s: Any, wanted: Array, force: Array, dt: float) -> None:
     """Move tip and hand on by one tick under the device's force (3,) [N].
 
-    Symplectic Euler in four steps of 0.25 ms, with damping and friction taken at the end of each
+    Symplectic Euler in four equal steps, with damping and friction taken at the end of each
     step: stable for every hand and device that the parameters allow.
     """
-    h = 1e-3 / _STEPS
+    h = dt / _STEPS
     for i in range(3):
-        aim_speed = (wanted[i] - s.wanted[i]) / 1e-3
+        aim_speed = (wanted[i] - s.wanted[i]) / dt
         for step in range(_STEPS):
             aim = s.wanted[i] + aim_speed * h * (step + 1)
             v = s.speed[i]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
+from teleop_core.errors import ParameterError, PartError
 from teleop_core.geometry import (
     Array,
     quaternion_from_rotation,
@@ -15,7 +15,7 @@ from teleop_core.geometry import (
     rotation,
     transform,
 )
-from teleop_core.kernels import kernel
+from teleop_core.kernels import kernel, records
 from teleop_core.master.device import (
     DeviceParameters,
     make_handle,
@@ -24,16 +24,26 @@ from teleop_core.master.device import (
     read_phantom,
 )
 from teleop_core.master.hand import HandParameters, move_hand, tremble
-from teleop_core.master.paths import Path, PathParameters
+from teleop_core.operators import OPERATORS, Setting
+from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.operators.shapes import PHASES
 from teleop_core.parameters import parameter
-from teleop_core.signals import DT, make_signals
+from teleop_core.signals import DT, assign
+from teleop_core.stage import RunningStage, Stage
+from teleop_core.topics import (
+    MASTER_BUTTONS,
+    MASTER_MEASURED_CF,
+    MASTER_MEASURED_CP,
+    MASTER_MEASURED_CV,
+    MASTER_SERVO_CF,
+)
 
 # The stylus rests in the inkwell at this tilt about x (Vongbunyong 2008, table 6.1; its sign is
 # the one that meets the slave's home), at this place in the master's base.
 REST_TILT = math.radians(-23.4)
 REST_POSITION = (0.0, -0.065511, -0.088114)
 BLOCK = 1000
-"""Ticks for which the wanted path and the noise are drawn at once."""
+"""Ticks for which the wanted motion and the noise are drawn at once, at most."""
 PRESS_TIME = 0.1
 """How long the operator presses the fixture or the mode button [s]."""
 
@@ -70,103 +80,101 @@ class HapticMasterParameters:
     )
     device: DeviceParameters = field(default_factory=DeviceParameters)
     hand: HandParameters = field(default_factory=HandParameters)
-    path: PathParameters = field(default_factory=PathParameters)
+    operator: OperatorParameters = field(default_factory=OperatorParameters)
     buttons: ButtonParameters = field(default_factory=ButtonParameters)
 
 
-_PARAMETERS = np.dtype(
-    [(name, "f8") for name in ("resolution", "gimbal", "peak_force", "mass", "friction",
-     "stiffness", "damping", "tremor", "frequency")]
-    + [("center", "f8", (3,)), ("half", "f8", (3,))]
-)  # fmt: skip
-_STATE = np.dtype(
-    [(name, "f8", (3,)) for name in ("position", "speed", "wanted", "phase", "wander", "reading",
-     "rate", "turning")] + [("attitude", "f8", (4,))]
-)  # fmt: skip
+_PARAMETERS = [
+    *((name, "f8") for name in ("resolution", "gimbal", "peak_force", "mass", "friction",
+      "stiffness", "damping", "tremor", "frequency")),
+    ("center", "f8", (3,)), ("half", "f8", (3,)),
+]  # fmt: skip
+_STATE = [
+    *((name, "f8", (3,)) for name in ("position", "speed", "wanted", "phase", "wander", "reading",
+      "rate", "turning")),
+    ("attitude", "f8", (4,)), ("next", "i8"),
+]  # fmt: skip
+_DRAWN = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("noise", "f8", (6,)),
+          ("buttons", "f8", (3,))]  # fmt: skip
 
 
 @kernel
-def haptic_master_step(
-    p: Any,
-    s: Any,
-    handle: Any,
-    wanted: Array,
-    attitude: Array,
-    noise: Array,
-    buttons: Array,
-    row: Any,
-) -> None:
+def haptic_master_step(p: Any, s: Any, handle: Any, drawn: Any, row: Any, dt: float) -> None:
     """One tick: feel master_servo_cf, move, and write master_measured_cp, _cv, _cf and _buttons.
 
     Args:
         p: Parameter record.
         s: State record; written.
         handle: None for the Phantom, else as :func:`teleop_core.master.device.make_handle` gives.
-        wanted: Where the hand wants to be (3,) [m], master's base.
-        attitude: How it holds the stylus, quaternion (4,).
-        noise: Standard normal numbers (6,): tremor x, y, z, gimbal x, y, z.
-        buttons: clutch, fixture, mode (3,).
+        drawn: What the operator wants and the noise in the coming ticks, record by record:
+            ``wanted`` (3,) [m] in the master's base, ``attitude`` of the stylus, quaternion (4,),
+            ``noise``, standard normal numbers (6,) for tremor x, y, z and gimbal x, y, z, and
+            ``buttons`` (3,): clutch, fixture, mode.
         row: Signals.
+        dt: Tick [s].
     """
-    force = np.empty(3)
+    now = drawn[s.next]
+    s.next += 1
+    force, noise = np.empty(3), now.noise
     command = row.master_servo_cf
     size = math.sqrt(command[0] ** 2 + command[1] ** 2 + command[2] ** 2)
     share = 1.0 if size <= p.peak_force else p.peak_force / size
     tremor = np.empty(3)
-    tremble(p, s, noise, tremor)
+    tremble(p, s, noise, tremor, dt)
     for i in range(3):
         force[i] = share * command[i]
-        tremor[i] += wanted[i]
-    move_hand(p, s, tremor, force)
+        tremor[i] += now.wanted[i]
+    move_hand(p, s, tremor, force, dt)
     if handle is None:
-        read_phantom(p, s.position, attitude, noise[3:6], row.master_measured_cp)
+        read_phantom(p, s.position, now.attitude, noise[3:6], row.master_measured_cp)
     else:
-        read_handle(handle, s.position, attitude, row.master_measured_cp)
-    measure_twist(s, row.master_measured_cp, row.master_measured_cv)
+        read_handle(handle, s.position, now.attitude, row.master_measured_cp)
+    measure_twist(s, row.master_measured_cp, row.master_measured_cv, dt)
     for i in range(3):
         row.master_measured_cf[i] = force[i]
         row.master_measured_cf[3 + i] = 0.0
-        row.master_buttons[i] = buttons[i]
+        row.master_buttons[i] = now.buttons[i]
 
 
-class HapticMaster:
-    """Stage that simulates device and operator, 1 kHz.
+class HapticMaster(RunningStage):
+    """Stage that simulates device and operator.
 
-    ``signals`` is the record it reads (``master_servo_cf``) and writes (``master_measured_cp``,
-    ``_cv``, ``_cf``, ``master_buttons``). The same parameters give the same motion, bit for bit,
-    as long as the same forces act on it.
+    The same parameters give the same motion, bit for bit, as long as the same forces act on it.
 
     Args:
-        parameters: What device, hand and path are.
-        signals: Record shared with other stages; None for one of its own.
-        recorded: Path of a recording, for the path kind "bag"; see :class:`Path`.
+        parameters: What device, hand and operator are.
+        dt: Length of a tick [s].
+
+    Raises:
+        TeleopError: The operator cannot be made, as one whose recording is missing.
     """
 
-    def __init__(
-        self,
-        parameters: HapticMasterParameters,
-        signals: Any = None,
-        recorded: tuple[Array, Array] | None = None,
-    ) -> None:
-        self.signals = make_signals(1)[0] if signals is None else signals
-        self.parameters = np.zeros(1, _PARAMETERS)[0]
-        self.state = np.zeros(1, _STATE)[0]
-        self._fixed, self._recorded = parameters, recorded
+    def __init__(self, parameters: HapticMasterParameters, dt: float = DT) -> None:
+        super().__init__(HAPTIC_MASTER, 0, dt)
+        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
+        self._drawn = records(_DRAWN, BLOCK)
+        self._fixed = parameters
+        self.kernel = haptic_master_step
         self.retune(parameters)
         self.reset()
 
     def reset(self) -> None:
         """Stylus in the inkwell, at time zero, with the random numbers of the seed."""
+        wanted = self._fixed.operator
         self._rng = np.random.default_rng(self._fixed.seed)
-        self._path = Path(self._fixed.path, self._rng, self._recorded)
-        self._tick, self._used = 0, BLOCK
-        self._block: tuple[Array, ...] | None = None
+        phases = self._rng.uniform(0.0, 2.0 * math.pi, PHASES)
+        self._operator = OPERATORS.find(wanted.kind.kind)
+        self.ahead = min(self._operator.ahead, BLOCK)
+        setting = Setting(wanted, phases, self._fixed.seed)
+        self._motion = self._operator.make(wanted.kind.parameters, setting)
+        self._tick, self._end = 0, 0
         self._rest = np.empty(4)
         quaternion_from_rotation(rotation("x", REST_TILT), self._rest)
         rest = transform(rotation("x", REST_TILT), np.array(REST_POSITION))
         self.handle = make_handle(self._fixed.device, rest)
-        for name in _STATE.names or ():
-            self.state[name] = 0.0
+        self.arguments = (self.parameters, self.state, self.handle, self._drawn)
+        self._bound = None
+        assign(self.state, 0)
         for name in ("position", "wanted"):
             self.state[name] = REST_POSITION
         place, pose = self.state["position"], self.signals["master_measured_cp"]
@@ -177,7 +185,7 @@ class HapticMaster:
         self.state["reading"], self.state["attitude"] = pose[:3], pose[3:]
 
     def retune(self, parameters: HapticMasterParameters) -> None:
-        """Take new device and hand parameters from the next tick on; the path stays."""
+        """Take new device and hand parameters from the next tick on; the operator goes on."""
         p, device, hand = self.parameters, parameters.device, parameters.hand
         p["resolution"], p["gimbal"] = device.position_resolution, device.gimbal_noise
         p["peak_force"], p["friction"] = device.peak_force, device.friction
@@ -187,20 +195,45 @@ class HapticMaster:
         p["center"] = np.subtract(REST_POSITION, device.start)
         p["half"] = 0.5 * np.array(device.workspace)
 
-    def draw(self, count: int) -> tuple[Array, Array, Array, Array]:
-        """What the operator wants in the next ``count`` ticks.
+    def prepare(self, ticks: int) -> None:
+        """Draw what the operator wants in the next ticks, as far ahead as he can be asked."""
+        first = int(self.state["next"])
+        left = self._end - first
+        if left >= ticks:
+            return
+        self._drawn[:left] = self._drawn[first : self._end]
+        self._end = max(ticks, min(left + self._operator.ahead, BLOCK))
+        self.state["next"] = 0
+        self._draw(self._drawn[left : self._end])
 
-        Returns:
-            Wanted positions (count, 3) [m], attitudes (count, 4), noise (count, 6), buttons
-            (count, 3), as :func:`haptic_master_step` takes them row by row.
-        """
-        times = np.arange(self._tick + 1, self._tick + count + 1, dtype=np.float64) * DT
+    def _draw(self, drawn: Any) -> None:
+        """Fill records with what the operator wants and the noise of the ticks that follow."""
+        count = len(drawn)
+        times = np.arange(self._tick + 1, self._tick + count + 1, dtype=np.float64) * self.dt
         self._tick += count
-        position, turn = self._path.sample(times)
+        moves = self._moves(times)
+        drawn["wanted"] = moves[:, :3] + REST_POSITION
         attitudes = np.empty((count, 4))
-        _turn_all(self._rest, turn, attitudes)
-        noise = self._rng.standard_normal((count, 6))
-        return position + REST_POSITION, attitudes, noise, self._pressed(times)
+        _turn_all(self._rest, np.ascontiguousarray(moves[:, 3:6]), attitudes)
+        drawn["attitude"] = attitudes
+        drawn["noise"] = self._rng.standard_normal((count, 6))
+        drawn["buttons"] = np.maximum(self._pressed(times), moves[:, 6:])
+
+    def _moves(self, times: Array) -> Array:
+        """Motion and buttons (N, 9) of the operator.
+
+        Raises:
+            PartError: What he answers has another shape, or is not finite.
+        """
+        name = self._fixed.operator.kind.kind
+        moves = np.asarray(self._motion(times), dtype=np.float64)
+        if moves.shape not in {(len(times), columns) for columns in (3, 6, 9)}:
+            text = f"one who answers (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
+            raise PartError("operator", name, text)
+        if not np.isfinite(moves).all():
+            bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]
+            raise PartError("operator", name, f"one who answers finite numbers; at {bad:g} s not")
+        return np.pad(moves, ((0, 0), (0, 9 - moves.shape[1])))
 
     def _pressed(self, times: Array) -> Array:
         buttons = self._fixed.buttons
@@ -211,28 +244,20 @@ class HapticMaster:
                 pressed[(times >= start) & (times < start + PRESS_TIME), column] = 1.0
         return pressed
 
-    def step(self) -> None:
-        """One tick of 1 ms."""
-        if self._used == BLOCK:
-            self._block, self._used = self.draw(BLOCK), 0
-        assert self._block is not None
-        wanted, attitudes, noise, buttons = self._block
-        i = self._used
-        self._used += 1
-        haptic_master_step(
-            self.parameters,
-            self.state,
-            self.handle,
-            wanted[i],
-            attitudes[i],
-            noise[i],
-            buttons[i],
-            self.signals,
-        )
-
 
 @kernel
 def _turn_all(rest: Array, turns: Array, attitudes: Array) -> None:
     """Write the rest attitude turned by each rotation vector (N, 3) into ``attitudes`` (N, 4)."""
     for i in range(turns.shape[0]):
         rotate_by_vector(rest, turns[i, 0], turns[i, 1], turns[i, 2], attitudes[i])
+
+
+HAPTIC_MASTER = Stage(
+    "haptic_master",
+    HapticMasterParameters,
+    reads=(MASTER_SERVO_CF,),
+    writes=(MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS),
+    late=(MASTER_SERVO_CF,),
+    make=HapticMaster,
+    node="teleop_core.nodes.haptic_master:HapticMasterNode",
+)

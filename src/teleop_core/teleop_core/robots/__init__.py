@@ -1,62 +1,120 @@
-"""Robots: one file each, one interface; ``load_robot("rcrt1")`` and ``list_robots()``."""
+"""Robots: one interface for every arm, whether built in, described by a table or your own.
+
+``load_robot("rcrt1")`` takes a name of :func:`list_robots` or the path of a Denavit-Hartenberg
+table. A table becomes a robot with ``robot_from_table({...})``; :func:`register_robot`, or the
+entry-point group ``teleop_core.robots`` of an installed package, gives a robot a name that
+``--set robot=`` takes::
+
+    from teleop_core.robots import register_robot, robot_from_table
+
+    arm = robot_from_table({
+        "name": "my_arm", "convention": "modified", "angles": "degrees",
+        "rows": [
+            {"theta": "q", "lower": -150, "upper": 150},
+            {"a": 0.4, "theta": "q", "lower": -120, "upper": 120, "home": 60},
+            {"a": 0.3, "d": "q", "lower": -0.1, "upper": 0.1},
+        ],
+        "task": ["x", "y", "z"],
+    })
+    register_robot(arm)
+"""
 
 from collections.abc import Iterable
-from importlib import import_module
+from typing import TYPE_CHECKING
 
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.robots.kinematics import IkResult, IkStatus
+from teleop_core.errors import ParameterError
+from teleop_core.robots.kinematics import IkBatch, IkOne, IkResult, IkStatus, Kernels
+from teleop_core.robots.parts import ROBOTS, Part, RobotPart, built, from_file, part_name
 from teleop_core.robots.robot import Robot
 
-__all__ = ["IkResult", "IkStatus", "Robot", "list_robots", "load_robot", "load_robot_set"]
+if TYPE_CHECKING:
+    from teleop_core.robots.dh import DhTable, load_table, parse_table, robot_from_table
 
-# Name of the robot -> module of this package whose make(**geometry) builds it.
-_MODULES = {
-    "rcrt1": "rcrt1",
-    "mma": "mma",
-    "four_bar": "four_bar",
-    "parallelogram": "parallelogram",
-    "stewart": "stewart",
-    "rps3": "rps3",
-    "scara_stewart": "scara_stewart",
-    "three_finger_hand": "three_finger_hand",
-    "puma560": "puma560",
-    "scara": "scara",
-    "planar_3r": "planar_3r",
-    "five_axis": "five_axis",
-}
+__all__ = [
+    "ROBOTS",
+    "DhTable",
+    "IkBatch",
+    "IkOne",
+    "IkResult",
+    "IkStatus",
+    "Kernels",
+    "Robot",
+    "RobotPart",
+    "list_robots",
+    "load_robot",
+    "load_robot_set",
+    "load_table",
+    "parse_table",
+    "register_robot",
+    "robot_from_table",
+]
+_OF_TABLES = ("DhTable", "load_table", "parse_table", "robot_from_table")
+
+
+def __getattr__(name: str) -> object:
+    """Load tables on first use, so that importing robots stays cheap."""
+    if name in _OF_TABLES:
+        from teleop_core.robots import dh
+
+        return getattr(dh, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
 
 
 def list_robots() -> tuple[str, ...]:
-    """Names that :func:`load_robot` knows."""
-    return tuple(_MODULES)
+    """Names that :func:`load_robot` knows: built in, installed, registered."""
+    return ROBOTS.names()
+
+
+def register_robot(robot: Part, name: str | None = None, *, replace: bool = False) -> Part:
+    """Give a robot a name for the rest of this program.
+
+    Args:
+        robot: A :class:`Robot`, a :class:`~teleop_core.robots.dh.DhTable`, or a function
+            ``make(**geometry)`` that returns a robot and whose parameters all have defaults.
+        name: What configurations call it; None for its own name.
+        replace: Whether it may take the place of one that this program registered before.
+
+    Returns:
+        The same robot, so that this decorates functions too.
+
+    Raises:
+        PartError: The name is taken, this is no robot, or its kernels do not run.
+    """
+    ROBOTS.add(part_name(robot) if name is None else name, robot, replace=replace)
+    return robot
 
 
 def load_robot(name: str, **geometry: float | str) -> Robot:
     """Robot by name.
 
     Args:
-        name: One of :func:`list_robots`.
+        name: One of :func:`list_robots`, or the path of a Denavit-Hartenberg table, which ends in
+            ``.yaml`` or ``.yml``.
         **geometry: Lengths and angles in place of the published ones [m, rad], by the symbols of
             the robot's file; a robot may take named options too, such as ``heading="carried"``.
+            Tables and robots that were registered ready-made take none.
 
     Returns:
         The robot.
 
     Raises:
         UnknownNameError: No such robot or no such symbol; the alternatives are listed.
-        ParameterError: A length is not possible.
+        ParameterError: A length is not possible, or a table has an impossible entry.
+        PartError: A robot of another package cannot be loaded.
+        OSError: A table cannot be read.
     """
-    if name not in _MODULES:
-        raise UnknownNameError("robot", name, _MODULES)
-    robot: Robot = import_module(f"{__name__}.{_MODULES[name]}").make(**geometry)
-    return robot
+    return from_file(name, geometry) or built(name, ROBOTS.find(name), geometry)
 
 
 def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
     """Robot by name, with its geometry as texts ``symbol=value``: how parameters give it.
 
     Args:
-        name: One of :func:`list_robots`.
+        name: As for :func:`load_robot`.
         settings: Lengths and angles [m, rad] such as ``L6=0.04``, or options such as
             ``heading=carried``.
 
@@ -64,8 +122,7 @@ def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
         The robot.
 
     Raises:
-        UnknownNameError: As :func:`load_robot`.
-        ParameterError: As :func:`load_robot`; or a text without "=".
+        ParameterError: A text without "="; and all errors of :func:`load_robot`.
     """
     geometry: dict[str, float | str] = {}
     for text in settings:

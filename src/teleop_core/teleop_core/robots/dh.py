@@ -15,6 +15,18 @@ variable::
 Entries that are left out are 0. A row without ``q`` is a fixed frame, such as a tool. Turning
 joints without limits have ±180 degrees; sliding ones must state theirs.
 
+Every chain can be a slave. What its drives are stands, joint by joint, in a section of its own::
+
+    drives:
+      q1: {inertia: 0.6, speed_limit: 200, effort_limit: 60}
+      d3: {inertia: 6.0, speed_limit: 1.0}
+
+The entries are those of :class:`~teleop_core.robots.drives.Drives`: ``speed_limit``,
+``friction_speed`` (per second) and ``encoder_step`` of turning joints are in the table's unit of
+angles, all others in SI units (N·m·s/rad, rad/s). What is left out is assumed
+(:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed`` names it. Axes do not act on
+each other, and gravity counts as balanced.
+
 Source:
     Denavit and Hartenberg 1955 (standard, also distal); Craig 2005 (modified, proximal); Sheth
     and Uicker 1971, in the order that reproduces the other two.
@@ -23,145 +35,37 @@ Source:
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.geometry import Array, checked_array, rotation, transform
-from teleop_core.robots import dh_kernels
-from teleop_core.robots.kinematics import DIRECTIONS, Kernels
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.robots.dh_chain import (
+    CONVENTIONS,
+    DhJoint,
+    DhRow,
+    DhTable,
+    elementary,
+)
+from teleop_core.robots.dh_drives import parse_drives
+from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
 
-# Elementary motions of one row, left to right: what, along or about which axis, by which symbol.
-CONVENTIONS = {
-    "standard": (("turn", "z", "theta"), ("slide", "z", "d"),
-                 ("slide", "x", "a"), ("turn", "x", "alpha")),
-    "modified": (("turn", "x", "alpha"), ("slide", "x", "a"),
-                 ("turn", "z", "theta"), ("slide", "z", "d")),
-    "sheth_uicker": (("turn", "z", "gamma"), ("slide", "z", "c"),
-                     ("turn", "x", "alpha"), ("slide", "x", "a"),
-                     ("turn", "z", "beta"), ("slide", "z", "b")),
-}  # fmt: skip
+__all__ = [
+    "CONVENTIONS",
+    "DIRECTIONS",
+    "DhJoint",
+    "DhRow",
+    "DhTable",
+    "elementary",
+    "load_table",
+    "parse_table",
+    "robot_from_table",
+]
 _EXPRESSION = re.compile(r"([+-]?)\s*q\s*(?:([+-])\s*([0-9.eE]+))?")
 _JOINT_KEYS = ("name", "lower", "upper", "home")
-
-
-@dataclass(frozen=True, kw_only=True)
-class DhJoint:
-    """Joint of a row: its symbol is ``sign * q`` plus the row's constant; limits [rad or m]."""
-
-    name: str
-    symbol: str
-    sign: float
-    lower: float
-    upper: float
-    home: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class DhRow:
-    """One row: constants by symbol [rad, m], and the joint if it has one."""
-
-    constants: Mapping[str, float]
-    joint: DhJoint | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class DhTable:
-    """A chain: rows in one convention, from the base to the tip.
-
-    ``task`` names the directions that the arm is to control, in base axes, of
-    :data:`DIRECTIONS`; the others are left to the residual.
-    """
-
-    name: str
-    convention: str
-    rows: tuple[DhRow, ...]
-    task: tuple[str, ...] = DIRECTIONS
-
-    @property
-    def joints(self) -> tuple[DhJoint, ...]:
-        """Joints from the base to the tip; their number is the chain's degrees of freedom."""
-        return tuple(row.joint for row in self.rows if row.joint)
-
-    def link_transforms(self, q: object) -> Array:
-        """Transform of each row, frame i in frame i-1.
-
-        Args:
-            q: Joint vector (n,) [rad, m].
-
-        Returns:
-            (rows, 4, 4); their product from left to right is ``T_base_tip``.
-
-        Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN or infinity.
-        """
-        values = checked_array("q", q, (len(self.joints),))
-        if values.ndim != 1:
-            raise ShapeError("q", (len(self.joints),), values.shape)
-        moves, out = iter(values), np.empty((len(self.rows), 4, 4))
-        for i, row in enumerate(self.rows):
-            out[i] = np.eye(4)
-            value = next(moves) * row.joint.sign if row.joint else 0.0
-            for kind, axis, symbol in CONVENTIONS[self.convention]:
-                amount = row.constants.get(symbol, 0.0)
-                if row.joint and symbol == row.joint.symbol:
-                    amount += value
-                out[i] = out[i] @ elementary(kind, axis, amount)
-        return out
-
-    def robot(self) -> Robot:
-        """The chain as a robot with numeric inverse kinematics; it has no drives."""
-        return Robot(
-            name=self.name,
-            joint_names=tuple(joint.name for joint in self.joints),
-            lower=np.array([joint.lower for joint in self.joints]),
-            upper=np.array([joint.upper for joint in self.joints]),
-            home=np.array([joint.home for joint in self.joints]),
-            geometry=self._geometry(),
-            kernels=Kernels(
-                fk=dh_kernels.fk,
-                jacobian=dh_kernels.jacobian,
-                ik=dh_kernels.ik,
-                ik_all=dh_kernels.ik_all,
-            ),
-            task_mask=tuple(direction in self.task for direction in DIRECTIONS),
-        )
-
-    def _geometry(self) -> dict[str, float]:
-        """Row of :mod:`teleop_core.robots.dh_kernels`, every number with a name."""
-        kinds, reach, fixed = [], 0.0, [np.eye(4)]
-        for row in self.rows:
-            for kind, axis, symbol in CONVENTIONS[self.convention]:
-                amount = row.constants.get(symbol, 0.0)
-                fixed[-1] = fixed[-1] @ elementary(kind, axis, amount)
-                reach += abs(amount) if kind == "slide" else 0.0
-                if row.joint and symbol == row.joint.symbol:
-                    kinds.append(row.joint.sign * (1.0 if kind == "turn" else 2.0))
-                    fixed.append(np.eye(4))
-                    if kind == "slide":
-                        reach += max(abs(row.joint.lower), abs(row.joint.upper))
-        names = {f"kind{i + 1}": kind for i, kind in enumerate(kinds)}
-        weights = {f"controls_{name}": float(name in self.task) for name in DIRECTIONS}
-        numbers = {
-            f"fixed{i}_{r}{c}": float(matrix[r, c])
-            for i, matrix in enumerate(fixed)
-            for r in range(3)
-            for c in range(4)
-        }
-        return {**names, "reach": reach if reach > 0.0 else 1.0, **weights, **numbers}
-
-
-def elementary(kind: str, axis: str, amount: float) -> Array:
-    """Transform (4, 4) of a "turn" [rad] about or a "slide" [m] along a coordinate axis."""
-    if kind == "turn":
-        return transform(rotation(axis, amount), np.zeros(3))
-    return transform(np.eye(3), amount * np.eye(3)["xyz".index(axis)])
 
 
 def load_table(path: Path | str) -> DhTable:
@@ -179,11 +83,16 @@ def load_table(path: Path | str) -> DhTable:
     return parse_table(content)
 
 
-def parse_table(content: Any) -> DhTable:
+def robot_from_table(content: object) -> Robot:
+    """Robot from what a table's YAML file holds; errors as :func:`load_table`."""
+    return parse_table(content).robot()
+
+
+def parse_table(content: object) -> DhTable:
     """Table from what its YAML file holds; errors as :func:`load_table`."""
     if not isinstance(content, Mapping):
         raise ParameterError("table", content, "a mapping with name, convention and rows")
-    _known("entry", content, ("name", "convention", "angles", "task", "rows"))
+    _known("entry", content, ("name", "convention", "angles", "task", "rows", "drives"))
     convention = _choice("convention", content.get("convention"), CONVENTIONS)
     angles = _choice("angles", content.get("angles", "radians"), ("radians", "degrees"))
     rows, task = content.get("rows"), content.get("task", DIRECTIONS)
@@ -199,7 +108,11 @@ def parse_table(content: Any) -> DhTable:
     parsed = tuple(_row(i + 1, row, convention, unit) for i, row in enumerate(rows))
     if not any(row.joint for row in parsed):
         raise ParameterError("rows", rows, "with q in at least one row")
-    return DhTable(name=content["name"], convention=convention, rows=parsed, task=tuple(task))
+    table = DhTable(name=content["name"], convention=convention, rows=parsed, task=tuple(task))
+    names = [joint.name for joint in table.joints]
+    if len(set(names)) < len(names):
+        raise ParameterError("rows", names, "with joint names that differ")
+    return replace(table, drives=parse_drives(content.get("drives"), names, table.kinds, unit))
 
 
 def _row(number: int, row: Any, convention: str, unit: float) -> DhRow:

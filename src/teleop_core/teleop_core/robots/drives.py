@@ -23,7 +23,7 @@ ENTRIES = (
     "inertia", "viscous", "coulomb", "friction_speed", "effort_limit", "speed_limit",
     "encoder_step", "bandwidth",
 )  # fmt: skip
-_MAY_BE_ZERO = ("viscous", "coulomb")
+MAY_BE_ZERO = ("viscous", "coulomb")
 
 
 def read_only(name: str, values: object, shape: tuple[int, ...] | None = None) -> Array:
@@ -76,8 +76,8 @@ class Drives:
     def __post_init__(self) -> None:
         for name in ENTRIES:
             array = read_only(name, getattr(self, name), np.shape(self.inertia))
-            needed = ">= 0" if name in _MAY_BE_ZERO else "> 0"
-            if not ((array >= 0.0) if name in _MAY_BE_ZERO else (array > 0.0)).all():
+            needed = ">= 0" if name in MAY_BE_ZERO else "> 0"
+            if not ((array >= 0.0) if name in MAY_BE_ZERO else (array > 0.0)).all():
                 raise ParameterError(name, array.tolist(), f"{needed} for every joint")
             object.__setattr__(self, name, array)
         for name in self.assumed:

@@ -13,7 +13,7 @@ from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import Array, checked_array, is_rigid
 from teleop_core.kernels import pointer
 from teleop_core.robots import kinematics
-from teleop_core.robots.drives import Drives, Dynamics, read_only
+from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.kinematics import (
     FK,
     IK,
@@ -44,7 +44,7 @@ class Robot:
         geometry: Symbols and their values [m, rad], in the order the kernels expect.
         kernels: Compiled functions.
         drives: Drive table, None for robots that are not used as slaves.
-        dynamics: Rigid-body model, None for robots that are not used as slaves.
+        dynamics: Rigid-body model; None for axes that do not act on each other.
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
 
     Raises:
@@ -75,8 +75,11 @@ class Robot:
             raise ParameterError("lower", self.lower.tolist(), f"below {self.upper.tolist()}")
         if not ((self.lower <= self.home) & (self.home <= self.upper)).all():
             raise ParameterError("home", self.home.tolist(), "inside the limits")
-        if self.drives is not None and self.drives.inertia.shape != shape:
-            raise ShapeError("drives", shape, self.drives.inertia.shape)
+        if self.drives is not None:
+            if self.drives.inertia.shape != shape:
+                raise ShapeError("drives", shape, self.drives.inertia.shape)
+            model = self.dynamics or independent_axes(self.drives.inertia)
+            object.__setattr__(self, "dynamics", model)
         geometry = MappingProxyType(dict(self.geometry))
         object.__setattr__(self, "geometry", geometry)
         object.__setattr__(self, "_row", np.array(list(geometry.values()), dtype=np.float64))

@@ -9,8 +9,9 @@ from typing import Any
 import yaml
 
 from teleop_core.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.graph import RECORDER_NAME, Graph, Member, build_graph
 from teleop_core.parameters import Spec, Value, build, parameter, specs, values_of
-from teleop_core.session.graph import STAGES
+from teleop_core.stage import STAGES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,16 +38,34 @@ class SessionParameters:
     duration: float = parameter(
         10.0, unit="s", lower=0.001, upper=86400.0, doc="simulated or live time"
     )
+    arms: tuple[str, ...] = parameter(
+        (), fixed=True,
+        doc="names of the arms, the first of which keeps the plain topics; empty: one without name",
+    )  # fmt: skip
+    stages: tuple[str, ...] = parameter(
+        (), fixed=True, doc="further stages of every arm, beside the built-in ones"
+    )
+    delays: tuple[str, ...] = parameter(
+        (), fixed=True, doc="delays on links, topic=seconds or topic@reader=seconds"
+    )
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
 
-GROUPS: dict[str, type] = {
-    "teleop": SessionParameters,
-    **{stage.name: stage.parameters for stage in STAGES},
+SESSION = "teleop"
+"""Name of the group of the session as a whole."""
+RENAMED = {
+    "haptic_master.path.": "haptic_master.operator.",
+    "motion_scaling.fixture.size": "motion_scaling.fixture.box.size",
+    "slave_sim.pid.": "slave_sim.controller.pid.",
 }
-"""Name of each group of a parameter file to its type."""
+"""Former names, which recordings and files may still have, or their beginnings."""
 
 Layer = dict[str, dict[str, object]]
+
+
+def declared_groups() -> dict[str, type]:
+    """Name of each group of a parameter file to its type: the session, then all known stages."""
+    return {SESSION: SessionParameters, **{name: STAGES.find(name).parameters for name in STAGES}}
 
 
 def config_folder() -> Path:
@@ -101,13 +120,25 @@ def parse_layer(content: object, where: str) -> Layer:
     layer: Layer = {}
     if not isinstance(content, Mapping):
         raise TeleopError(f"{where}: must hold stages, each with ros__parameters")
-    for stage, inner in content.items():
-        if stage not in GROUPS:
-            raise UnknownNameError(f"{where}: stage", stage, GROUPS)
+    for key, inner in content.items():
+        name = str(key).removeprefix("/").removeprefix("**/")
+        stage = name.rpartition("/")[2]
+        if stage != SESSION and stage not in STAGES.names():
+            raise UnknownNameError(f"{where}: stage", key, (SESSION, *STAGES))
         if not isinstance(inner, Mapping) or not isinstance(inner.get("ros__parameters"), Mapping):
-            raise TeleopError(f"{where}: {stage} must hold ros__parameters with names and values")
-        layer[stage] = dict(_flat(inner["ros__parameters"]))
+            raise TeleopError(f"{where}: {key} must hold ros__parameters with names and values")
+        values = dict(_flat(inner["ros__parameters"]))
+        layer.setdefault(name, {}).update({_current(stage, n): v for n, v in values.items()})
     return layer
+
+
+def _current(stage: str, name: str) -> str:
+    """Present name of a parameter that may be called by a former one."""
+    full = f"{stage}.{name}"
+    for old, new in RENAMED.items():
+        if full == old or (old.endswith(".") and full.startswith(old)):
+            return (new + full[len(old) :]).partition(".")[2]
+    return name
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, object]]:
@@ -121,39 +152,54 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, ob
 def parse_setting(text: str) -> Layer:
     """Values of one ``--set key=value``.
 
-    The key is ``stage.name``, or a bare name, which sets every stage that has it. A list is
-    written [1, 2]. Whole numbers serve for real ones.
+    The key is ``stage.name``, or a bare name, which sets every stage that has it; ``arm/`` before
+    it means that arm alone. The name of a group with a ``kind`` chooses the kind:
+    ``fixture=sphere``. A list is written [1, 2]. Whole numbers serve for real ones.
 
     Raises:
         TeleopError: No "=", or a value that is not YAML.
         UnknownNameError: No stage has the key; the nearest keys are listed.
     """
-    key, equals, value_text = text.partition("=")
+    given, equals, value_text = text.partition("=")
     if not equals:
         raise TeleopError(f"--set {text!r} must be key=value")
-    declared = {
-        f"{stage}.{spec.name}": (stage, spec)
-        for stage, group in GROUPS.items()
-        for spec in specs(group)
-    }
-    key = key.strip()
-    hits = [entry for full, entry in declared.items() if key in {full, entry[1].name}]
-    if not hits:
-        ends = {full: entry for full, entry in declared.items() if full.endswith("." + key)}
-        if len({spec.name for _, spec in ends.values()}) > 1:
-            raise UnknownNameError("key", key, ends)  # several parameters end so
-        hits = list(ends.values())
-    if not hits:
-        near = difflib.get_close_matches(key, [*declared, *(s.name for _, s in declared.values())])
-        raise UnknownNameError("key", key, near or declared)
+    arm, slash, key = given.strip().rpartition("/")
     try:
         value = yaml.safe_load(value_text)
     except yaml.YAMLError as error:
         raise TeleopError(f"--set {text!r}: the value is not YAML") from error
     layer: Layer = {}
-    for stage, spec in hits:
-        layer.setdefault(stage, {})[spec.name] = _as_declared(spec, value)
+    for stage, spec in _hits(key):
+        layer.setdefault(arm + slash + stage, {})[spec.name] = _as_declared(spec, value)
     return layer
+
+
+def _hits(key: str) -> list[tuple[str, Spec]]:
+    """Stages and parameters that a key means.
+
+    Raises:
+        UnknownNameError: None, or several of different names.
+    """
+    declared = {
+        f"{stage}.{spec.name}": (stage, spec)
+        for stage, group in declared_groups().items()
+        for spec in specs(group)
+    }
+    for wanted in (key, f"{key}.kind"):
+        if hits := [e for full, e in declared.items() if wanted in {full, e[1].name}]:
+            return hits
+    known = dict(declared)  # by former names too
+    for full, entry in declared.items():
+        for old, new in RENAMED.items():
+            if full == new or (new.endswith(".") and full.startswith(new)):
+                known.setdefault(old + full[len(new) :], entry)
+    ends = {full: entry for full, entry in known.items() if f".{full}".endswith("." + key)}
+    if len({spec.name for _, spec in ends.values()}) > 1:
+        raise UnknownNameError("key", key, ends)  # several parameters end so
+    if not ends:
+        near = difflib.get_close_matches(key, [*known, *(s.name for _, s in declared.values())])
+        raise UnknownNameError("key", key, near or declared)
+    return list({stage: (stage, spec) for stage, spec in ends.values()}.values())
 
 
 def _as_declared(spec: Spec, value: object) -> object:
@@ -172,32 +218,51 @@ def _as_declared(spec: Spec, value: object) -> object:
 
 @dataclass(frozen=True)
 class Configuration:
-    """Checked parameters of all stages: ``groups`` by stage name, ``scenario`` for the record."""
+    """Checked parameters of a session.
+
+    Attributes:
+        groups: Parameter groups: ``teleop``, ``recorder`` and one for each member of the graph.
+        scenario: Name of the session, for the record.
+        graph: What runs.
+    """
 
     groups: dict[str, Any]
     scenario: str
+    graph: Graph
 
     @staticmethod
     def from_layers(layers: Iterable[Layer], scenario: str = "") -> "Configuration":
         """Later layers over earlier ones over the defaults.
 
+        What is said of a stage holds for all arms, unless the arm's own group says otherwise.
+
         Raises:
             UnknownNameError: A name is not declared.
             ParameterError: A value breaks its declaration.
+            PartError: The graph cannot run.
         """
-        merged: Layer = {name: {} for name in GROUPS}
+        merged: Layer = {}
         for layer in layers:
-            for stage, values in layer.items():
-                merged[stage] |= values
-        groups: dict[str, Any] = {
-            name: build(group, merged[name], f"{name}.") for name, group in GROUPS.items()
-        }
-        stages = ("inverse_kinematics", "slave_sim")
-        for name in ("robot", "geometry"):
-            first, second = (getattr(groups[stage], name) for stage in stages)
-            if first != second:
-                raise ParameterError(name, (first, second), "the same in " + " and ".join(stages))
-        return Configuration(groups, scenario)
+            for name, values in layer.items():
+                merged.setdefault(name, {}).update(values)
+        session = build(SessionParameters, merged.get(SESSION, {}), f"{SESSION}.")
+        graph = build_graph(session.arms, session.stages, session.delays)
+        _check_names(merged, graph)
+        groups: dict[str, Any] = {SESSION: session}
+        for member in _ordered(graph):
+            values = _values_for(member, merged, graph)
+            groups[member.name] = build(member.stage.parameters, values, f"{member.name}.")
+        recorder = STAGES.find(RECORDER_NAME)
+        groups[RECORDER_NAME] = build(
+            recorder.parameters, merged.get(RECORDER_NAME, {}), f"{RECORDER_NAME}."
+        )
+        for arm in graph.namespaces:
+            _check_robots(graph, groups, arm)
+        return Configuration(groups, scenario, graph)
+
+    def group(self, stage: str, arm: str = "") -> Any:
+        """Parameters of a stage of an arm, by the arm's namespace."""
+        return self.groups[f"{arm}/{stage}" if arm else stage]
 
     def text(self) -> str:
         """All values as a ROS 2 parameter file, which :func:`parse_layer` reads back."""
@@ -206,6 +271,47 @@ class Configuration:
             for name, group in self.groups.items()
         }
         return yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)
+
+
+def _ordered(graph: Graph) -> list[Member]:
+    """Members arm by arm, in the order in which stages are named."""
+    return [Member(stage, arm) for arm in graph.namespaces for stage in graph.stages]
+
+
+def _values_for(member: Member, merged: Layer, graph: Graph) -> dict[str, object]:
+    """What is said of the stage, then of the stage of this arm."""
+    named = dict(zip(graph.namespaces, graph.arms, strict=True))[member.arm]
+    own = merged.get(f"{named}/{member.stage.name}", {}) if named else {}
+    return merged.get(member.stage.name, {}) | own
+
+
+def _check_names(merged: Layer, graph: Graph) -> None:
+    """Refuse groups that nobody has.
+
+    Raises:
+        UnknownNameError: An arm or stage that is not in the graph.
+    """
+    stages = [stage.name for stage in graph.stages]
+    for name in merged:
+        arm, _, stage = name.rpartition("/")
+        if arm and arm not in graph.arms:
+            raise UnknownNameError(f"arm of {name}", arm, [a for a in graph.arms if a] or ["none"])
+        if stage not in {SESSION, RECORDER_NAME, *stages}:
+            raise UnknownNameError("stage of teleop.stages", stage, (*stages, RECORDER_NAME))
+
+
+def _check_robots(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
+    """Make sure that all stages of an arm are for the same robot.
+
+    Raises:
+        ParameterError: Two differ.
+    """
+    members = [Member(stage, arm) for stage in graph.stages]
+    named = [m.name for m in members if hasattr(groups[m.name], "robot")]
+    for name in ("robot", "geometry"):
+        values = [getattr(groups[member], name) for member in named]
+        if any(value != values[0] for value in values):
+            raise ParameterError(name, tuple(values), "the same in " + " and ".join(named))
 
 
 def _plain(value: Value) -> object:
@@ -231,8 +337,9 @@ def configure(
 def parameter_rows(stages: Iterable[str]) -> list[tuple[str, str, str, str]]:
     """Name, default, what is allowed and meaning of every parameter of some stages."""
     rows = []
+    groups = declared_groups()
     for stage in stages:
-        for spec in specs(GROUPS[stage]):
+        for spec in specs(groups[stage]):
             allowed = ", ".join(spec.choices) if spec.choices else spec.bounds()
             default = spec.default if spec.kind is not tuple else list(spec.default)  # type: ignore[arg-type]
             text = spec.doc + (" (fixed)" if spec.fixed else "")

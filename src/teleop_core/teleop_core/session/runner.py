@@ -1,6 +1,6 @@
 """Runner: a session in virtual time, recorded block by block, and its replay."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,19 +8,16 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from teleop_core import topics
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
-from teleop_core.geometry import Array, rotation_vectors
-from teleop_core.session.configuration import Configuration, Layer, parse_layer
-from teleop_core.session.graph import STAGES, Graph
-from teleop_core.signals import STATE_FIELDS, TICK_NS, make_signals
-from teleop_core.topics import STREAMS
-
-BLOCK = 1000
-"""Ticks per block: one second, one chunk of the recording."""
+from teleop_core.geometry import Array
+from teleop_core.graph import RECORDER_NAME, Member
+from teleop_core.session.configuration import SESSION, Configuration, Layer, parse_layer
+from teleop_core.session.virtual import BLOCK, VirtualTime, stamps_of
+from teleop_core.signals import STATE_FIELDS, TICK_NS
+from teleop_core.topics import Kind, Topic
 
 Progress = Callable[[int, int], None]
 
@@ -43,25 +40,31 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = _sile
     Raises:
         RecordingError: The directory exists, cannot be written, or the disk is full.
     """
-    ticks = max(1, round(configuration.groups["teleop"].duration * 1e3))
-    graph = Graph(configuration.groups, recorded_path(configuration))
+    ticks = session_ticks(configuration)
+    session = VirtualTime(configuration)
+    return _record(session, configuration, out, run_blocks(session, ticks), ticks, progress)
 
-    def blocks() -> Iterator[Any]:
-        for done in range(0, ticks, BLOCK):
-            yield graph.run(min(BLOCK, ticks - done))
 
-    return _record(graph, configuration, out, blocks(), ticks, progress)
+def session_ticks(configuration: Configuration) -> int:
+    """Number of ticks in the configured duration, at least one."""
+    return max(1, round(configuration.groups[SESSION].duration * 1e9 / TICK_NS))
+
+
+def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
+    """Rows of the next ticks, a block at a time."""
+    for done in range(0, ticks, BLOCK):
+        yield session.run(min(BLOCK, ticks - done))
 
 
 def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress = _silent) -> int:
-    """Run the recorded master through the graph again, in virtual time, and record it.
+    """Run the recorded masters through the graph again, in virtual time, and record it.
 
     Ticks are 1 ms apart, from the first to the last recorded sample; a tick for which none was
     recorded holds the one before it. For a recording of virtual time every tick has its own
     sample, so the same configuration gives the same slave motion, bit for bit.
 
     Args:
-        bag: Recording with master/measured_cp and master/buttons.
+        bag: Recording with master/measured_cp and master/buttons of every arm.
         configuration: What the samples run through.
         out: Directory of the new recording, made here.
         progress: As in :func:`simulate`.
@@ -72,25 +75,31 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
     Raises:
         RecordingError: The bag lacks a topic, or the directory is as in :func:`simulate`.
     """
-    bag.require((topics.MASTER_MEASURED_CP, topics.MASTER_BUTTONS))
-    recorded = [topic for topic in MASTER_TOPICS if topic.name in bag.topics]
+    session = VirtualTime(configuration, is_replay=True)
+    samples, ticks = replayed_blocks(session, bag)
+    return _record(session, configuration, out, samples, ticks, progress)
+
+
+def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]:
+    """Rows of a replay, a block at a time, and the number of ticks; raises as :func:`replay`."""
+    played = session.played_topics
+    needed = [t for t in played if t.kind in {Kind.POSE, Kind.BUTTONS}]
+    bag.require(needed)
+    recorded = [topic for topic in played if topic.name in bag.topics]
     series = bag.read_many(recorded)
-    poses = series[topics.MASTER_MEASURED_CP.name]
-    stamps = np.arange(poses.stamp_ns[0], poses.stamp_ns[-1] + 1, TICK_NS)
-    graph = Graph(configuration.groups)
+    poses = series[needed[0].name]
+    stamps = stamps_of(int(poses.stamp_ns[0]), int(poses.stamp_ns[-1]))
 
     def blocks() -> Iterator[Any]:
         for done in range(0, len(stamps), BLOCK):
-            samples = make_signals(graph.robot.n, len(stamps[done : done + BLOCK]))
-            samples["stamp_ns"] = stamps[done : done + BLOCK]
+            samples = session.rows(len(stamps[done : done + BLOCK]))
+            samples["now_ns"] = stamps[done : done + BLOCK]
             for topic in recorded:
-                _hold(series[topic.name], samples["stamp_ns"], samples[topic.field])
-            yield graph.replay(samples)
+                samples[f"{topic.field}_ns"] = samples["now_ns"]
+                _hold(series[topic.name], samples["now_ns"], samples[topic.field])
+            yield session.replay(samples)
 
-    return _record(graph, configuration, out, blocks(), len(stamps), progress)
-
-
-MASTER_TOPICS = STAGES[0].writes
+    return blocks(), len(stamps)
 
 
 def _hold(series: Series, stamps_ns: NDArray[np.int64], values: Array) -> None:
@@ -110,97 +119,112 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     return layer, bag.metadata.get("scenario", "")
 
 
-def recorded_path(configuration: Configuration) -> tuple[Array, Array] | None:
-    """Path for an operator who follows a recording, None for any other.
-
-    Raises:
-        RecordingError: The recording is missing or lacks master/measured_cp.
-    """
-    path = configuration.groups["haptic_master"].path
-    if path.kind != "bag":
-        return None
-    bag = Bag(Path(path.bag))
-    bag.require((topics.MASTER_MEASURED_CP,))
-    series = bag.read(topics.MASTER_MEASURED_CP)
-    times = (series.stamp_ns - series.stamp_ns[0]) * 1e-9
-    moves = series.values[:, :3] - series.values[0, :3]
-    return times, np.hstack((moves, rotation_vectors(series.values[:, 3:])))
-
-
 def _record(
-    graph: Graph,
+    session: VirtualTime,
     configuration: Configuration,
     out: Path,
-    blocks: Iterator[Any],
+    blocks: Iterable[Any],
     ticks: int,
     progress: Progress,
 ) -> int:
-    written = (*STREAMS, topics.TELEOP_STATE)
-    done, last_state = 0, np.full(len(STATE_FIELDS), np.nan)
-    with BagWriter(
-        out,
-        written,
-        graph.robot.joint_names,
-        parameters=configuration.groups["recorder"],
-        metadata=describe(configuration),
-    ) as writer:
+    done = 0
+    with open_writer(session, configuration, out) as writer:
+        reports = StateReports(session)
         for block in blocks:
-            write_signals(writer, block)
-            last_state = _write_state(writer, block, last_state)
+            write_signals(writer, session.graph.streams, block)
+            reports.write(writer, block)
             done += len(block)
             progress(done, ticks)
     if not done:
         raise RecordingError(out, "holds no ticks")
-    return done  # fmt: skip
+    return done
+
+
+def open_writer(session: VirtualTime, configuration: Configuration, out: Path) -> BagWriter:
+    """Writer of everything that a session's stages write."""
+    return BagWriter(
+        out,
+        session.graph.topics,
+        session.joint_names,
+        parameters=configuration.groups[RECORDER_NAME],
+        metadata=describe(configuration),
+    )
 
 
 def describe(configuration: Configuration) -> dict[str, str]:
     """Names and texts stored with a recording, so that it can be repeated."""
     from teleop_core import __version__
 
-    return {
-        "version": __version__,
-        "scenario": configuration.scenario,
-        "robot": configuration.groups["slave_sim"].robot,
-        "seed": str(configuration.groups["haptic_master"].seed),
-        "configuration": configuration.text(),
-    }
+    graph = configuration.graph
+    about = {"version": __version__, "scenario": configuration.scenario}
+    if graph.arms != ("",):
+        about["arms"] = " ".join(graph.arms)
+    for arm in graph.namespaces:
+        prefix = f"{arm}/" if arm else ""
+        about[f"{prefix}robot"] = configuration.group("slave_sim", arm).robot
+        about[f"{prefix}seed"] = str(configuration.group("haptic_master", arm).seed)
+    return about | {"configuration": configuration.text()}
 
 
-def write_signals(writer: BagWriter, block: Any) -> None:
-    """Record a block of signals; setpoints carry the stamp of the command in force."""
-    log_ns = block["stamp_ns"]
-    setpoints = {topics.SLAVE_SETPOINT_JS, topics.SLAVE_SETPOINT_CP}
+def write_signals(writer: BagWriter, streams: Iterable[Topic], block: Any) -> None:
+    """Record some streams of a block of rows, each under its own stamp."""
+    log_ns = block["now_ns"]
     writer.write_block(
-        {
-            topic: (block["setpoint_stamp_ns" if topic in setpoints else "stamp_ns"],
-                    block[topic.field], log_ns)
-            for topic in STREAMS
-        }
-    )  # fmt: skip
+        {topic: (block[f"{topic.field}_ns"], block[topic.field], log_ns) for topic in streams}
+    )
 
 
-def state_report(stamp_ns: int, state: Array) -> bytes:
-    """Message of teleop/state, as CDR bytes, for one row of :data:`STATE_FIELDS`."""
+def state_report(stamp_ns: int, state: Array, described: Mapping[str, str] | None = None) -> bytes:
+    """Message of teleop/state, as CDR bytes.
+
+    Args:
+        stamp_ns: Stamp [ns].
+        state: Row of :data:`STATE_FIELDS`.
+        described: Further names and texts, such as what the fixture is.
+    """
     values = {name: repr(float(value)) for name, value in zip(STATE_FIELDS, state, strict=True)}
-    return report(stamp_ns, "teleop", 0, state_text(state), values)
+    more = dict(described or {})
+    text = state_text(state, more.get("fixture", "box"))
+    return report(stamp_ns, "teleop", 0, text, values | more)
 
 
-def state_text(state: Array) -> str:
+def state_text(state: Array, fixture: str = "box") -> str:
     """State in words: CLUTCHED or FOLLOWING or ALIGNING, mode and fixture."""
     named = dict(zip(STATE_FIELDS, state, strict=True))
     doing = "CLUTCHED" if named["is_clutched"] else "FOLLOWING"
     if not named["is_following"]:
         doing = "ALIGNING"
     mode = "fine" if named["is_fine"] else "coarse"
-    return f"{doing} {mode}{', box on' if named['is_fixture_on'] else ''}"
+    return f"{doing} {mode}{f', {fixture} on' if named['is_fixture_on'] else ''}"
 
 
-def _write_state(writer: BagWriter, block: Any, last: Array) -> Array:
-    """Record teleop/state where it changed; returns the last row."""
-    states = block["teleop_state"]
-    changed = (states != np.vstack((last, states[:-1]))).any(axis=1)
-    for i in np.flatnonzero(changed):
-        stamp = int(block["stamp_ns"][i])
-        writer.write(topics.TELEOP_STATE, stamp, state_report(stamp, states[i]))
-    return np.array(states[-1])
+class StateReports:
+    """Recorder of the reports of a session's stages, where they change."""
+
+    def __init__(self, session: VirtualTime) -> None:
+        self._reports = [
+            _Report(session, member, topic)
+            for member in session.graph.members
+            for topic in member.writes
+            if topic.kind is Kind.REPORT
+        ]
+
+    def write(self, writer: BagWriter, block: Any) -> None:
+        """Record the changes of a block."""
+        for report in self._reports:
+            report.write(writer, block)
+
+
+class _Report:
+    def __init__(self, session: VirtualTime, member: Member, topic: Topic) -> None:
+        self._topic, self._stage = topic, session.stages.get(member.name)
+        self._last = np.full(len(topic.columns), np.nan)
+
+    def write(self, writer: BagWriter, block: Any) -> None:
+        states, stamps = block[self._topic.field], block[f"{self._topic.field}_ns"]
+        changed = (states != np.vstack((self._last, states[:-1]))).any(axis=1)
+        described = getattr(self._stage, "described", dict)()
+        for i in np.flatnonzero(changed):
+            data = state_report(int(stamps[i]), states[i], described)
+            writer.write(self._topic, int(block["now_ns"][i]), data)
+        self._last = np.array(states[-1])

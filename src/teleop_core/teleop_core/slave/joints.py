@@ -8,8 +8,6 @@ import numpy as np
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 
-CONTROL_PERIOD = 1e-3
-
 
 @inner
 def _derivative(
@@ -47,8 +45,9 @@ def integrate(
     effort: Array,
     q: Array,
     dq: Array,
+    dt: float,
 ) -> None:
-    """Move ``q`` and ``dq`` (n,) on by one control period under constant drive effort.
+    """Move ``q`` and ``dq`` (n,) on by one tick under constant drive effort.
 
     Args:
         acceleration: Pointer to the robot's rigid-body model.
@@ -60,9 +59,10 @@ def integrate(
         effort: Drive effort (n,) [N·m or N].
         q: Joint positions (n,) [rad or m]; written.
         dq: Joint speeds (n,) [rad/s or m/s]; written.
+        dt: Tick [s].
     """
     n = q.shape[0]
-    h = CONTROL_PERIOD / steps
+    h = dt / steps
     k, net = np.empty((4, n)), np.empty(n)
     position, speed = np.empty(n), np.empty(n)
     for _ in range(steps):

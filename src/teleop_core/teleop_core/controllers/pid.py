@@ -1,0 +1,136 @@
+"""PID: one joint's controller in parallel form, with a clean derivative and no windup."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.controllers import Controller, per_joint
+from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
+from teleop_core.parameters import parameter
+from teleop_core.robots.robot import Robot
+
+
+@dataclass(frozen=True, kw_only=True)
+class PidParameters:
+    """Gains; empty lists mean: from the robot's drive table, critically damped."""
+
+    bandwidth: tuple[float, ...] = parameter(
+        (), unit="rad/s", lower=0.1, upper=500.0, doc="triple closed-loop pole of each joint"
+    )
+    kp: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/rad or N/m of each joint")
+    ki: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/(rad·s) or N/(m·s) of each joint")
+    kd: tuple[float, ...] = parameter((), lower=0.0, doc="N·m·s/rad or N·s/m of each joint")
+
+
+def critically_damped_gains(
+    inertia: Array, viscous: Array, bandwidth: Array
+) -> tuple[Array, Array, Array]:
+    """Gains that put all three closed-loop poles of an inertia with friction at one real place.
+
+    The loop ``inertia q'' + viscous q' = Kp e + Ki ∫e + Kd e'`` has the characteristic
+    polynomial ``inertia (s + bandwidth)³``: three equal real poles, hence no oscillation.
+
+    Args:
+        inertia: Inertias (n,) [kg·m² or kg], > 0.
+        viscous: Viscous friction (n,) [N·m·s/rad or N·s/m], >= 0.
+        bandwidth: Triple pole (n,) [rad/s], > 0.
+
+    Returns:
+        Kp, Ki, Kd, each (n,). Where friction alone damps more than wanted, Kd is 0.
+    """
+    kp = 3.0 * bandwidth**2 * inertia
+    ki = bandwidth**3 * inertia
+    kd = (3.0 * bandwidth * inertia - viscous).clip(min=0.0)
+    return kp, ki, kd
+
+
+@kernel
+def pid_step(
+    setpoint: float,
+    measured: float,
+    gains: Array,
+    memory: Array,
+    feedforward: float,
+    limit: float,
+    dt: float,
+) -> float:
+    """Drive effort for one tick, within ±limit; updates the memory.
+
+    The integral is held while the drive is saturated and the error would push it further
+    (conditional integration). The derivative acts on the measured position alone, through a
+    first-order filter of two ticks: a step of the setpoint gives it no kick.
+
+    Args:
+        setpoint: Wanted position [rad or m].
+        measured: Measured position [rad or m].
+        gains: Kp, Ki, Kd.
+        memory: Integral effort, last measured position, filtered speed (3,); written.
+        feedforward: Effort added before the limit.
+        limit: Largest effort of the drive.
+        dt: Tick [s], > 0.
+
+    Returns:
+        Effort [N·m or N].
+    """
+    memory[2] += ((measured - memory[1]) / dt - memory[2]) / 2.0
+    memory[1] = measured
+    error = setpoint - measured
+    free = gains[0] * error - gains[2] * memory[2] + feedforward
+    integral = memory[0] + gains[1] * error * dt
+    effort = free + integral
+    if abs(effort) <= limit or effort * error < 0.0:
+        memory[0] = integral
+    else:
+        effort = free + memory[0]
+    return min(max(effort, -limit), limit)
+
+
+@kernel
+def pid_control(
+    gains: Array,
+    memory: Array,
+    setpoint: Array,
+    measured: Array,
+    feedforward: Array,
+    limit: Array,
+    dt: float,
+    effort: Array,
+) -> None:
+    """Write the efforts of all joints; see :func:`pid_step`."""
+    for i in range(effort.shape[0]):
+        effort[i] = pid_step(
+            setpoint[i], measured[i], gains[i], memory[i], feedforward[i], limit[i], dt
+        )
+
+
+def pid_gains(parameters: PidParameters, robot: Robot, viscous: Array) -> Array:
+    """Kp, Ki, Kd of each joint, (n, 3): given, or from the robot's drives.
+
+    Raises:
+        ParameterError: A list has another length than the robot has joints.
+    """
+    drives = robot.drives
+    assert drives is not None
+    bandwidth = per_joint(robot, "controller.pid.bandwidth", parameters.bandwidth, drives.bandwidth)
+    designed = critically_damped_gains(drives.inertia, viscous, bandwidth)
+    given = (("kp", parameters.kp), ("ki", parameters.ki), ("kd", parameters.kd))
+    columns = [
+        per_joint(robot, f"controller.pid.{name}", values, default)
+        for (name, values), default in zip(given, designed, strict=True)
+    ]
+    return np.stack(columns, axis=1)
+
+
+def begin(memory: Array, measured: Array, effort: Array) -> None:
+    """Let the integrators hold the arm where it is."""
+    memory[:, 0] = effort
+    memory[:, 1] = measured
+
+
+def shift(memory: Array, effort: Array) -> None:
+    """Let the integrators take over what the feedforward no longer gives."""
+    memory[:, 0] += effort
+
+
+PID = Controller("pid", PidParameters, pid_gains, pid_control, 3, begin, shift)

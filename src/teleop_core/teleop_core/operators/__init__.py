@@ -1,0 +1,125 @@
+"""Operators: what the hand wants to do, one file per kind.
+
+An operator is asked for motion at some times, a block of ticks at once, and answers with places and
+turns of the hand relative to where the stylus rests. The simulated hand then tries to get there
+against its mass, its tremor and the device's force.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.errors import PartError
+from teleop_core.geometry import Array
+from teleop_core.parameters import NoParameters
+from teleop_core.registry import Registry
+
+__all__ = ["OPERATORS", "Motion", "Operator", "Setting", "following", "register_operator"]
+
+Motion = Callable[[Array], Array]
+"""Times (N,) since the start [s] to rows (N, 3), (N, 6) or (N, 9).
+
+Columns: position x, y, z [m] and rotation vector [rad] relative to the start, in the master's base;
+then the buttons clutch, fixture, mode (1 pressed). What is left out is zero.
+"""
+
+
+class Setting(NamedTuple):
+    """What an operator is made with beside parameters of its own.
+
+    Attributes:
+        common: The whole group ``haptic_master.operator``.
+        phases: Random phases (6, 4) [rad] of the session's seed, the same for every operator.
+        seed: Seed of the session, for more random numbers.
+    """
+
+    common: Any
+    phases: Array
+    seed: int
+
+
+@dataclass(frozen=True)
+class Operator:
+    """A kind of operator.
+
+    Attributes:
+        name: What ``--set operator=`` calls it.
+        make: ``make(parameters, setting)`` gives the :data:`Motion` of one session.
+        parameters: Its parameter group, beside those that all operators share.
+        ahead: Ticks for which it can be asked at once: 1 for one who answers to what happens.
+    """
+
+    name: str
+    make: Callable[[Any, Setting], Motion]
+    parameters: type = NoParameters
+    ahead: int = 1000
+
+
+def following(name: str, times: object, rows: object) -> Operator:
+    """Operator who follows given samples, linear in between, and rests before and after them.
+
+    Args:
+        name: What it is called.
+        times: Times (N,) since the start [s], rising.
+        rows: Rows as of :data:`Motion`; buttons are held, not interpolated.
+
+    Raises:
+        PartError: Shapes do not fit, times do not rise, or a number is not finite.
+    """
+    motion = sampled_motion(name, times, rows)
+    return Operator(name, lambda parameters, setting: motion)
+
+
+def sampled_motion(name: str, times: object, rows: object) -> Motion:
+    """Motion through samples; see :func:`following`."""
+    at, wanted = np.array(times, np.float64), np.array(rows, np.float64)
+    if at.ndim != 1 or wanted.ndim != 2 or len(at) != len(wanted) or not len(at):
+        text = (
+            f"given as times (N,) and rows (N, 3), (N, 6) or (N, 9), not {at.shape}, {wanted.shape}"
+        )
+        raise PartError("operator", name, text)
+    if wanted.shape[1] not in {3, 6, 9}:
+        raise PartError("operator", name, f"given in 3, 6 or 9 columns, not {wanted.shape[1]}")
+    if not (np.isfinite(at).all() and np.isfinite(wanted).all()):
+        bad = int(np.flatnonzero(~(np.isfinite(wanted).all(axis=1) & np.isfinite(at)))[0])
+        raise PartError("operator", name, f"given in finite numbers; row {bad} is not")
+    if (np.diff(at) <= 0.0).any():
+        bad = int(np.flatnonzero(np.diff(at) <= 0.0)[0]) + 1
+        raise PartError("operator", name, f"given at rising times; row {bad} is not later")
+
+    def motion(times: Array) -> Array:
+        smooth = [np.interp(times, at, column) for column in wanted[:, :6].T]
+        held = wanted[np.maximum(np.searchsorted(at, times, side="right") - 1, 0), 6:]
+        return np.column_stack((*smooth, held))
+
+    return motion
+
+
+def _checked(name: str, part: object) -> Operator:
+    if isinstance(part, Operator):
+        return part
+    if callable(part):  # a motion alone: the shortest way to an own operator
+        motion: Motion = part
+        return Operator(name, lambda parameters, setting: motion)
+    raise PartError("operator", name, f"an Operator or motion(times), not a {type(part).__name__}")
+
+
+OPERATORS: Registry[Operator] = Registry(
+    "operator",
+    "operators",
+    {
+        **{kind: f"teleop_core.operators.shapes:{kind.upper()}"
+           for kind in ("random", "line", "circle", "points", "hold")},
+        "bag": "teleop_core.operators.recorded:BAG",
+        "file": "teleop_core.operators.recorded:FILE",
+    },
+    _checked,
+)  # fmt: skip
+"""All operators by name."""
+
+
+def register_operator(name: str, operator: Operator | Motion, *, replace: bool = False) -> Operator:
+    """Add an operator, or a motion alone, for the rest of the program; see :meth:`Registry.add`."""
+    return OPERATORS.add(name, operator, replace=replace)

@@ -1,0 +1,154 @@
+"""Denavit-Hartenberg chains as values: rows in one convention, and the robot they make."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.errors import ShapeError
+from teleop_core.geometry import Array, checked_array, rotation, transform
+from teleop_core.robots import dh_kernels
+from teleop_core.robots.dh_drives import drives_of
+from teleop_core.robots.drives import independent_axes
+from teleop_core.robots.kinematics import DIRECTIONS, Kernels
+from teleop_core.robots.robot import Robot
+
+# Elementary motions of one row, left to right: what, along or about which axis, by which symbol.
+CONVENTIONS = {
+    "standard": (("turn", "z", "theta"), ("slide", "z", "d"),
+                 ("slide", "x", "a"), ("turn", "x", "alpha")),
+    "modified": (("turn", "x", "alpha"), ("slide", "x", "a"),
+                 ("turn", "z", "theta"), ("slide", "z", "d")),
+    "sheth_uicker": (("turn", "z", "gamma"), ("slide", "z", "c"),
+                     ("turn", "x", "alpha"), ("slide", "x", "a"),
+                     ("turn", "z", "beta"), ("slide", "z", "b")),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class DhJoint:
+    """Joint of a row: its symbol is ``sign * q`` plus the row's constant; limits [rad or m]."""
+
+    name: str
+    symbol: str
+    sign: float
+    lower: float
+    upper: float
+    home: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DhRow:
+    """One row: constants by symbol [rad, m], and the joint if it has one."""
+
+    constants: Mapping[str, float]
+    joint: DhJoint | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DhTable:
+    """A chain: rows in one convention, from the base to the tip.
+
+    ``task`` names the directions that the arm is to control, in base axes, of
+    :data:`DIRECTIONS`; the others are left to the residual. ``drives`` holds, for each joint, the
+    entries of its drive that are stated [SI]; empty means for none.
+    """
+
+    name: str
+    convention: str
+    rows: tuple[DhRow, ...]
+    task: tuple[str, ...] = DIRECTIONS
+    drives: tuple[Mapping[str, float], ...] = ()
+
+    @property
+    def joints(self) -> tuple[DhJoint, ...]:
+        """Joints from the base to the tip; their number is the chain's degrees of freedom."""
+        return tuple(row.joint for row in self.rows if row.joint)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """For each joint "turn" or "slide"."""
+        return tuple(kinds_of(self.convention)[joint.symbol] for joint in self.joints)
+
+    def link_transforms(self, q: object) -> Array:
+        """Transform of each row, frame i in frame i-1.
+
+        Args:
+            q: Joint vector (n,) [rad, m].
+
+        Returns:
+            (rows, 4, 4); their product from left to right is ``T_base_tip``.
+
+        Raises:
+            ShapeError: Another shape.
+            ParameterError: NaN or infinity.
+        """
+        values = checked_array("q", q, (len(self.joints),))
+        if values.ndim != 1:
+            raise ShapeError("q", (len(self.joints),), values.shape)
+        moves, out = iter(values), np.empty((len(self.rows), 4, 4))
+        for i, row in enumerate(self.rows):
+            out[i] = np.eye(4)
+            value = next(moves) * row.joint.sign if row.joint else 0.0
+            for kind, axis, symbol in CONVENTIONS[self.convention]:
+                amount = row.constants.get(symbol, 0.0)
+                if row.joint and symbol == row.joint.symbol:
+                    amount += value
+                out[i] = out[i] @ elementary(kind, axis, amount)
+        return out
+
+    def robot(self) -> Robot:
+        """The chain as a robot with numeric inverse kinematics, which can be a slave."""
+        drives = drives_of(self.kinds, self.drives or ({},) * len(self.joints))
+        return Robot(
+            name=self.name,
+            joint_names=tuple(joint.name for joint in self.joints),
+            lower=np.array([joint.lower for joint in self.joints]),
+            upper=np.array([joint.upper for joint in self.joints]),
+            home=np.array([joint.home for joint in self.joints]),
+            geometry=self._geometry(),
+            kernels=Kernels(
+                fk=dh_kernels.fk,
+                jacobian=dh_kernels.jacobian,
+                ik=dh_kernels.ik,
+                ik_all=dh_kernels.ik_all,
+            ),
+            drives=drives,
+            dynamics=independent_axes(drives.inertia),
+            task_mask=tuple(direction in self.task for direction in DIRECTIONS),
+        )
+
+    def _geometry(self) -> dict[str, float]:
+        """Row of :mod:`teleop_core.robots.dh_kernels`, every number with a name."""
+        kinds, reach, fixed = [], 0.0, [np.eye(4)]
+        for row in self.rows:
+            for kind, axis, symbol in CONVENTIONS[self.convention]:
+                amount = row.constants.get(symbol, 0.0)
+                fixed[-1] = fixed[-1] @ elementary(kind, axis, amount)
+                reach += abs(amount) if kind == "slide" else 0.0
+                if row.joint and symbol == row.joint.symbol:
+                    kinds.append(row.joint.sign * (1.0 if kind == "turn" else 2.0))
+                    fixed.append(np.eye(4))
+                    if kind == "slide":
+                        reach += max(abs(row.joint.lower), abs(row.joint.upper))
+        names = {f"kind{i + 1}": kind for i, kind in enumerate(kinds)}
+        weights = {f"controls_{name}": float(name in self.task) for name in DIRECTIONS}
+        numbers = {
+            f"fixed{i}_{r}{c}": float(matrix[r, c])
+            for i, matrix in enumerate(fixed)
+            for r in range(3)
+            for c in range(4)
+        }
+        return {**names, "reach": reach if reach > 0.0 else 1.0, **weights, **numbers}
+
+
+def elementary(kind: str, axis: str, amount: float) -> Array:
+    """Transform (4, 4) of a "turn" [rad] about or a "slide" [m] along a coordinate axis."""
+    if kind == "turn":
+        return transform(rotation(axis, amount), np.zeros(3))
+    return transform(np.eye(3), amount * np.eye(3)["xyz".index(axis)])
+
+
+def kinds_of(convention: str) -> dict[str, str]:
+    """Symbols of a row, and whether each is a "turn" or a "slide"."""
+    return {symbol: kind for kind, _, symbol in CONVENTIONS[convention]}

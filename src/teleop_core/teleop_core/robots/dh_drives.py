@@ -1,0 +1,108 @@
+"""Drives of a Denavit-Hartenberg table: what its ``drives`` section states, the rest assumed.
+
+What a joint does not state is assumed to be of the size of a small laboratory arm, and in
+proportion to its inertia, so that friction stays within what the simulation resolves.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.robots.drives import ENTRIES, MAY_BE_ZERO, Drives
+
+# All assumed, [rad, N·m, s] of turning joints, [m, N, s] of sliding ones.
+_INERTIA = {"turn": 0.1, "slide": 2.0}
+_SPEEDS = {
+    "turn": {"friction_speed": 0.01, "speed_limit": 2.0, "encoder_step": 2e-5, "bandwidth": 60.0},
+    "slide": {"friction_speed": 1e-3, "speed_limit": 0.3, "encoder_step": 1e-6, "bandwidth": 60.0},
+}
+_PER_INERTIA = {
+    "turn": {"viscous": 2.0, "coulomb": 1.0, "effort_limit": 100.0},
+    "slide": {"viscous": 10.0, "coulomb": 0.4, "effort_limit": 40.0},
+}
+_OF_POSITION = ("friction_speed", "speed_limit", "encoder_step")  # in the table's unit of angles
+_FASTEST = {"bandwidth": 500.0}  # [rad/s], what the 1 kHz control can do
+# Friction may stop a joint no faster than this [1/s]: two integration steps a millisecond.
+_STIFFEST = 2000.0
+
+
+def assumed_drive(kind: str, stated: Mapping[str, float]) -> dict[str, float]:
+    """Entries of one joint, SI units, with those that are not stated filled in.
+
+    Args:
+        kind: "turn" or "slide".
+        stated: Entries of :data:`teleop_core.robots.drives.ENTRIES` that are known.
+    """
+    inertia = stated.get("inertia", _INERTIA[kind])
+    scaled = {name: share * inertia for name, share in _PER_INERTIA[kind].items()}
+    return {"inertia": inertia, **scaled, **_SPEEDS[kind], **stated}
+
+
+def drives_of(kinds: Sequence[str], stated: Sequence[Mapping[str, float]]) -> Drives:
+    """Drive table of joints, each "turn" or "slide", from the entries [SI] stated for each."""
+    joints = [assumed_drive(kind, own) for kind, own in zip(kinds, stated, strict=True)]
+    columns = {name: np.array([joint[name] for joint in joints]) for name in ENTRIES}
+    assumed = tuple(name for name in ENTRIES if any(name not in own for own in stated))
+    return Drives(**columns, assumed=assumed)
+
+
+def parse_drives(
+    content: Any, names: Sequence[str], kinds: Sequence[str], unit: float
+) -> tuple[dict[str, float], ...]:
+    """Stated entries [SI] of each joint, from the ``drives`` section of a table.
+
+    Args:
+        content: Mapping of joint names to mappings of entries; None when there is no section.
+        names: Names of the joints, in order.
+        kinds: "turn" or "slide" for each.
+        unit: Radians in the table's unit of angles.
+
+    Raises:
+        UnknownNameError: A joint or an entry that does not exist.
+        ParameterError: A value that is not possible.
+    """
+    section = {} if content is None else content
+    if not isinstance(section, Mapping):
+        raise ParameterError("drives", section, "a mapping from joint names to their entries")
+    for name in section:
+        if name not in names:
+            raise UnknownNameError("drives joint", name, names)
+    return tuple(
+        _joint(f"drives {name}", section.get(name, {}), unit if kind == "turn" else 1.0, kind)
+        for name, kind in zip(names, kinds, strict=True)
+    )
+
+
+def _joint(where: str, content: Any, unit: float, kind: str) -> dict[str, float]:
+    if not isinstance(content, Mapping):
+        raise ParameterError(where, content, "a mapping of entries such as {speed_limit: 2.0}")
+    stated: dict[str, float] = {}
+    for name, value in content.items():
+        if name not in ENTRIES:
+            raise UnknownNameError(f"{where} entry", name, ENTRIES)
+        number = _number(f"{where} {name}", name, value)
+        stated[name] = number * (unit if name in _OF_POSITION else 1.0)
+    _refuse_stiff(where, assumed_drive(kind, stated))
+    return stated
+
+
+def _number(where: str, name: str, value: Any) -> float:
+    is_least_zero, most = name in MAY_BE_ZERO, _FASTEST.get(name, math.inf)
+    needed = "a finite number" + (" >= 0" if is_least_zero else " > 0")
+    needed += f", <= {most:g}" if name in _FASTEST else ""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ParameterError(where, value, needed)
+    if value < 0.0 or (value == 0.0 and not is_least_zero) or value > most:
+        raise ParameterError(where, value, needed)
+    return float(value)
+
+
+def _refuse_stiff(where: str, joint: Mapping[str, float]) -> None:
+    rate = (joint["viscous"] + joint["coulomb"] / joint["friction_speed"]) / joint["inertia"]
+    if rate > _STIFFEST:
+        name = f"{where} (viscous + coulomb / friction_speed) / inertia"
+        needed = f"at most {_STIFFEST:g}/s; raise inertia or friction_speed"
+        raise ParameterError(name, rate, needed)

@@ -1,0 +1,15 @@
+"""Robot parameters: which arm a stage works for, for every stage whose topics have joints."""
+
+from dataclasses import dataclass
+
+from teleop_core.parameters import parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotParameters:
+    """The arm; all stages of one arm must name the same."""
+
+    robot: str = parameter("rcrt1", fixed=True, doc="slave robot, one of `teleop robot`")
+    geometry: tuple[str, ...] = parameter(
+        (), fixed=True, doc="symbol=value in place of the robot's lengths and options [m, rad]"
+    )

@@ -1,0 +1,136 @@
+"""Robots as parts: what counts as one, and how it becomes a :class:`Robot`."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Protocol, TypeAlias, TypeVar, runtime_checkable
+
+import numpy as np
+
+from teleop_core.errors import ParameterError, PartError, TeleopError, UnknownNameError
+from teleop_core.registry import Registry
+from teleop_core.robots.robot import Robot
+
+_BUILT_IN = (
+    "rcrt1", "mma", "four_bar", "parallelogram", "stewart", "rps3", "scara_stewart",
+    "three_finger_hand", "puma560", "scara", "planar_3r", "five_axis",
+)  # fmt: skip
+_TABLE_ENDINGS = (".yaml", ".yml")
+# Of a failure of somebody else's kernel, which may be pages long.
+_MOST_CHARACTERS = 200
+
+
+@runtime_checkable
+class RobotSource(Protocol):
+    """What describes a robot, such as :class:`teleop_core.robots.dh.DhTable`."""
+
+    def robot(self) -> Robot:
+        """The robot."""
+        ...
+
+
+RobotPart: TypeAlias = Robot | RobotSource | Callable[..., Robot]
+"""A robot, what describes one, or ``make(**geometry)`` that returns one, all with defaults."""
+Part = TypeVar("Part", bound=RobotPart)
+
+
+def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Robot:
+    """Robot of a part.
+
+    Raises:
+        UnknownNameError: The part's function does not take such a symbol.
+        ParameterError: A ready robot is given a geometry, or a length is not possible.
+        PartError: The part makes something else than a robot.
+    """
+    if isinstance(part, Robot | RobotSource):
+        if geometry:
+            raise ParameterError("geometry", dict(geometry), f"empty: {name!r} has no symbols")
+        robot: object = part if isinstance(part, Robot) else part.robot()
+    else:
+        _refuse_unknown(part, geometry)
+        robot = part(**geometry)
+    if not isinstance(robot, Robot):
+        raise PartError("robot", name, f"made as a Robot, not as a {type(robot).__name__}")
+    return robot
+
+
+def from_file(path: str, geometry: Mapping[str, float | str]) -> Robot | None:
+    """Robot of a Denavit-Hartenberg table; None for what is no name of such a file."""
+    if not path.endswith(_TABLE_ENDINGS):
+        return None
+    from teleop_core.robots.dh import load_table
+
+    return built(path, load_table(Path(path).expanduser()), geometry)
+
+
+def _refuse_unknown(make: Callable[..., Robot], geometry: Mapping[str, float | str]) -> None:
+    parameters = inspect.signature(make).parameters.values()
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+        return
+    known = [p.name for p in parameters if p.kind in {p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD}]
+    for symbol in geometry:
+        if symbol not in known:
+            raise UnknownNameError("geometry", symbol, known)
+
+
+def _checked(name: str, part: object) -> RobotPart:
+    if isinstance(part, Robot) or (isinstance(part, RobotSource) and not isinstance(part, type)):
+        return part
+    if not callable(part):
+        text = "a Robot, a DhTable or a function make(**geometry) -> Robot"
+        raise PartError("robot", name, f"{text}, not a {type(part).__name__}")
+    try:
+        inspect.signature(part).bind()
+    except TypeError as error:
+        raise PartError(
+            "robot", name, f"a function whose parameters all have defaults ({error})"
+        ) from error
+    except ValueError:  # built into Python: no signature to look at
+        pass
+    return part
+
+
+def _try(part: RobotPart) -> None:
+    """Run every kernel once at home, so that a wrong one is told before anything else runs.
+
+    Chains of a table are not tried: their kernels are ours.
+    """
+    name = part_name(part)
+    robot = built(name, part, {})
+    if robot.kernels.ik.__module__.startswith("teleop_core."):
+        return
+    try:
+        tip = robot.fk(robot.home)
+        robot.jacobian(robot.home)
+        robot.ik(tip, robot.home)
+        robot.ik_all(tip)
+        _try_dynamics(robot)
+    except TeleopError:
+        raise
+    except Exception as error:  # whatever a foreign kernel raises, one line names it
+        reason = " ".join(str(error).split())[:_MOST_CHARACTERS]
+        raise PartError(
+            "robot", name, f"one whose kernels run at home; {type(error).__name__}: {reason}"
+        ) from error
+
+
+def _try_dynamics(robot: Robot) -> None:
+    if robot.dynamics is not None:
+        q, row, out = robot.home.copy(), robot.dynamics.parameters.copy(), np.zeros(robot.n)
+        robot.dynamics.gravity(q, row, out)
+        robot.dynamics.acceleration(q, np.zeros(robot.n), np.zeros(robot.n), row, out)
+
+
+def part_name(part: RobotPart) -> str:
+    """Name that a part brings along: its own, or that of its function."""
+    return str(getattr(part, "name", None) or getattr(part, "__name__", type(part).__name__))
+
+
+ROBOTS: Registry[RobotPart] = Registry(
+    "robot",
+    "robots",
+    {name: f"teleop_core.robots.{name}:make" for name in _BUILT_IN},
+    _checked,
+    _try,
+)
+"""All robots by name; see :data:`RobotPart` for what can be added."""

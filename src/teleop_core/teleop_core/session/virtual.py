@@ -1,0 +1,111 @@
+"""Virtual time: all stages of a graph in one process, tick by tick, as fast as the machine allows."""
+
+from typing import Any
+
+import numpy as np
+
+from teleop_core.kernels import records
+from teleop_core.session.compose import Tick, block_dtype, compose
+from teleop_core.session.configuration import Configuration
+from teleop_core.signals import TICK_NS
+from teleop_core.stage import Runner, joints_of
+from teleop_core.topics import Topic
+
+BLOCK = 1000
+"""Ticks that are made at once, at most."""
+
+
+class VirtualTime:
+    """A session in virtual time.
+
+    Args:
+        configuration: What runs.
+        tick_ns: Length of a tick [ns].
+        is_replay: Whether the masters' topics come from recorded samples; see :meth:`replay`.
+
+    Attributes:
+        graph: What runs.
+        stages: Stages at work, by the names of their members.
+        joint_names: Joint names of each arm by its namespace; empty for an arm without a robot.
+        now_ns: Time of the last tick [ns]; the first tick is one tick after 0.
+    """
+
+    def __init__(
+        self, configuration: Configuration, tick_ns: int = TICK_NS, *, is_replay: bool = False
+    ) -> None:
+        self.graph, self._tick_ns = configuration.graph, tick_ns
+        groups, dt = configuration.groups, tick_ns / 1e9
+        first = self.graph.stages[0]
+        self._played = frozenset(
+            m.name for m in self.graph.members if is_replay and m.stage is first
+        )
+        self.stages: dict[str, Runner] = {
+            member.name: member.stage.run(groups[member.name], dt)
+            for member in self.graph.members
+            if member.name not in self._played
+        }
+        self.joint_names = {arm: self._joints(groups, arm) for arm in self.graph.namespaces}
+        joints = {arm: len(names) for arm, names in self.joint_names.items()}
+        self._dtype = block_dtype(self.graph, joints)
+        self._tick: Tick = compose(self.graph, self.stages, self._dtype, dt, self._played)
+        self._ahead = min([BLOCK, *(stage.ahead for stage in self.stages.values())])
+        self.now_ns = 0
+
+    def _joints(self, groups: dict[str, Any], arm: str) -> tuple[str, ...]:
+        names = [m.name for m in self.graph.members if m.arm == arm]
+        return next((found for name in names if (found := joints_of(groups[name]))), ())
+
+    @property
+    def source(self) -> str:
+        """Generated source of the tick."""
+        return self._tick.source
+
+    @property
+    def played_topics(self) -> tuple[Topic, ...]:
+        """Topics that :meth:`replay` takes from samples."""
+        members = [m for m in self.graph.members if m.name in self._played]
+        return tuple(topic for member in members for topic in member.writes)
+
+    def rows(self, count: int) -> Any:
+        """Rows (count,) of everything that happens in a tick, all zero."""
+        return records(self._dtype, count)
+
+    def run(self, ticks: int) -> Any:
+        """Next ``ticks`` ticks of the session.
+
+        Returns:
+            Rows (ticks,): ``now_ns``, the fields and stamps of all topics, and the stages' notes.
+
+        Raises:
+            TeleopError: A part cannot go on.
+        """
+        return self._run(ticks, self.rows(1))
+
+    def replay(self, samples: Any) -> Any:
+        """Ticks with recorded samples in place of the simulated masters.
+
+        Args:
+            samples: Rows (N,) of which ``now_ns``, steps of one tick, and the fields and stamps of
+                :attr:`played_topics` are used.
+
+        Returns:
+            Rows (N,) as :meth:`run` gives them.
+        """
+        self.now_ns = int(samples["now_ns"][0]) - self._tick_ns
+        return self._run(len(samples), samples)
+
+    def _run(self, ticks: int, samples: Any) -> Any:
+        block = self.rows(ticks)
+        for begin in range(0, ticks, self._ahead):
+            part = block[begin : begin + self._ahead]
+            for stage in self.stages.values():
+                stage.prepare(len(part))
+            taken = samples[begin : begin + self._ahead] if self._played else samples
+            self._tick.run(self.now_ns + self._tick_ns, self._tick_ns, taken, part)
+            self.now_ns += len(part) * self._tick_ns
+        return block
+
+
+def stamps_of(first_ns: int, last_ns: int, tick_ns: int = TICK_NS) -> "np.ndarray[Any, Any]":
+    """Times of ticks from the first to the last [ns], both included where they fit."""
+    return np.arange(first_ns, last_ns + 1, tick_ns, dtype=np.int64)

@@ -1,0 +1,263 @@
+"""Stage: one step of the chain as a value, and what it is while a session runs.
+
+A stage names its parameters, the topics at its ports and the kernel that makes one step. From a
+tuple of stages everything else follows: the order of a tick, the nodes, the links, the recording.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from teleop_core.errors import PartError
+from teleop_core.kernels import bound, is_kernel, pointer, raise_pending, records
+from teleop_core.parameters import Value, specs, values_of
+from teleop_core.registry import Registry
+from teleop_core.robots import load_robot_set
+from teleop_core.signals import DT, Field, assign, make_signals
+from teleop_core.topics import Kind, Topic
+
+__all__ = ["STAGES", "Runner", "RunningStage", "Stage", "register_stage"]
+
+_WITH_JOINTS = (Kind.JOINTS, Kind.STATE)
+
+
+class Runner(Protocol):
+    """A stage at work: what virtual time and nodes need of it.
+
+    ``kernel(*arguments, signals, dt)`` makes one step from the inputs in ``signals`` to the outputs
+    there; a kernel that is compiled becomes part of the compiled tick, any other callable is
+    called from Python.
+    """
+
+    signals: Any
+    kernel: Callable[..., None]
+    arguments: tuple[Any, ...]
+    ahead: int
+    """Ticks for which it can be prepared at once, 1000 at most."""
+
+    def prepare(self, ticks: int) -> None:
+        """Get ready for the next ``ticks`` steps, ``ahead`` at most."""
+
+    def reset(self) -> None:
+        """Back to the state before the first step."""
+
+    def retune(self, parameters: Any) -> None:
+        """Take new parameters from the next step on; nothing jumps."""
+
+    def step(self) -> None:
+        """Make one step."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the graph.
+
+    Attributes:
+        name: Name of its node and of its group in parameter files.
+        parameters: Parameter group, a dataclass of :func:`~teleop_core.parameters.parameter`.
+        reads: Topics it reads; its record has a field for each.
+        writes: Topics it writes, streams and at most one report.
+        step: ``step(parameters, state, signals, dt)``, a kernel or a plain function: ``parameters``
+            and ``state`` are records with a field for each parameter and each entry of ``state``.
+        state: Fields of what it remembers from step to step, as :class:`numpy.dtype` takes them;
+            zero at the start.
+        make: In place of ``step`` and ``state``: makes the :class:`Runner` from parameters and the
+            length of a tick [s].
+        late: Those of ``reads`` that are taken as they were at the end of the last tick. A cycle
+            of stages needs one.
+        trigger: The topic whose messages it answers, one step each; None for a stage with a clock
+            of its own, which makes one step per tick.
+        replaces: Topic whose other readers read ``writes[0]`` in its place, as for a limit or a
+            filter between two stages.
+        notes: Further fields of its record, which nobody reads.
+        node: ``module:class`` of its node, if a general one does not do.
+        needs: Topics without which the node answers nothing.
+
+    Raises:
+        PartError: It contradicts itself; the text says how.
+    """
+
+    name: str
+    parameters: type
+    reads: tuple[Topic, ...]
+    writes: tuple[Topic, ...]
+    step: Callable[..., None] | None = None
+    state: tuple[Field, ...] = ()
+    make: Callable[[Any, float], Runner] | None = None
+    late: tuple[Topic, ...] = ()
+    trigger: Topic | None = None
+    replaces: Topic | None = None
+    notes: tuple[Field, ...] = ()
+    node: str = ""
+    needs: tuple[Topic, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse what could never run."""
+        known = {topic.name for topic in self.reads}
+        for word, topics in (("late", self.late), ("needs", self.needs)):
+            for topic in topics:
+                self._insist(topic.name in known, f"with {topic.name} ({word}) among its reads")
+        if self.trigger is not None:
+            text = f"with its trigger {self.trigger.name} among its reads"
+            self._insist(self.trigger.name in known, text)
+        for topic in self.writes:
+            is_known = topic.stamp.is_in_force or topic.stamp.of in {"", *known}
+            self._insist(is_known, f"with {topic.stamp.of}, whose stamp {topic.name} passes on, "
+                                   "among its reads")  # fmt: skip
+        if self.replaces is not None:
+            is_like = bool(self.writes) and self.writes[0].kind is self.replaces.kind
+            self._insist(self.replaces.name in known and is_like,
+                         f"one that reads {self.replaces.name} and writes its like first")  # fmt: skip
+        self._insist(self._is_made() or not (self.reads or self.writes),
+                     "with a step, step(parameters, state, signals, dt), or a make")  # fmt: skip
+        names = {spec.name for spec in specs(self.parameters)}
+        has_joints = any(topic.kind in _WITH_JOINTS for topic in (*self.reads, *self.writes))
+        self._insist("robot" in names or not has_joints,
+                     "one whose parameters inherit RobotParameters, for it has topics with joints")  # fmt: skip
+
+    def _is_made(self) -> bool:
+        return callable(self.step) is not callable(self.make)
+
+    def _insist(self, is_so: bool, expected: str) -> None:
+        if not is_so:
+            raise PartError("stage", self.name, expected)
+
+    @property
+    def ports(self) -> tuple[Topic, ...]:
+        """All topics of its record."""
+        return tuple(dict.fromkeys((*self.reads, *self.writes)))
+
+    def run(self, parameters: Any, dt: float = DT) -> Runner:
+        """The stage at work.
+
+        Args:
+            parameters: An instance of its group.
+            dt: Length of a tick [s].
+        """
+        if self.make is not None:
+            return self.make(parameters, dt)
+        return _Plain(self, parameters, dt)
+
+
+def joints_of(parameters: Any) -> tuple[str, ...]:
+    """Joint names of the robot that a stage's parameters name; empty without one."""
+    if not hasattr(parameters, "robot"):
+        return ()
+    return load_robot_set(parameters.robot, parameters.geometry).joint_names
+
+
+class RunningStage:
+    """Base of :class:`Runner` classes: a record of signals and a kernel bound to its arguments.
+
+    Args:
+        stage: What it runs.
+        joints: Number of joints of its arm; 0 without.
+        dt: Length of a tick [s].
+    """
+
+    def __init__(self, stage: Stage, joints: int, dt: float) -> None:
+        self.stage, self.dt = stage, dt
+        self.signals: Any = make_signals(stage.ports, joints, stage.notes)[0]
+        self.kernel: Callable[..., None] = _nothing
+        self.arguments: tuple[Any, ...] = ()
+        self.ahead = 1000
+        self._bound: Callable[[], object] | None = None
+
+    def prepare(self, ticks: int) -> None:
+        """Get ready for the next ``ticks`` steps; nothing to do here."""
+
+    def reset(self) -> None:
+        """Back to the state before the first step."""
+
+    def retune(self, parameters: Any) -> None:
+        """Take new parameters from the next step on."""
+
+    def step(self) -> None:
+        """Make one step."""
+        self.prepare(1)
+        if self._bound is None:
+            self._bound = bound(self.kernel, *self.arguments, self.signals, self.dt)
+        self._bound()
+        raise_pending()
+
+
+def _nothing() -> None:
+    """Stand in for the kernel of a stage that is being made."""
+
+
+class _Plain(RunningStage):
+    """A stage of records alone: parameters become fields, the state starts at zero."""
+
+    def __init__(self, stage: Stage, parameters: Any, dt: float) -> None:
+        super().__init__(stage, len(joints_of(parameters)), dt)
+        assert stage.step is not None
+        self.kernel = stage.step
+        declared = [(spec, value) for spec, value in _numbers(parameters)]
+        self._parameters = records(
+            [_field(name, value) for name, value in declared] or [("none", "i8")]
+        )[0]
+        self._state = records(list(stage.state) or [("none", "i8")])[0]
+        self.arguments = (self._parameters, self._state)
+        self._begin = self.signals.copy()
+        self.retune(parameters)
+
+    def reset(self) -> None:
+        """State and signals as before the first step."""
+        assign(self._state, 0)
+        assign(self.signals, self._begin)
+
+    def retune(self, parameters: Any) -> None:
+        """Take new parameters; those that are texts become the place of theirs in the choices."""
+        for name, value in _numbers(parameters):
+            self._parameters[name] = value
+
+
+def _numbers(parameters: Any) -> list[tuple[str, Any]]:
+    """Fields of a parameter record: dots as underscores, texts as places among their choices."""
+    found: list[tuple[str, Any]] = []
+    values = values_of(parameters)
+    for spec in specs(type(parameters)):
+        value: Value = values[spec.name]
+        if spec.element is str:
+            if spec.choices and isinstance(value, str):
+                found.append((spec.name.replace(".", "_"), spec.choices.index(value)))
+            continue
+        found.append((spec.name.replace(".", "_"), value))
+    return found
+
+
+def _field(name: str, value: Any) -> Field:
+    if isinstance(value, tuple):
+        return (name, "f8", (len(value),))
+    return (name, "f8" if isinstance(value, float) else "i8")
+
+
+def _checked(name: str, part: object) -> Stage:
+    if not isinstance(part, Stage):
+        raise PartError("stage", name, f"a Stage, not a {type(part).__name__}")
+    if part.name != name:
+        raise PartError("stage", name, f"registered under its own name, {part.name!r}")
+    return part
+
+
+STAGES: Registry[Stage] = Registry(
+    "stage",
+    "stages",
+    {
+        "haptic_master": "teleop_core.master.haptic_master:HAPTIC_MASTER",
+        "motion_scaling": "teleop_core.mapping.motion_scaling:MOTION_SCALING",
+        "inverse_kinematics": "teleop_core.robots.inverse_kinematics:INVERSE_KINEMATICS",
+        "slave_sim": "teleop_core.slave.slave_sim:SLAVE_SIM",
+        "recorder": "teleop_core.bags.recording:RECORDER",
+    },
+    _checked,
+)
+"""All stages by name, in the order in which data goes through the built-in ones."""
+
+
+def register_stage(stage: Stage, *, replace: bool = False) -> Stage:
+    """Add a stage under its own name for the rest of the program; see :meth:`Registry.add`."""
+    return STAGES.add(stage.name, stage, replace=replace)
+
+
+__all__ += ["is_kernel", "joints_of", "pointer"]
