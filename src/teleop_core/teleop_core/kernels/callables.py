@@ -17,6 +17,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from teleop_core.errors import KernelError
+from teleop_core.kernels.mistakes import place_of
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,7 @@ _SCALARS: dict[Any, Any] = {
     types.boolean: ctypes.c_bool,
 }
 _ARRAYS = (types.float64[::1], types.float64[:, ::1])
+_TAKEN = "float64, int64, bool or a C-contiguous array of float64, 1-D or 2-D"
 _RESULTS: dict[Any, tuple[Any, Callable[[Any], Any]]] = {
     types.void: (None, lambda _: None),
     types.float64: (ctypes.c_double, float),
@@ -120,17 +122,18 @@ def _views() -> Callable[..., Array]:
     return view
 
 
-def _check(function: Callable[..., Any], arguments: tuple[Any, ...], result: Any) -> None:
-    name = getattr(function, "__qualname__", repr(function))
+def _check(function: Any, arguments: tuple[Any, ...], result: Any) -> None:
+    name, place = getattr(function, "__name__", type(function).__name__), place_of(function)
     for i, kind in enumerate(arguments, 1):
         if kind not in _SCALARS and kind not in _ARRAYS:
-            reason = f"argument {i} is {kind}, must be float64, int64, bool or a C-contiguous array"
-            raise KernelError(f"signature of {name}", f"{reason} of float64, 1-D or 2-D")
+            raise KernelError(place, f"argument {i} of {name!r} is {kind}, must be {_TAKEN}")
     if result not in _RESULTS:
-        raise KernelError(f"signature of {name}", f"returns {result}, must be void, float64, int64")
+        expected = "void, float64 or int64"
+        raise KernelError(place, f"result of {name!r} is {result}, must be {expected}")
     try:
         inspect.signature(function).bind(*arguments)
     except TypeError as error:
-        raise KernelError(name, f"must take {len(arguments)} arguments ({error})") from error
+        count = f"{len(arguments)} argument" + "s" * (len(arguments) != 1)
+        raise KernelError(place, f"{name!r} must take {count} ({error})") from error
     except ValueError:  # a builtin, which does not say what it takes
         return

@@ -41,6 +41,14 @@ def kernel_error(
     return KernelError(f"{_shown(place[0])}:{place[1]}", reason)
 
 
+def place_of(function: object) -> str:
+    """File and line of a function; of another object its type."""
+    code = getattr(function, "__code__", None)
+    if not isinstance(code, CodeType):
+        return type(function).__qualname__
+    return f"{_shown(code.co_filename)}:{code.co_firstlineno}"
+
+
 def _shown(file: str) -> str:
     """Path of a file from the package or the working directory on, if it is in there."""
     for folder in (_PACKAGE, Path.cwd()):

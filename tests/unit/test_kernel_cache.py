@@ -1,0 +1,242 @@
+"""Kernels on disk: what is kept is thrown away when anything changes that it was made from."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from teleop_core.kernels import IS_COMPILED
+
+pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="nothing is kept of what is not compiled")
+
+CALLS = {
+    "inner.py": """
+from teleop_core.kernels import kernel
+
+@kernel
+def factor(x: float) -> float:
+    return 2.0 * x
+""",
+    "middle.py": """
+from teleop_core.kernels import kernel
+from inner import factor
+
+@kernel
+def plus_one(x: float) -> float:
+    return factor(x) + 1.0
+""",
+    "outer.py": """
+from numba import types
+from teleop_core.kernels import kernel, pointer
+from middle import plus_one
+
+@kernel
+def scaled(x: float) -> float:
+    return 10.0 * plus_one(x)
+
+@kernel
+def through(function, x: float) -> float:
+    return function(x)
+
+print(scaled(3.0), through(pointer(plus_one, types.float64(types.float64)), 3.0))
+print(sum(scaled.stats.cache_hits.values()))
+""",
+}
+
+CONSTANTS = {
+    "values.py": """
+from enum import IntEnum
+
+import numpy as np
+
+FIELDS = ("gain", "zero")
+OFFSET = 1.0
+WEIGHTS = (1.0, 2.0)
+TABLE = np.array([5.0, 6.0])
+IS_ON = True
+PLACES = {"first": 0, "second": 1}
+
+class Mode(IntEnum):
+    SLOW = 0
+    FAST = 2
+""",
+    "outer.py": """
+import numpy as np
+
+import values
+from teleop_core.kernels import inner, kernel
+from values import IS_ON, PLACES, TABLE, WEIGHTS, Mode
+
+ZERO = values.FIELDS.index("zero")
+SECOND = PLACES["second"]
+
+@kernel
+def from_names(row):
+    return row[ZERO]
+
+@kernel
+def from_dictionary(row):
+    return row[SECOND]
+
+@inner
+def offset(x):
+    return x + values.OFFSET
+
+@kernel
+def from_called(row):
+    return offset(row[0])
+
+@kernel
+def from_tuple(row):
+    return row[0] * WEIGHTS[1]
+
+@kernel
+def from_array(row):
+    return row[0] + TABLE[0]
+
+@kernel
+def from_flag(row):
+    return row[0] if IS_ON else row[1]
+
+@kernel
+def from_choice(row):
+    return row[1] if int(row[0]) - 8 == Mode.FAST else row[0]
+
+@kernel
+def from_nested(row):
+    def shifted(x):
+        return x + values.OFFSET
+    return shifted(row[1])
+
+kernels = (from_names, from_dictionary, from_called, from_tuple, from_array, from_flag,
+           from_choice, from_nested)
+print(*(kernel(np.array([10.0, 20.0])) for kernel in kernels))
+print(sum(sum(kernel.stats.cache_hits.values()) for kernel in kernels))
+""",
+}
+
+CHANGES = {
+    '("gain", "zero")': '("zero", "gain")',
+    "OFFSET = 1.0": "OFFSET = 3.0",
+    "(1.0, 2.0)": "(1.0, 4.0)",
+    "[5.0, 6.0]": "[7.0, 6.0]",
+    "IS_ON = True": "IS_ON = not 1",
+    '"first": 0, "second": 1': '"first": 1, "second": 0',
+    "FAST = 2": "FAST = 1",
+}
+
+GENERATED = {
+    "constant.py": "OFFSET = 1.0",
+    "part.py": """
+import constant
+from teleop_core.kernels import kernel
+
+@kernel
+def moved(x: float) -> float:
+    return x + constant.OFFSET
+""",
+    "outer.py": """
+from part import moved
+from teleop_core.kernels import kernel_from_source
+
+tick = kernel_from_source(
+    "def tick(x):\\n    return moved(x) * SCALE", "tick", {"moved": moved, "SCALE": 3.0}
+)
+print(tick(2.0))
+print(sum(tick.stats.cache_hits.values()))
+""",
+}
+
+
+def run(folder: Path) -> tuple[list[float], int]:
+    """Values and cache hits of a fresh process that imports the modules."""
+    done = subprocess.run(
+        [sys.executable, "outer.py"], cwd=folder, capture_output=True, text=True, check=True,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(folder / "c")},
+    )  # fmt: skip
+    values, hits = done.stdout.splitlines()
+    return [float(value) for value in values.split()], int(hits)
+
+
+def write(path: Path, text: str) -> None:
+    """File whose time says nothing: all versions have the same."""
+    path.write_text(text)
+    os.utime(path, (1_000_000_000, 1_000_000_000))
+
+
+def write_all(folder: Path, modules: dict[str, str]) -> Path:
+    for name, text in modules.items():
+        write(folder / name, text)
+    return folder
+
+
+def test_kernels_of_unchanged_files_come_from_the_cache(tmp_path):
+    folder = write_all(tmp_path, CALLS)
+    assert run(folder) == ([70.0, 7.0], 0)
+    assert run(folder) == ([70.0, 7.0], 1)
+
+
+@pytest.mark.parametrize("name", ["inner.py", "middle.py", "outer.py"])
+def test_change_of_one_digit_in_a_called_file_reaches_its_cached_callers(tmp_path, name):
+    folder = write_all(tmp_path, CALLS)
+    run(folder)
+    changed = CALLS[name].replace("2.0 * x", "5.0 * x").replace("+ 1.0", "+ 4.0")
+    write(folder / name, changed.replace("10.0 *", "20.0 *"))
+    assert (
+        run(folder)
+        == {
+            "inner.py": ([160.0, 16.0], 0),
+            "middle.py": ([100.0, 10.0], 0),
+            "outer.py": ([140.0, 7.0], 0),
+        }[name]
+    )
+
+
+def test_changed_constant_of_another_module_reaches_every_cached_kernel_that_uses_it(tmp_path):
+    folder = write_all(tmp_path, CONSTANTS)
+    before = [20.0, 20.0, 11.0, 20.0, 15.0, 10.0, 20.0, 21.0]
+    assert run(folder) == (before, 0)
+    assert run(folder) == (before, len(before))
+    text = CONSTANTS["values.py"]
+    for old, new in CHANGES.items():
+        assert old in text
+        text = text.replace(old, new)
+    write(folder / "values.py", text)
+    assert run(folder) == ([10.0, 10.0, 13.0, 40.0, 17.0, 20.0, 10.0, 23.0], 0)
+
+
+def test_constant_that_no_kernel_uses_leaves_the_cache_alone(tmp_path):
+    folder = write_all(tmp_path, CONSTANTS)
+    first = run(folder)[0]
+    write(folder / "values.py", CONSTANTS["values.py"] + "OTHER = 1\n")
+    assert run(folder) == (first, len(first))
+
+
+def test_kernel_from_generated_source_is_compiled_once_for_all_processes(tmp_path):
+    folder = write_all(tmp_path, GENERATED)
+    assert run(folder) == ([9.0], 0)
+    assert run(folder) == ([9.0], 1)
+    write(folder / "constant.py", "OFFSET = 2.0")
+    assert run(folder) == ([12.0], 0)
+
+
+def test_kernel_without_a_source_file_works_and_leaves_nothing_on_the_disk(tmp_path):
+    text = CALLS["inner.py"] + "print(factor(4.0))"
+    for arguments, given in ((["-c", text], ""), (["-"], text)):
+        done = subprocess.run(
+            [sys.executable, *arguments], input=given, capture_output=True, text=True, check=True,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        )  # fmt: skip
+        assert done.stdout == "8.0\n"
+    assert not list(tmp_path.rglob("*factor*"))
+
+
+def test_versions_of_numba_in_setup_are_those_that_the_kernels_are_written_for():
+    from teleop_core.kernels.numba_private import SUPPORTED
+
+    setup = Path(__file__).parents[2] / "src/teleop_core/setup.py"
+    bounds = re.findall(r'"numba>=(\d+)\.(\d+),<(\d+)\.(\d+)"', setup.read_text())
+    assert [tuple(map(int, found)) for found in bounds] == [SUPPORTED[0] + SUPPORTED[1]]
