@@ -42,7 +42,8 @@ def of_arm(bag: Bag, arm: str = "") -> Bag:
     """
     arms = arm_names(bag)
     if arm and arm not in arms:
-        raise UnknownNameError(f"arm of {bag.path}", arm, filter(None, arms))
+        known = list(filter(None, arms)) or ["'' (the recording names no arms)"]
+        raise UnknownNameError(f"arm of {bag.path}", arm, known)
     if len(arms) == 1:
         return bag
     return _ArmBag(bag, "" if arm in {"", arms[0]} else f"{arm}/", arms[1:])
@@ -59,27 +60,29 @@ class _ArmBag(Bag):
 
     def __init__(self, bag: Bag, prefix: str, further: tuple[str, ...]) -> None:
         self._bag, self._prefix = bag, prefix
-        self._others = tuple(f"{arm}/" for arm in further if f"{arm}/" != prefix)
+        self._others = tuple(f"{arm}/" for arm in further)
         self.path, self.start_ns, self.end_ns = bag.path, bag.start_ns, bag.end_ns
         self.topics: dict[str, TopicInfo] = {}
         for name, info in bag.topics.items():
-            if name == DIAGNOSTICS.name:
-                self.topics[name] = info
-            elif (plain := self._plain(name)) is not None:
+            plain = name if name == DIAGNOSTICS.name else self._plain(name)
+            if plain is not None:
                 self.topics[plain] = info
-        common = {} if not prefix else bag.metadata
-        self.metadata = {name: text for name, text in common.items() if name not in _OF_ONE_ARM}
-        for name, text in bag.metadata.items():
-            if (plain := self._plain(name)) is not None:
-                self.metadata[plain] = text
+        self.metadata = self._metadata(bag.metadata)
+
+    def _metadata(self, texts: dict[str, str]) -> dict[str, str]:
+        """Texts about this arm over those about all arms."""
+        common = texts if self._prefix else {}
+        own = {self._plain(name): text for name, text in texts.items()}
+        return {
+            **{name: text for name, text in common.items() if name not in _OF_ONE_ARM},
+            **{name: text for name, text in own.items() if name is not None},
+        }
 
     def _plain(self, name: str) -> str | None:
         """Name below the arm; None if it is of another arm."""
-        if not name.startswith(self._prefix) or (
-            not self._prefix and name.startswith(self._others)
-        ):
-            return None
-        return name.removeprefix(self._prefix)
+        if self._prefix:
+            return name.removeprefix(self._prefix) if name.startswith(self._prefix) else None
+        return None if name.startswith(self._others) else name
 
     def _recorded(self, topic: Topic | str) -> str:
         """Name of a topic in the whole recording."""
@@ -119,8 +122,9 @@ class _ArmBag(Bag):
         self, topics: Iterable[Topic | str] | None = None
     ) -> Iterator[tuple[str, str, int, bytes]]:
         """As for the whole recording."""
-        wanted = self._wanted(self.topics if topics is None else topics)
-        for name, ros_type, log_ns, data in self._bag.raw(wanted):
+        if topics is None:
+            topics = [name for name, info in self.topics.items() if info.count]
+        for name, ros_type, log_ns, data in self._bag.raw(self._wanted(topics)):
             yield name.removeprefix(self._prefix), ros_type, log_ns, data
 
     def _wanted(self, topics: Iterable[Topic | str]) -> list[str]:

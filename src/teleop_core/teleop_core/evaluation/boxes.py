@@ -70,7 +70,7 @@ def boxes_of(context: Context) -> list[Box]:
     is_on = states.is_fixture_on
     corners = np.concatenate((states.center, states.size, is_on[:, None]), axis=1)
     begins = np.flatnonzero((np.diff(corners, axis=0, prepend=np.nan) != 0.0).any(axis=1))
-    ends = np.append(stamps[begins[1:]], context.bag.end_ns)
+    ends = np.append(stamps[begins[1:]], context.bag.end_ns)[: len(begins)]
     out = []
     for row, end_ns in zip(begins.tolist(), ends.tolist(), strict=True):
         if is_on[row]:

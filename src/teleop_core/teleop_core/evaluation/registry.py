@@ -5,7 +5,7 @@ through ``METRICS.add("jerk", JerkMetric)``. Every metric of the registry is in 
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from teleop_core.errors import PartError
 from teleop_core.evaluation.metric import Key, Metric
@@ -96,3 +96,18 @@ METRICS: Registry[type[Metric]] = Registry(
     check_metric,
 )  # fmt: skip
 """All metrics, in the order of the score."""
+
+
+def all_metrics(further: Iterable[type[Metric]] = ()) -> list[type[Metric]]:
+    """Metrics of the registry, and some that are not in it.
+
+    Raises:
+        PartError: One of them is no metric, or has the name of another.
+    """
+    found = {name: METRICS.find(name) for name in METRICS}
+    for part in further:
+        name = str(getattr(part, "name", getattr(part, "__name__", part)))
+        if name in found:
+            raise PartError("metric", name, "a name that is free; this one is used already")
+        found[name] = check_metric(name, part)
+    return list(found.values())

@@ -14,7 +14,7 @@ from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import Metric
 from teleop_core.evaluation.plain import Plain, leaves, plain
-from teleop_core.evaluation.registry import METRICS
+from teleop_core.evaluation.registry import all_metrics
 from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Result, Score, Session
 from teleop_core.evaluation.state_history import read_history
@@ -46,30 +46,31 @@ class Study(NamedTuple):
         return found
 
 
-def evaluate(bag: Bag, arm: str = "") -> Score:
+def evaluate(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = ()) -> Score:
     """Score of one arm of a recording.
 
     Args:
         bag: The recording.
         arm: Name of the arm; empty for the default one.
+        further: Metrics beside those of the registry.
 
     Raises:
-        PartError: An added metric is no metric.
+        PartError: An added metric is no metric, or does not keep to its keys.
         EvaluationError: Nothing in the recording can be compared, or a metric fails.
         RecordingError: It lacks one of :data:`REQUIRED`, or is damaged.
         UnknownNameError: It has no such arm.
     """
-    return study(bag, arm).score
+    return study(bag, arm, further).score
 
 
-def scores(bag: Bag) -> list[Score]:
-    """Scores of all arms of a recording, the default arm first; raises as :func:`evaluate`."""
-    return [evaluate(bag, arm) for arm in arm_names(bag)]
+def scores(bag: Bag, further: Sequence[type[Metric]] = ()) -> list[Score]:
+    """Scores of all arms of a recording, the default arm first; as :func:`evaluate`."""
+    return [found.score for found in studies(bag, further)]
 
 
-def study(bag: Bag, arm: str = "") -> Study:
+def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = ()) -> Study:
     """Score of one arm with its metrics; raises as :func:`evaluate`."""
-    makers = [METRICS.find(name) for name in METRICS]
+    makers = all_metrics(further)
     view = of_arm(bag, arm)
     view.require(REQUIRED)
     context, metrics = _run(view, arm or arm_names(bag)[0], makers)
@@ -83,9 +84,9 @@ def study(bag: Bag, arm: str = "") -> Study:
     return Study(score, tuple(metrics))
 
 
-def studies(bag: Bag) -> list[Study]:
-    """All arms of a recording, the default arm first; raises as :func:`evaluate`."""
-    return [study(bag, arm) for arm in arm_names(bag)]
+def studies(bag: Bag, further: Sequence[type[Metric]] = ()) -> list[Study]:
+    """All arms of a recording, the default arm first; as :func:`evaluate`."""
+    return [study(bag, arm, further) for arm in arm_names(bag)]
 
 
 def _run(bag: Bag, arm: str, makers: Sequence[type[Metric]]) -> tuple[Context, list[Metric]]:

@@ -1,0 +1,164 @@
+"""Arms: a recording of two arms is scored arm by arm, each as if it had been recorded alone."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from teleop_core.bags.arms import arm_names, of_arm
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.reports import report
+from teleop_core.bags.writer import BagWriter
+from teleop_core.errors import EvaluationError, RecordingError, UnknownNameError
+from teleop_core.evaluation import evaluate, scores
+from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.signals import STATE_FIELDS, TICK_NS
+from teleop_core.topics import (
+    ALL,
+    DIAGNOSTICS,
+    SLAVE_MEASURED_CP,
+    SLAVE_MEASURED_JS,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+    TELEOP_STATE,
+)
+
+COUNT = 5000
+JOINTS = {"": ("a", "b"), "left": ("c", "d", "e")}
+MM = 1e-3
+ROUNDING = 1e-9  # [mm], of metres in doubles
+METADATA = {"arms": "right left", "scenario": "pair", "robot": "rcrt1", "seed": "7",
+            "left/robot": "puma560", "left/seed": "8"}  # fmt: skip
+
+
+def state(gain):
+    values = {name: repr(gain if name == "gain" else 0.0) for name in STATE_FIELDS}
+    return report(0, "teleop", 0, "FOLLOWING", values)
+
+
+def write(path, offsets, metadata=METADATA, lost=()):
+    """A recording of arms whose tips are so far [m] from their references."""
+    stamps = np.arange(COUNT) * TICK_NS
+    rest = np.tile([0.4, 0, 0, 1, 0, 0, 0], (COUNT, 1))
+    rows = {}
+    for arm, offset in offsets.items():
+        measured = rest + offset * np.array([1.0, 0, 0, 0, 0, 0, 0])
+        joints = np.zeros((COUNT, 3 * len(JOINTS[arm])))
+        poses = {SLAVE_SERVO_CP: rest, SLAVE_SETPOINT_CP: rest, SLAVE_MEASURED_CP: measured}
+        for topic, values in (poses | {SLAVE_MEASURED_JS: joints}).items():
+            rows[topic.of_arm(arm)] = (stamps, values, stamps)
+    for topic in lost:
+        del rows[topic]
+    topics = [topic.of_arm(arm) for arm in offsets for topic in ALL if topic is not DIAGNOSTICS]
+    with BagWriter(path, [*topics, DIAGNOSTICS], JOINTS, metadata=metadata) as writer:
+        for arm, gain in zip(offsets, (1.0, 0.1), strict=False):
+            writer.write(TELEOP_STATE.of_arm(arm), 0, state(gain))
+        for name, ticks in (("slave_sim", 1000), ("left/slave_sim", 2000), ("/left/play", 3000)):
+            writer.write(DIAGNOSTICS, 1, report(1, name, 0, "", {"ticks": str(ticks)}))
+        writer.write_block(rows)
+    return path
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("bags") / "pair", {"": 1 * MM, "left": 3 * MM})
+
+
+@pytest.fixture
+def bag(path):
+    return Bag(path)
+
+
+def test_each_arm_has_a_score_of_its_own(bag):
+    right, left = scores(bag)
+    assert np.isclose(right.position_error_mm.max, 1.0, atol=ROUNDING)
+    assert np.isclose(left.position_error_mm.max, 3.0, atol=ROUNDING)
+    assert (right.session.arm, left.session.arm) == ("right", "left")
+    assert (right.session.robot, left.session.robot) == ("rcrt1", "puma560")
+    assert (right.session.seed, left.session.seed) == (7, 8)
+    assert right.session.scenario == left.session.scenario == "pair"
+    assert (right.session.gain, left.session.gain) == (1.0, 0.1)
+
+
+def test_default_arm_has_the_first_name_and_no_name(bag):
+    plain, named = evaluate(bag), evaluate(bag, "right")
+    assert plain.session.arm == "right"
+    assert plain.to_json() == named.to_json()
+
+
+def test_arm_is_scored_as_if_it_had_been_recorded_alone(bag, tmp_path):
+    alone = evaluate(Bag(write(tmp_path / "pair", {"": 3 * MM}, {"scenario": "pair"})))
+    left = evaluate(bag, "left")
+    assert left.position_error_mm == alone.position_error_mm
+    assert set(left.topics) == set(alone.topics)
+    assert left.topics["slave/measured_js"] == alone.topics["slave/measured_js"]
+
+
+def test_nodes_are_those_of_the_arm(bag):
+    right, left = scores(bag)
+    assert right.nodes == {"slave_sim": {"ticks": 1000}}
+    assert left.nodes == {"slave_sim": {"ticks": 2000}, "play": {"ticks": 3000}}
+    assert (right.ticks.executed, left.ticks.executed) == (1000, 2000)
+
+
+def test_view_of_an_arm_reads_what_the_recording_holds_of_it(bag):
+    left = of_arm(bag, "left")
+    series = left.read(SLAVE_MEASURED_JS)
+    assert series.names == ("c", "d", "e")
+    assert series.values.shape == (COUNT, 9)
+    assert {name for name, *_ in left.raw(["slave/servo_cp"])} == {"slave/servo_cp"}
+    assert sum(1 for _ in left.raw()) == sum(info.count for info in left.topics.values())
+    assert "left/slave/measured_cp" not in of_arm(bag).topics
+
+
+def test_json_table_and_page_show_every_arm(path, tmp_path):
+    shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
+    target, page = tmp_path / "scores.json", tmp_path / "page.html"
+    evaluate_bags([path], target, page, shown)
+    assert [s["session"]["arm"] for s in json.loads(target.read_text())] == ["right", "left"]
+    lines = [text.split() for text in shown.export_text().splitlines()]
+    assert ["arm", "right", "arm", "left"] in lines
+    assert ["position,", "max", "mm", "1.000", "3.000"] in [
+        [word.partition("✗")[0] for word in line if not word.startswith("≤")] for line in lines
+    ]
+    text = page.read_text()
+    assert "pair · right</th>" in text
+    assert "pair · left</th>" in text
+
+
+def test_recording_without_names_of_arms_has_one_without_a_name(tmp_path):
+    bag = Bag(write(tmp_path / "one", {"": 1 * MM}, {}))
+    assert arm_names(bag) == ("",)
+    assert of_arm(bag) is bag
+    assert [score.session.arm for score in scores(bag)] == [""]
+
+
+def test_unknown_arm_is_told_with_those_there_are(bag, tmp_path):
+    with pytest.raises(UnknownNameError) as caught:
+        evaluate(bag, "middle")
+    assert caught.value.alternatives == ("right", "left")
+    single = Bag(write(tmp_path / "one", {"": 1 * MM}, {}))
+    with pytest.raises(UnknownNameError, match="names no arms"):
+        evaluate(single, "left")
+
+
+def test_arm_named_twice_is_refused(tmp_path):
+    bag = Bag(write(tmp_path / "one", {"": 1 * MM}, {"arms": "left left"}))
+    with pytest.raises(RecordingError, match="names the arm left twice"):
+        scores(bag)
+
+
+def test_what_an_arm_lacks_is_told_with_the_arm(tmp_path):
+    lost = (SLAVE_SERVO_CP.of_arm("left"),)
+    bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": 1 * MM}, lost=lost))
+    assert evaluate(bag).samples.scored == COUNT
+    with pytest.raises(RecordingError, match="arm left lacks slave/servo_cp; it has"):
+        evaluate(bag, "left")
+
+
+def test_arm_that_never_meets_its_reference_is_named(tmp_path):
+    bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": np.nan}))
+    with pytest.raises(EvaluationError, match="of arm left has a valid"):
+        scores(bag)
