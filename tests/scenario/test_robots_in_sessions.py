@@ -1,5 +1,7 @@
 """Every robot in the whole graph: as slave, as master's handle, with options, in virtual time."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,10 @@ from teleop_core.session.runner import simulate
 SHORT = ("teleop.duration=3.0", "path.approach_time=1.0", "path.size=[0.02, 0.02, 0.02]")
 
 
-@pytest.mark.parametrize("name", list_robots())
+TABLES = sorted(map(str, Path("config/robots").glob("*.yaml")))
+
+
+@pytest.mark.parametrize("name", [*list_robots(), *TABLES])
 def test_every_robot_follows_a_session_inside_its_limits_and_drives(name, tmp_path):
     configuration = configure("free_motion", settings=[*SHORT, f"robot={name}"])
     simulate(configuration, tmp_path / "bag")

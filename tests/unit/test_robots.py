@@ -1,12 +1,25 @@
 """Robots as parts: what one caller writes no other sees, and names lead to robots."""
 
+import dataclasses
 from dataclasses import fields
 
 import numpy as np
 import pytest
+import yaml
 
-from teleop_core.robots import list_robots, load_robot
-from teleop_core.robots.drives import ENTRIES, Drives
+from teleop_core.errors import ParameterError, PartError, ShapeError, UnknownNameError
+from teleop_core.robots import (
+    ROBOTS,
+    Kernels,
+    Robot,
+    list_robots,
+    load_robot,
+    load_robot_set,
+    parse_table,
+    register_robot,
+    robot_from_table,
+)
+from teleop_core.robots.drives import ENTRIES, Drives, electric_cylinders
 
 robots = pytest.mark.parametrize("name", list_robots())
 
@@ -80,3 +93,172 @@ def test_no_kernel_is_compiled_a_second_time_for_arrays_that_cannot_be_written(n
     for compiled in vars(robot.kernels).values():
         for signature in getattr(compiled, "signatures", ()):
             assert all(getattr(kind, "mutable", True) for kind in signature), compiled
+
+
+# Robots by name, by file, by hand.
+
+TABLE = {
+    "name": "my_arm",
+    "convention": "modified",
+    "angles": "degrees",
+    "rows": [
+        {"theta": "q", "lower": -150, "upper": 150},
+        {"a": 0.4, "theta": "q", "lower": -120, "upper": 120, "home": 60},
+        {"a": 0.3, "d": "q", "lower": -0.1, "upper": 0.1, "name": "slide"},
+    ],
+    "task": ["x", "y", "z"],
+}
+
+
+@pytest.fixture
+def registered(monkeypatch):
+    """Register robots that are forgotten after the test."""
+    for store in ("_parts", "_own"):
+        monkeypatch.setattr(ROBOTS, store, getattr(ROBOTS, store).copy())
+    return register_robot
+
+
+def test_a_registered_robot_loads_by_its_name_and_is_listed(registered):
+    arm = registered(robot_from_table(TABLE))
+    assert load_robot("my_arm") is arm
+    assert "my_arm" in list_robots()
+
+
+def test_a_registered_table_loads_as_a_robot(registered):
+    registered(parse_table(TABLE), "arm_of_mine")
+    assert load_robot("arm_of_mine").joint_names == ("q1", "q2", "slide")
+
+
+def test_a_registered_function_gets_the_geometry(registered):
+    @registered
+    def long_arm(reach=0.4):
+        rows = [{**TABLE["rows"][0]}, {**TABLE["rows"][1], "a": reach}, TABLE["rows"][2]]
+        return robot_from_table({**TABLE, "rows": rows})
+
+    assert load_robot("long_arm").fk(np.zeros(3))[0, 3] == pytest.approx(0.7)
+    assert load_robot_set("long_arm", ["reach=1.0"]).fk(np.zeros(3))[0, 3] == pytest.approx(1.3)
+    with pytest.raises(UnknownNameError) as caught:
+        load_robot("long_arm", width=1.0)
+    assert caught.value.alternatives == ("reach",)
+
+
+def test_a_name_is_used_once_unless_a_cell_is_run_again(registered):
+    registered(robot_from_table(TABLE))
+    with pytest.raises(PartError, match="my_arm"):
+        registered(robot_from_table(TABLE))
+    with pytest.raises(PartError, match="scara"):
+        registered(robot_from_table(TABLE), "scara", replace=True)
+    second = registered(robot_from_table(TABLE), replace=True)
+    assert load_robot("my_arm") is second
+
+
+def needs_a_length(length):
+    return robot_from_table(TABLE)
+
+
+@pytest.mark.parametrize("part", [3, "rcrt1", Robot, needs_a_length, lambda: 3])
+def test_what_is_no_robot_is_refused_by_name(registered, part):
+    with pytest.raises(PartError) as caught:
+        registered(part, "mine")
+    assert (caught.value.kind, "mine" not in list_robots()) == ("robot", True)
+
+
+def turned_by(q, geometry, T):
+    T[:] = np.eye(4)
+    T[0, 0] = T[1, 1] = np.cos(q[0])
+    T[1, 0] = np.sin(q[0])
+    T[0, 1] = -T[1, 0]
+
+
+def crooked(kernels):
+    values = {"lower": [-1.0], "upper": [1.0], "home": [0.0], "joint_names": ("q",)}
+    return Robot(name="crooked", geometry={"a": 1.0}, kernels=kernels, **values)
+
+
+def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(registered):
+    def ik(T, seed, q):
+        return 0
+
+    kernels = Kernels(fk=turned_by, jacobian=turned_by, ik=ik, ik_all=turned_by)
+    with pytest.raises(PartError, match="crooked"):
+        registered(crooked(kernels))
+
+
+def test_ready_robots_take_no_geometry(registered):
+    registered(robot_from_table(TABLE))
+    with pytest.raises(ParameterError) as caught:
+        load_robot("my_arm", a2=1.0)
+    assert caught.value.name == "geometry"
+
+
+def test_the_path_of_a_table_is_a_robot(tmp_path):
+    path = tmp_path / "my_arm.yaml"
+    path.write_text(yaml.safe_dump(TABLE), encoding="utf-8")
+    robot = load_robot_set(str(path), ())
+    assert robot.name == "my_arm"
+    assert robot.n == 3
+    with pytest.raises(FileNotFoundError):
+        load_robot(str(tmp_path / "other.yml"))
+
+
+def test_unknown_names_list_the_alternatives():
+    with pytest.raises(UnknownNameError) as caught:
+        load_robot("r2d2")
+    assert caught.value.alternatives == list_robots()
+
+
+# What a robot says of itself.
+
+
+def test_a_robot_is_one_line_at_the_prompt_and_a_table_in_a_notebook():
+    arm = robot_from_table(TABLE)
+    assert repr(arm) == (
+        "Robot 'my_arm', 3 joints [rad, m]: q1 -2.618…2.618, q2 -2.094…2.094, slide -0.1…0.1"
+    )
+    html = arm._repr_html_()
+    assert html.count("<tr>") == 4
+    assert "slide" in html
+
+
+def test_robots_with_names_from_elsewhere_cannot_write_into_the_page():
+    arm = robot_from_table({**TABLE, "name": "<script>"})
+    assert "<script>" not in arm._repr_html_()
+
+
+@pytest.mark.parametrize("name", ["rcrt1", "puma560"])
+def test_a_robot_says_which_of_its_drives_are_assumed(name):
+    robot = load_robot(name)
+    assert robot.drives_are_assumed
+    assert ("speed_limit" in robot.drives.assumed) == (name == "puma560")
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ({"home": [3.0]}, ParameterError),
+        ({"lower": [3.0]}, ParameterError),
+        ({"upper": [np.nan]}, ParameterError),
+        ({"home": [0.0, 0.0]}, ShapeError),
+        ({"drives": electric_cylinders(2)}, ShapeError),
+    ],
+)
+def test_a_robot_whose_vectors_do_not_fit_is_refused(change, error):
+    with pytest.raises(error) as caught:
+        dataclasses.replace(robot_from_table({**TABLE, "rows": TABLE["rows"][:1]}), **change)
+    assert caught.value.name == next(iter(change))
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ({"speed_limit": [0.0]}, ParameterError),
+        ({"viscous": [-1.0]}, ParameterError),
+        ({"inertia": [np.inf]}, ParameterError),
+        ({"bandwidth": [1.0, 1.0]}, ShapeError),
+        ({"assumed": ("mass",)}, UnknownNameError),
+    ],
+)
+def test_impossible_drives_are_refused_by_entry(change, error):
+    with pytest.raises(error) as caught:
+        Drives(**({name: [1.0] for name in ENTRIES} | change))
+    assert caught.value.name == next(iter(change))

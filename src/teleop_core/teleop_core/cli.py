@@ -280,9 +280,8 @@ def _parameters(arguments: argparse.Namespace) -> int:
 
 
 def _robot(arguments: argparse.Namespace) -> int:
-    import numpy as np
-
     from teleop_core.robots import list_robots, load_robot_set
+    from teleop_core.robots.description import text
 
     if arguments.table is not None:
         from teleop_core.robots.dh import load_table
@@ -293,15 +292,7 @@ def _robot(arguments: argparse.Namespace) -> int:
     else:
         print("\n".join(list_robots()))
         return 0
-    directions = ("x", "y", "z", "rx", "ry", "rz")
-    controlled = [d for d, is_free in zip(directions, robot.task_mask, strict=True) if is_free]
-    print(f"{robot.name}: {robot.n} joints [rad, m], controls {', '.join(controlled)} of the tip")
-    for row in zip(robot.joint_names, robot.lower, robot.upper, robot.home, strict=True):
-        print("  {:14} {:9.4f} … {:8.4f}   home {:8.4f}".format(*row))
-    if arguments.table is None:
-        print("geometry: " + ", ".join(f"{k} = {v:g}" for k, v in robot.geometry.items()))
-    print("T_base_tip at home:")
-    print(np.array2string(robot.fk(robot.home), precision=4, suppress_small=True))
+    print(text(robot))
     return 0
 
 

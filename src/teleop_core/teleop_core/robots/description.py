@@ -8,7 +8,7 @@ import numpy as np
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
 
-_MOST_SYMBOLS = 40  # of a geometry that is worth printing: those of chains are matrices
+_OF_CHAINS = "fixed0_00"  # a symbol of chains from tables, whose geometry is a row of matrices
 
 
 def short(robot: Robot) -> str:
@@ -23,7 +23,7 @@ def text(robot: Robot) -> str:
     for row in rows(robot):
         lines.append("  {:14} {:9.4f} … {:8.4f}   home {:8.4f}".format(*row))
     lines.append(f"drives: {drives(robot)}")
-    if len(robot.geometry) <= _MOST_SYMBOLS:
+    if _OF_CHAINS not in robot.geometry:
         lines.append("geometry: " + ", ".join(f"{k} = {v:g}" for k, v in robot.geometry.items()))
     tip = np.array2string(robot.fk(robot.home), precision=4, suppress_small=True)
     return "\n".join([*lines, "T_base_tip at home:", tip])

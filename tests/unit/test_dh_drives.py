@@ -1,0 +1,109 @@
+"""Drives of Denavit-Hartenberg tables: every chain can be a slave, and says what is assumed."""
+
+import numpy as np
+import pytest
+
+from teleop_core.errors import ParameterError
+from teleop_core.robots import IkStatus, load_robot, robot_from_table
+from teleop_core.robots.drives import ENTRIES
+
+TABLES = tuple(
+    f"config/robots/{name}.yaml"
+    for name in (
+        "puma560", "rcrt1", "scara", "planar_3r", "five_axis_standard", "five_axis_sheth_uicker"
+    )
+)  # fmt: skip
+TABLE = {
+    "name": "my_arm",
+    "convention": "modified",
+    "angles": "degrees",
+    "rows": [
+        {"theta": "q", "lower": -150, "upper": 150},
+        {"a": 0.4, "theta": "q", "lower": -120, "upper": 120, "home": 60},
+        {"a": 0.3, "d": "q", "lower": -0.1, "upper": 0.1, "name": "slide"},
+    ],
+    "task": ["x", "y", "z"],
+}
+
+
+def test_a_chain_that_states_no_drives_has_assumed_ones():
+    robot = robot_from_table(TABLE)
+    assert robot.drives.assumed == ENTRIES
+    assert np.array_equal(robot.dynamics.parameters, robot.drives.inertia)
+
+
+def test_stated_drives_are_read_in_the_table_unit_and_the_rest_is_assumed():
+    stated = {
+        "q1": {"speed_limit": 90, "encoder_step": 0.01, "inertia": 0.5, "viscous": 0},
+        "slide": {"speed_limit": 0.2, "inertia": 3.0},
+    }
+    drives = robot_from_table({**TABLE, "drives": stated}).drives
+    assert drives.speed_limit == pytest.approx([np.pi / 2.0, 2.0, 0.2])
+    assert drives.encoder_step[0] == pytest.approx(np.radians(0.01))
+    assert drives.inertia == pytest.approx([0.5, 0.1, 3.0])
+    assert drives.viscous[0] == 0.0
+    # In proportion to the inertia.
+    assert drives.effort_limit == pytest.approx([50.0, 10.0, 120.0])
+    assert "inertia" in drives.assumed  # of q2
+
+
+def test_a_chain_that_states_every_entry_assumes_nothing():
+    every = {name: 60.0 if name == "bandwidth" else 1.0 for name in ENTRIES}
+    names = ("q1", "q2", "slide")
+    robot = robot_from_table({**TABLE, "drives": dict.fromkeys(names, every)})
+    assert not robot.drives_are_assumed
+
+
+@pytest.mark.parametrize(
+    ("drives", "named"),
+    [
+        ([1.0], "drives"),
+        ({"q9": {}}, "drives joint"),
+        ({"q1": 3.0}, "drives q1"),
+        ({"q1": {"mass": 1.0}}, "drives q1 entry"),
+        ({"q1": {"inertia": 0.0}}, "drives q1 inertia"),
+        ({"q1": {"coulomb": -1.0}}, "drives q1 coulomb"),
+        ({"q1": {"speed_limit": True}}, "drives q1 speed_limit"),
+        ({"q1": {"speed_limit": "fast"}}, "drives q1 speed_limit"),
+        ({"q1": {"bandwidth": 1e4}}, "drives q1 bandwidth"),
+        (
+            {"q1": {"inertia": 1e-6, "viscous": 1.0}},
+            "drives q1 (viscous + coulomb / friction_speed) / inertia",
+        ),
+    ],
+)
+def test_malformed_drives_of_a_chain_are_refused_by_name(drives, named):
+    with pytest.raises(ParameterError) as caught:
+        robot_from_table({**TABLE, "drives": drives})
+    assert caught.value.name == named
+
+
+def test_joints_with_one_name_are_refused():
+    rows = [{"theta": "q", "name": "yaw"}, {"a": 1.0, "theta": "q", "name": "yaw"}]
+    with pytest.raises(ParameterError) as caught:
+        robot_from_table({**TABLE, "rows": rows})
+    assert caught.value.name == "rows"
+
+
+@pytest.mark.parametrize("path", TABLES)
+def test_chains_follow_a_path_inside_their_limits_and_speeds(path):
+    robot, dt = load_robot(path), 1e-3
+    way = np.sin(np.linspace(0.0, np.pi, 2000))[:, None]
+    q = np.clip(robot.home + 0.1 * way, robot.lower, robot.upper)
+    result = robot.follow(robot.fk(q), robot.home, dt)
+    steps = np.diff(np.vstack((robot.home, result.q)), axis=0)
+    assert (np.abs(steps) <= robot.drives.speed_limit * dt * (1.0 + 1e-9)).all()
+    assert (result.q >= robot.lower).all()
+    assert (result.q <= robot.upper).all()
+    reached = np.isin(result.status, (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR))
+    assert reached.mean() > 0.99
+
+
+@pytest.mark.parametrize("path", TABLES)
+def test_chains_held_back_by_their_speeds_stay_within_them(path):
+    robot, dt = load_robot(path), 1e-3
+    far = robot.fk(np.clip(robot.home + 0.5, robot.lower, robot.upper))
+    result = robot.follow(np.repeat(far[None], 50, axis=0), robot.home, dt)
+    steps = np.diff(np.vstack((robot.home, result.q)), axis=0)
+    assert (np.abs(steps) <= robot.drives.speed_limit * dt * (1.0 + 1e-9)).all()
+    assert result.status[0] == IkStatus.LIMITED
