@@ -11,6 +11,7 @@ NODES = (
     "slave_sim",
     "recorder",
     "teleop_session",
+    "stage",
 )
 
 
@@ -69,7 +70,7 @@ setup(
     entry_points={
         "console_scripts": [
             "teleop = teleop_core.cli:main",
-            *(f"{node} = teleop_core.nodes.{node}:main" for node in NODES),
+            *(f"{node} = teleop_core.nodes.start:main" for node in NODES),
         ]
     },
 )

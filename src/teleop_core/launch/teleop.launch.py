@@ -8,9 +8,9 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
+from teleop_core.graph import RECORDER_NAME
 from teleop_core.nodes.live import parameter_file
 from teleop_core.session.configuration import configure
-from teleop_core.session.graph import STAGES
 
 ARGUMENTS = {
     "scenario": ("coarse_box", "one of `teleop scenarios`"),
@@ -27,14 +27,20 @@ def nodes(context: LaunchContext) -> list[Node]:
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
         file.write(parameter_file(configuration, given["out"]))
     is_recorded = given["record"].lower() in {"true", "1", "yes"}
-    return [
-        Node(
-            package="teleop_core", executable=stage.name, name=stage.name, output="screen",
-            parameters=[file.name],
-        )
-        for stage in reversed(STAGES)
-        if is_recorded or stage.name != "recorder"
-    ]  # fmt: skip
+    graph = configuration.graph
+    names = [member.name for member in reversed(graph.members)]
+    if is_recorded:
+        names.insert(0, RECORDER_NAME)
+    return [_node(name, file.name) for name in names]
+
+
+def _node(name: str, file: str) -> Node:
+    """A member of the graph in the namespace of its arm."""
+    arm, _, stage = name.rpartition("/")
+    return Node(
+        package="teleop_core", executable="stage", arguments=[stage], name=stage, namespace=arm,
+        output="screen", parameters=[file],
+    )  # fmt: skip
 
 
 def generate_launch_description() -> LaunchDescription:

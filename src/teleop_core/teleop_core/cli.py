@@ -264,11 +264,12 @@ def _scenarios(_: argparse.Namespace) -> int:
 
 def _parameters(arguments: argparse.Namespace) -> int:
     from teleop_core.errors import UnknownNameError
-    from teleop_core.session.configuration import GROUPS, parameter_rows
+    from teleop_core.session.configuration import declared_groups, parameter_rows
 
-    if arguments.stage is not None and arguments.stage not in GROUPS:
-        raise UnknownNameError("stage", arguments.stage, GROUPS)
-    rows = parameter_rows([arguments.stage] if arguments.stage else GROUPS)
+    groups = declared_groups()
+    if arguments.stage is not None and arguments.stage not in groups:
+        raise UnknownNameError("stage", arguments.stage, groups)
+    rows = parameter_rows([arguments.stage] if arguments.stage else groups)
     if arguments.markdown:
         print("| parameter | default | allowed | meaning |\n|---|---|---|---|")
         for row in rows:

@@ -48,7 +48,7 @@ class Runner(Protocol):
         """Make one step."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Stage:
     """One stage of the graph.
 
@@ -121,6 +121,9 @@ class Stage:
     def _insist(self, is_so: bool, expected: str) -> None:
         if not is_so:
             raise PartError("stage", self.name, expected)
+
+    def __repr__(self) -> str:
+        return f"Stage({self.name!r})"
 
     @property
     def ports(self) -> tuple[Topic, ...]:

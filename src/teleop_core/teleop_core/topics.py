@@ -80,7 +80,7 @@ def in_force(topic: str) -> Stamp:
     return Stamp(f"of the {topic} in force", topic, is_in_force=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Topic:
     """One topic of an arm.
 
@@ -111,6 +111,9 @@ class Topic:
             return self
         frame = f"{arm}/{self.frame_id}" if self.frame_id else ""
         return replace(self, name=f"{arm}/{self.name}", frame_id=frame, arm=arm)
+
+    def __repr__(self) -> str:
+        return f"Topic({self.name!r}, {self.kind.name})"
 
     @property
     def field(self) -> str:

@@ -4,17 +4,18 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 
-from teleop_core import topics
 from teleop_core.bags.layouts import layout
-from teleop_core.errors import TeleopError
+from teleop_core.errors import ParameterError, TeleopError
+from teleop_core.geometry import Array
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.loop import Loop
@@ -23,15 +24,14 @@ from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.streams import Input, Output, message_type, profile
 from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.configuration import RealTimeParameters
-from teleop_core.session.graph import Stage
 from teleop_core.signals import TICK_NS
+from teleop_core.stage import Stage, joints_of
 from teleop_core.topics import Kind, Topic
 
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE,
     TransitionCallbackReturn.ERROR,
 )  # fmt: skip
-_SETPOINTS = (topics.SLAVE_SETPOINT_JS, topics.SLAVE_SETPOINT_CP)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,32 @@ class NodeParameters:
         1000, unit="ticks", lower=0, upper=10_000, fixed=True,
         doc="missed ticks that one late wake-up makes up for; beyond them time is dropped",
     )  # fmt: skip
+    links: tuple[str, ...] = parameter(
+        (), fixed=True,
+        doc="what feeds a port in place of the topic of its name, port=topic or port=topic@delay, "
+        "with the delay in seconds; topics of one port are added",
+    )  # fmt: skip
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
+
+    def feeds(self, port: str) -> list[tuple[str, float]]:
+        """Topics that feed a port, each with its delay [s].
+
+        Raises:
+            ParameterError: A link has another form.
+        """
+        found = []
+        for text in self.links:
+            own, equals, feed = text.partition("=")
+            topic, at, delay = feed.partition("@")
+            try:
+                seconds = float(delay) if at else 0.0
+            except ValueError:
+                seconds = -1.0
+            if not (equals and topic) or seconds < 0.0:
+                raise ParameterError("links", text, "port=topic or port=topic@seconds")
+            if own == port:
+                found.append((topic, seconds))
+        return found or [(port, 0.0)]
 
 
 class CoreNode(LifecycleNode):  # type: ignore[misc]
@@ -65,7 +90,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def __init__(self, stage: Stage, group: type | None = None, **options: Any) -> None:
         super().__init__(stage.name, **options)
-        self._description, self._groups = stage, (NodeParameters, group or stage.parameters)
+        self.description, self._groups = stage, (NodeParameters, group or stage.parameters)
         self._specs = {spec.name: spec for entry in self._groups for spec in specs(entry)}
         self.options, self.parameters = self._built(self._overrides())
         declare(self, self._specs.values(), values_of(self.options) | values_of(self.parameters))
@@ -79,9 +104,11 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         """Whether the node works in a thread of its own, or in that of a whole session."""
         self.is_at_work = False
         self._loop: Loop | None = None
-        self.inputs: dict[Topic, Input] = {}
+        self.inputs: dict[str, list[Input]] = {}
         self.outputs: dict[Topic, Output] = {}
         self._own_publishers: list[Any] = []
+        self._summed: dict[str, list[Array]] = {}
+        self._stamps: list[tuple[Output, str]] | None = None
         self._fresh_counts()
         self._word = "unconfigured"
         self._reporter = Reporter(self)
@@ -91,10 +118,15 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def setup(self, parameters: Any) -> None:
         """Make the stage and open its topics."""
-        raise NotImplementedError
+        self.stage = self.description.run(parameters, TICK_NS / 1e9)
+        self.open_streams(joints_of(parameters))
 
     def turn(self) -> None:
         """One round of work; blocks for a tenth of a second at most."""
+        raise NotImplementedError
+
+    def tick(self, tick_ns: int) -> None:
+        """Work for one tick [ns, monotonic] of a session that goes through all its nodes."""
         raise NotImplementedError
 
     def start(self) -> None:
@@ -121,17 +153,34 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     # -- topics ----------------------------------------------------------------------------------
 
+    @property
+    def arm(self) -> str:
+        """Namespace of the node, without the slash before it."""
+        return str(self.get_namespace()).strip("/")
+
+    @property
+    def member_name(self) -> str:
+        """Name of the node with its namespace, without the slash before it."""
+        return f"{self.arm}/{self.get_name()}" if self.arm else str(self.get_name())
+
     def open_streams(self, joint_names: tuple[str, ...] = ()) -> None:
         """Open the streams that the stage reads and writes, on the fields of its signals."""
-        for topic in self._description.reads:
-            target = self.stage.signals[topic.field]
-            entry = Input(self, topic, joint_names, target, may_repeat=topic in _SETPOINTS)
-            self.inputs[topic] = entry
-        for topic in self._description.writes:
-            if topic.kind is not Kind.REPORT:
-                source = self.stage.signals[topic.field]
-                publisher = self.open_publisher(topic)
-                self.outputs[topic] = Output(publisher, layout(topic, joint_names), source)
+        signals = self.stage.signals
+        for port in self.description.reads:
+            feeds = self.options.feeds(port.name)
+            for name, delay in feeds:
+                target = signals[port.field] if len(feeds) == 1 else signals[port.field].copy()
+                topic = replace(port, name=name).of_arm(self.arm)
+                entry = Input(self, topic, name, joint_names, target, delay)
+                self.inputs.setdefault(port.name, []).append(entry)
+                if len(feeds) > 1:
+                    self._summed.setdefault(port.field, []).append(target)
+        for plain in self.description.writes:
+            if plain.kind is not Kind.REPORT:
+                topic = plain.of_arm(self.arm)
+                publisher = self.open_publisher(plain)
+                form = layout(topic, joint_names)
+                self.outputs[topic] = Output(publisher, form, signals[plain.field])
 
     def open_publisher(self, topic: Topic) -> Any:
         """Publisher that is silent unless the node is active, and closed at cleanup."""
@@ -140,20 +189,63 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self._own_publishers.append(publisher)
         return publisher
 
-    def input(self, topic: Topic) -> Input:
-        """What the node reads from a topic."""
-        return self.inputs[topic]
+    def input(self, port: Topic) -> Input:
+        """What the node reads at a port, of several the one that others are added to."""
+        return self.inputs[port.name][0]
 
     def output(self, topic: Topic) -> Output:
-        """What the node writes to a topic."""
-        return self.outputs[topic]
+        """What the node writes to a topic of its stage."""
+        return self.outputs[topic.of_arm(self.arm)]
+
+    def all_inputs(self) -> list[Input]:
+        """What the node reads at all its ports."""
+        return [entry for entries in self.inputs.values() for entry in entries]
+
+    def read_ports(self, trigger: Topic | None = None) -> None:
+        """Bring the signals up to date, all ports but that of the trigger."""
+        for port in self.description.reads:
+            if trigger is None or port.name != trigger.name:
+                for entry in self.inputs[port.name]:
+                    entry.newest()
+                self._note(port)
+        for name, parts in self._summed.items():
+            self.stage.signals[name] = np.sum(parts, axis=0)
+
+    def _note(self, port: Topic) -> None:
+        """Write the stamp of a port into the signals."""
+        stamp_ns = self.inputs[port.name][0].stamp_ns
+        if stamp_ns is not None:
+            self.stage.signals[f"{port.field}_ns"] = stamp_ns
+
+    def send_all(self, now_ns: int) -> None:
+        """Send what the stage wrote, each under the stamp that its topic says."""
+        signals = self.stage.signals
+        for output, field_name in self._stamped():
+            output.send(int(signals[field_name]) if field_name else now_ns)
+
+    def _stamped(self) -> list[tuple[Output, str]]:
+        """Outputs, each with the field of its stamp; empty for the time of sampling."""
+        if self._stamps is None:
+            self._stamps = []
+            ports = {port.name: port for port in self.description.reads}
+            for plain in self.description.writes:
+                if plain.kind is not Kind.REPORT:
+                    of = ports.get(plain.stamp.of)
+                    field_name = (
+                        f"{plain.field}_ns"
+                        if plain.stamp.is_in_force
+                        else (f"{of.field}_ns" if of else "")
+                    )
+                    self._stamps.append((self.output(plain), field_name))
+        return self._stamps
 
     def _close(self) -> None:
-        for entry in self.inputs.values():
+        for entry in self.all_inputs():
             entry.close()
         for publisher in self._own_publishers:
             self.destroy_lifecycle_publisher(publisher)
         self.inputs, self.outputs, self._own_publishers = {}, {}, []
+        self._summed, self._stamps = {}, None
         self.stage = None
 
     # -- lifecycle -------------------------------------------------------------------------------
@@ -190,7 +282,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         return self._guard("recovery", self._clear, "unconfigured")
 
     def _begin(self) -> None:
-        for entry in self.inputs.values():
+        for entry in self.all_inputs():
             entry.forget()
         self.start()
         self.is_at_work = True
@@ -264,7 +356,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
     def _built(self, values: dict[str, Any]) -> tuple[NodeParameters, Any]:
         options, group = self._groups
         own = {spec.name for spec in specs(options)}
-        prefix = f"{self.get_name()}."
+        prefix = f"{self.member_name}."
         return (
             build(options, {k: v for k, v in values.items() if k in own}, prefix),
             build(group, {k: v for k, v in values.items() if k not in own}, prefix),
@@ -309,7 +401,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def report(self) -> None:
         """Publish how the node is."""
-        inputs = list(self.inputs.values())
+        inputs = self.all_inputs()
         is_active = self._word == "active"
         concerns = self._reporter.input_concerns(inputs)
         if is_active:

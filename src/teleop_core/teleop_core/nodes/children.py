@@ -64,16 +64,19 @@ class Child:
     """Process of one node.
 
     Args:
-        name: Node, and module in :mod:`teleop_core.nodes`.
+        name: Stage with its namespace, or a whole session.
         parameters: Parameter file.
         folder: Where its output is kept.
         env: Its environment.
     """
 
     def __init__(self, name: str, parameters: Path, folder: Path, env: dict[str, str]) -> None:
-        self.name, self._log = name, folder / f"{name}.log"
-        command = [sys.executable, "-m", f"teleop_core.nodes.{name}"]
+        arm, _, stage = name.rpartition("/")
+        self.name, self._log = name, folder / f"{name.replace('/', '.')}.log"
+        command = [sys.executable, "-m", "teleop_core.nodes", stage]
         command += ["--ros-args", "--params-file", str(parameters)]
+        if arm:
+            command += ["-r", f"__ns:=/{arm}"]
         with self._log.open("wb") as log:
             # A session of its own: Ctrl-C on the terminal reaches us, and we end it in order.
             self._process = subprocess.Popen(

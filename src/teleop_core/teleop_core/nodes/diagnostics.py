@@ -16,13 +16,13 @@ class Reporter:
     """Sender of a node's ``diagnostics``.
 
     Args:
-        node: The node; its name is that of the status.
+        node: The node; its name, with the namespace, is that of the status.
     """
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publisher = node.create_publisher(
-            DiagnosticArray, DIAGNOSTICS.name, profile(DIAGNOSTICS)
+            DiagnosticArray, f"/{DIAGNOSTICS.name}", profile(DIAGNOSTICS)
         )
         self._last_time, self._last_ticks = time.monotonic(), 0
         self._last_refused: dict[str, int] = {}
@@ -55,7 +55,8 @@ class Reporter:
 
     def send(self, concerns: list[str], text: str, values: Mapping[str, str]) -> None:
         """Publish one status: a warning if there are concerns."""
-        status = DiagnosticStatus(name=self._node.get_name(), hardware_id="teleop_core")
+        name = f"{self._node.get_namespace()}/{self._node.get_name()}".strip("/")
+        status = DiagnosticStatus(name=name, hardware_id="teleop_core")
         status.level = DiagnosticStatus.WARN if concerns else DiagnosticStatus.OK
         status.message = "; ".join(concerns) or text
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]

@@ -1,23 +1,19 @@
 """Node ``haptic_master``: the simulated haptic device in the hand of an operator."""
 
-import sys
-import time
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from teleop_core import topics
 from teleop_core.bags.reports import read_reports
-from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
-from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.process import run
+from teleop_core.master.haptic_master import HAPTIC_MASTER, HapticMasterParameters
 from teleop_core.nodes.streams import Subscription
+from teleop_core.nodes.ticking import TickingNode
 from teleop_core.parameters import parameter
-from teleop_core.session.configuration import Configuration
-from teleop_core.session.graph import STAGE
-from teleop_core.session.runner import recorded_path, state_report
+from teleop_core.session.runner import state_report
 from teleop_core.signals import STATE_FIELDS
+from teleop_core.stage import Stage
+from teleop_core.topics import MASTER_SERVO_CF, TELEOP_STATE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,33 +26,25 @@ class HapticMasterNodeParameters(HapticMasterParameters):
     )  # fmt: skip
 
 
-class HapticMasterNode(CoreNode):
+class HapticMasterNode(TickingNode):
     """One sample of the device per millisecond, stamped with its nominal time.
 
     Nodes find each other within seconds. Until the slave follows, the hand rests, as an operator's
     would: no part of its motion is lost.
     """
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__(STAGE["haptic_master"], HapticMasterNodeParameters, **options)
+    def __init__(self, stage: Stage = HAPTIC_MASTER, **options: Any) -> None:
+        super().__init__(stage, HapticMasterNodeParameters, **options)
 
     def setup(self, parameters: HapticMasterNodeParameters) -> None:
         """Make the device and open its topics."""
-        recorded = recorded_path(Configuration({"haptic_master": parameters}, ""))
-        self.stage = HapticMaster(parameters, recorded=recorded)
+        super().setup(parameters)
         self.stage.step()  # loads the kernels, which takes longer than many ticks
         self.stage.reset()
-        self.open_streams()
-        self._servo_cf = self.input(topics.MASTER_SERVO_CF)
-        self._samples = [self.output(topic) for topic in STAGE["haptic_master"].writes]
-        self._force = self.stage.signals[topics.MASTER_SERVO_CF.field]
+        self._force = self.stage.signals[MASTER_SERVO_CF.field]
         self._has_begun, self._first_ns = False, 0
         read_reports(state_report(0, np.zeros(len(STATE_FIELDS))))  # loads the message types
-        self._state = Subscription(self, topics.TELEOP_STATE)
-
-    def start(self) -> None:
-        """Relate the monotonic time of the loop to the stamps."""
-        self._epoch_ns = time.time_ns() - time.monotonic_ns()
+        self._state = Subscription(self, TELEOP_STATE, TELEOP_STATE.name)
 
     def stop(self) -> None:
         """Forget the force: the next activation starts without one."""
@@ -66,22 +54,12 @@ class HapticMasterNode(CoreNode):
         """Stop listening to the state."""
         self._state.close()
 
-    def turn(self) -> None:
-        """Take all samples that are due."""
-        for tick_ns in self.schedule.due():
-            self.work(tick_ns)
-
-    def work(self, tick_ns: int) -> None:
-        """Take the sample of one tick [ns, monotonic]."""
-        self._servo_cf.newest()
-        if self._servo_cf.age() > self.parameters.force_timeout:
+    def advance(self, now_ns: int) -> None:
+        """Take the sample of one tick; without a fresh force none acts, at first the hand rests."""
+        if self.input(MASTER_SERVO_CF).age() > self.parameters.force_timeout:
             self._force[:] = 0.0
-        stamp_ns = tick_ns + self._epoch_ns
-        if self._has_begun or self._begins(stamp_ns):
-            with self.lock:
-                self.stage.step()
-        for sample in self._samples:
-            sample.send(stamp_ns)
+        if self._has_begun or self._begins(now_ns):
+            super().advance(now_ns)
 
     def _begins(self, stamp_ns: int) -> bool:
         """Whether the operator begins with this sample."""
@@ -102,12 +80,3 @@ class HapticMasterNode(CoreNode):
     def values(self) -> dict[str, str]:
         """Whether the operator moves yet."""
         return {"has_begun": str(int(self._has_begun))}
-
-
-def main() -> int:
-    """Entry point of ``ros2 run teleop_core haptic_master``."""
-    return run(HapticMasterNode)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -14,22 +14,27 @@ import yaml
 from rich.console import Console
 
 from teleop_core.errors import RecordingError, SessionError
+from teleop_core.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.children import Child, end_all, environment
-from teleop_core.nodes.observer import WARNING, Observer
-from teleop_core.session.configuration import Configuration
-from teleop_core.session.graph import STAGES
+from teleop_core.nodes.observer import WARNING, Observer, Status
+from teleop_core.nodes.start import SESSION as SESSION_NODE
+from teleop_core.session.configuration import SESSION, Configuration
+from teleop_core.session.links import link_texts
 
 START_TIMEOUT = 180.0
 """A node must be at work within this time [s]; the first start ever compiles the kernels."""
 SILENCE = 10.0
 """A node that has not reported for this long hangs [s]."""
-RECORDER = "recorder"
-_NODES = tuple(stage.name for stage in STAGES)
-_OTHERS = tuple(name for name in _NODES if name != RECORDER)
 Crew = dict[str, tuple[str, ...]]
 """Processes that are started together, each with its nodes."""
-_ONE_EACH: tuple[Crew, ...] = ({RECORDER: (RECORDER,)}, {name: (name,) for name in _OTHERS})
-_ALL_IN_ONE: Crew = {"teleop_session": _NODES}
+
+
+def _crews(graph: Graph, *, is_composed: bool) -> tuple[Crew, ...]:
+    """Processes of a graph: the recorder before the others, or all in one."""
+    names = tuple(member.name for member in graph.members)
+    if is_composed:
+        return ({SESSION_NODE: (*names, RECORDER_NAME)},)
+    return ({RECORDER_NAME: (RECORDER_NAME,)}, {name: (name,) for name in names})
 
 
 def live(
@@ -56,7 +61,7 @@ def live(
         Observer(int(env["ROS_DOMAIN_ID"])) as observer,
     ):
         session = _Session(configuration, out, console, observer, Path(folder), env)
-        session.crews = (_ALL_IN_ONE,) if is_composed else _ONE_EACH
+        session.crews = _crews(configuration.graph, is_composed=is_composed)
         with _terminable():
             session.run()
 
@@ -86,12 +91,13 @@ class _Session:
         folder: Path,
         env: dict[str, str],
     ) -> None:
-        self._duration = float(configuration.groups["teleop"].duration)
+        self._duration = float(configuration.groups[SESSION].duration)
+        self._graph = configuration.graph
         self._console, self._observer, self._folder, self._env = console, observer, folder, env
         self._parameters = folder / "parameters.yaml"
         self._parameters.write_text(parameter_file(configuration, str(out)))
         self._children: dict[str, Child] = {}
-        self.crews = _ONE_EACH
+        self.crews = _crews(self._graph, is_composed=False)
 
     def run(self) -> None:
         """Start, watch and stop all nodes; the recorder comes first and goes last."""
@@ -128,7 +134,9 @@ class _Session:
 
     def _await_operator(self) -> None:
         """Wait until the hand moves; it does after a while even if nothing follows it."""
-        while not self._observer.statuses["haptic_master"].number("has_begun"):
+        first = self._graph.stages[0]
+        masters = [m.name for m in self._graph.members if m.stage is first]
+        while not all(self._observer.statuses[m].number("has_begun") for m in masters):
             self._observer.listen(0.1)
             self._check()
 
@@ -160,19 +168,25 @@ class _Session:
     def _line(self) -> str:
         """How the session is, in one line."""
         statuses = self._observer.statuses
-        slave = statuses["slave_sim"]
         refused = sum(status.number("refused") for status in statuses.values())
-        parts = [
-            f"slave {slave.number('rate_hz'):.0f} Hz",
+        parts = []
+        for member in self._graph.members:
+            if member.stage.name == self._graph.chain()[-1][0]:
+                parts += self._slave_line(member.arm, statuses[member.name])
+        parts.append(f"refused {refused:.0f}")
+        warnings = [f"{n}: {s.message}" for n, s in statuses.items() if s.level >= WARNING]
+        return ", ".join(parts) + "".join(f"; {warning}" for warning in warnings)
+
+    @staticmethod
+    def _slave_line(arm: str, slave: Status) -> list[str]:
+        return [
+            f"{arm or 'slave'} {slave.number('rate_hz'):.0f} Hz",
             f"late {slave.number('late'):.0f}",
             f"missed {slave.number('missed'):.0f}",
             f"dropped {slave.number('dropped_time_ms'):g} ms",
             f"master to slave {slave.number('delay_ms.median'):.1f} ms"
             f" (p99 {slave.number('delay_ms.p99'):.1f})",
-            f"refused {refused:.0f}",
         ]
-        warnings = [f"{n}: {s.message}" for n, s in statuses.items() if s.level >= WARNING]
-        return ", ".join(parts) + "".join(f"; {warning}" for warning in warnings)
 
     def _say(self, text: str) -> None:
         self._console.print(text, highlight=False, markup=False, soft_wrap=True)
@@ -181,7 +195,7 @@ class _Session:
         is_main = threading.current_thread() is threading.main_thread()
         before = signal.signal(signal.SIGINT, signal.SIG_IGN) if is_main else None
         try:
-            recorder = self._children.pop(RECORDER, None)
+            recorder = self._children.pop(RECORDER_NAME, None)
             end_all(self._children.values())
             code = recorder.end() if recorder else 0
             if recorder and code:
@@ -192,14 +206,22 @@ class _Session:
 
 
 def parameter_file(configuration: Configuration, out: str) -> str:
-    """Parameters of all nodes as a ROS 2 parameter file; ``out`` is that of the recorder."""
-    text = configuration.text()
+    """Parameters of all nodes as a ROS 2 parameter file; ``out`` is that of the recorder.
+
+    Every node is named with its namespace. What feeds its ports, where that is not the topic of
+    the port's name, stands in its ``links``.
+    """
+    text, graph = configuration.text(), configuration.graph
     content: dict[str, Any] = yaml.safe_load(text)
-    shared = content.pop("teleop")["ros__parameters"]
+    session = content.pop(SESSION)
+    shared = {k: v for k, v in session["ros__parameters"].items() if k.startswith("real_time.")}
     for node in content.values():
-        wanted = {k: v for k, v in shared.items() if k.startswith("real_time.")}
-        node["ros__parameters"] |= deepcopy(wanted)  # rcl cannot read YAML's aliases
-    recorder = content[RECORDER]["ros__parameters"]
+        node["ros__parameters"] |= deepcopy(shared)  # rcl cannot read YAML's aliases
+    for member in graph.members:
+        if links := link_texts(graph, member):
+            content[member.name]["ros__parameters"]["links"] = links
+    recorder = content[RECORDER_NAME]["ros__parameters"]
     recorder["out"], recorder["configuration"] = out, text
     recorder["scenario"] = configuration.scenario
-    return yaml.safe_dump(content, allow_unicode=True)
+    named = {f"/{name}": node for name, node in content.items()}
+    return yaml.safe_dump({SESSION: session, **named}, allow_unicode=True)

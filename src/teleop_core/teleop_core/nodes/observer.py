@@ -41,7 +41,7 @@ class Observer:
         self._node = Node(
             "teleop_live", context=self._context, use_global_arguments=False, enable_rosout=False
         )
-        self._reports = Subscription(self._node, DIAGNOSTICS, 100)
+        self._reports = Subscription(self._node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
         self._waiter = Waiter(self._context, self._reports)
 
     def __enter__(self) -> "Observer":

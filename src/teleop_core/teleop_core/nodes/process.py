@@ -6,13 +6,10 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from itertools import pairwise
-from pathlib import Path
 from typing import Protocol
 
 import rclpy
 import rclpy.utilities
-import yaml
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
@@ -20,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from teleop_core.errors import TeleopError
 from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.discovery import announce_often
+from teleop_core.nodes.files import checked_arguments
 
 _BAD_ARGUMENTS = (
     rclpy_implementation.RCLError,
@@ -48,7 +46,7 @@ def run(make_crew: Callable[[], Crew]) -> int:
     """
     signals = _signal_pipe()
     try:
-        _check_files(sys.argv)
+        sys.argv[:] = checked_arguments(sys.argv)
         announce_often()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         nodes = make_crew().nodes
@@ -67,23 +65,6 @@ def run(make_crew: Callable[[], Crew]) -> int:
     for node in nodes:
         node.destroy_node()
     return _finish(code)
-
-
-def _check_files(arguments: list[str]) -> None:
-    """Refuse parameter files that cannot be read in words, which rcl does not.
-
-    Raises:
-        TeleopError: A file is missing or is not YAML.
-    """
-    for flag, file in pairwise(arguments):
-        if flag != "--params-file":
-            continue
-        try:
-            yaml.safe_load(Path(file).read_text())
-        except OSError as error:
-            raise TeleopError(f"{file}: cannot be read: {error.strerror}") from error
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise TeleopError(f"{file}: is not YAML: {' '.join(str(error).split())}") from error
 
 
 def _signal_pipe() -> int:

@@ -9,18 +9,18 @@ from typing import Any
 
 import yaml
 
-from teleop_core import topics
-from teleop_core.bags.recording import RecordingParameters
+from teleop_core.bags.recording import RECORDER, RecordingParameters
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
+from teleop_core.graph import Graph
 from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.process import run
+from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.streams import Subscription
 from teleop_core.parameters import parameter
 from teleop_core.session.configuration import Configuration, parse_layer
-from teleop_core.session.graph import STAGE
 from teleop_core.session.runner import describe
-from teleop_core.topics import Quality, Topic
+from teleop_core.stage import Stage
+from teleop_core.topics import DIAGNOSTICS, Quality, Topic
 
 DEPTH = 2000
 """Messages of one topic that wait while the disk or another process is slow: two seconds."""
@@ -46,7 +46,7 @@ class _Channel:
     def __init__(self, node: CoreNode, topic: Topic) -> None:
         self.topic, self._node = topic, node
         self.received = self.lost = self._number = 0
-        self.publishers = 0 if topic is topics.DIAGNOSTICS else 1
+        self.publishers = 0 if topic is DIAGNOSTICS else 1
         self._given: deque[Arrival] = deque()
         self._subscription: Subscription | None = None
         self._inside_ns: int | None = None
@@ -82,7 +82,10 @@ class _Channel:
             self.close()
         elif self._subscription is None:
             depth = 10 if self.topic.quality is Quality.LATCHED else DEPTH
-            self._subscription, self._number = Subscription(self._node, self.topic, depth), 0
+            self._subscription, self._number = (
+                Subscription(self._node, self.topic, f"/{self.topic.name}", depth),
+                0,
+            )
 
     def close(self) -> None:
         """Stop listening to the topic."""
@@ -105,24 +108,30 @@ class _Channel:
 class RecorderNode(CoreNode):
     """Takes what has come, some hundred times a second, and hands it to the writer unread."""
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__(STAGE["recorder"], RecorderParameters, **options)
-        self.channels: dict[Topic, _Channel] = {}
+    def __init__(self, stage: Stage = RECORDER, graph: Graph | None = None, **options: Any) -> None:
+        super().__init__(stage, RecorderParameters, **options)
+        self.channels: dict[str, _Channel] = {}
+        self._graph = graph
 
     def setup(self, parameters: RecorderParameters) -> None:
         """Make the recording's directory."""
+        configuration = _configuration(parameters)
+        graph = self._graph or (
+            configuration.graph if parameters.configuration else graph_of(sys.argv)
+        )
         name = parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S")
+        topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
         self._writer = BagWriter(
-            Path(name), topics.ALL, (), parameters=parameters, metadata=_metadata(parameters),
+            Path(name), topics, {}, parameters=parameters, metadata=describe(configuration),
             start_ns=time.time_ns(),
         )  # fmt: skip
         self.stage, self._is_broken = self._writer, False
-        every = parameters.every_nth(topics.ALL)
-        self._recorded = [topic for topic in topics.ALL if every[topic.name]]
+        every = parameters.every_nth(topics)
+        self._recorded = [topic for topic in topics if every[topic.name]]
 
     def start(self) -> None:
         """Open the topics; latched ones send what they have."""
-        self.channels = {topic: _Channel(self, topic) for topic in self._recorded}
+        self.channels = {topic.name: _Channel(self, topic) for topic in self._recorded}
 
     def turn(self) -> None:
         """Record what has come."""
@@ -159,8 +168,8 @@ class RecorderNode(CoreNode):
     def concerns(self) -> list[str]:
         """Topics of which messages were lost before they came here."""
         for channel in self.channels.values():
-            is_shared = channel.topic is topics.DIAGNOSTICS
-            channel.publishers = 0 if is_shared else self.count_publishers(channel.topic.name)
+            is_shared = channel.topic is DIAGNOSTICS
+            channel.publishers = 0 if is_shared else self.count_publishers(f"/{channel.topic.name}")
         lost = sum(channel.lost for channel in self.channels.values())
         return [f"the middleware lost {lost} messages on the way here"] if lost else []
 
@@ -173,17 +182,8 @@ class RecorderNode(CoreNode):
         return values
 
 
-def _metadata(parameters: RecorderParameters) -> dict[str, str]:
-    """Names and texts stored with the recording."""
+def _configuration(parameters: RecorderParameters) -> Configuration:
+    """Configuration of the session, of defaults where none is given."""
     content = yaml.safe_load(parameters.configuration) or {}
     layer = parse_layer(content, "recorder.configuration")
-    return describe(Configuration.from_layers([layer], parameters.scenario))
-
-
-def main() -> int:
-    """Entry point of ``ros2 run teleop_core recorder``."""
-    return run(RecorderNode)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return Configuration.from_layers([layer], parameters.scenario)

@@ -6,7 +6,7 @@ Both give the same values.
 """
 
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any
@@ -74,14 +74,15 @@ class Subscription:
     Args:
         node: Node that owns it.
         topic: What it listens to.
+        name: Its name for the middleware.
         depth: Length of the queue; None for the topic's own.
     """
 
-    def __init__(self, node: Node, topic: Topic, depth: int | None = None) -> None:
+    def __init__(self, node: Node, topic: Topic, name: str, depth: int | None = None) -> None:
         self.topic, self._node = topic, node
         self.type = message_type(topic.kind.ros_type)
         self._own = node.create_subscription(
-            self.type, topic.name, _ignore, profile(topic, depth), raw=True,
+            self.type, name, _ignore, profile(topic, depth), raw=True,
             callback_group=Unattended(),
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )  # fmt: skip
@@ -116,15 +117,15 @@ class Waiter:
 
 
 class Input:
-    """Newest sound message of one topic, kept in the signals of a stage.
+    """Newest sound message of one topic, for a port of a stage.
 
     Args:
         node: Node that owns it.
-        topic: What it listens to.
+        topic: What it listens to, in its namespace.
+        name: Its name for the middleware, below the node's namespace.
         joint_names: Order of the joints in the signals.
         target: Where the values are written, shape (width,).
-        may_repeat: Whether a stamp may come again, and 0 at any time: as that of the command in
-            force, 0 for none, which setpoints carry.
+        delay: Time for which each message is held back, as on a slow link [s].
 
     Attributes:
         stamp_ns: Stamp of the newest sound message; None before the first.
@@ -137,30 +138,36 @@ class Input:
         self,
         node: Node,
         topic: Topic,
+        name: str,
         joint_names: tuple[str, ...],
         target: Array,
-        may_repeat: bool = False,
+        delay: float = 0.0,
     ) -> None:
-        self.topic, self._node = topic, node
-        self.subscription: Subscription | None = Subscription(node, topic, _WAITING)
+        self.topic, self._node, self._name = topic, node, name
+        self.subscription: Subscription | None = Subscription(node, topic, name, _WAITING)
         self._is_new = False
-        self._joint_names, self._target, self._may_repeat = joint_names, target, may_repeat
+        self._joint_names, self._target = joint_names, target
         self._layout = layout(topic, joint_names)
+        self._delay_ns = round(delay * 1e9)
+        self._held: deque[tuple[int, int, Values]] = deque()
         self.received, self.refused = 0, Counter[Refusal]()
         self.stamp_ns: int | None = None
         self.arrival_ns = 0
 
+    @property
+    def delay(self) -> float:
+        """Time for which each message is held back [s]."""
+        return self._delay_ns * 1e-9
+
     def take(self) -> bool:
         """Write the next sound message that waits into the signals; whether there was one."""
+        if self._delay_ns:
+            return self._take_held()
         if self.subscription is None:
             is_new, self._is_new = self._is_new, False
             return is_new
-        while (taken := self.subscription.take()) is not None:
-            self.received += 1
-            found = self._layout.decode_one(taken[0]) or self._read(taken[0])
-            if isinstance(found, Refusal):
-                self.refused[found] += 1
-            elif self._accept(*found):
+        while (found := self._next()) is not None:
+            if self._accept(*found):
                 return True
         return False
 
@@ -171,11 +178,33 @@ class Input:
             is_new = True
         return is_new
 
+    def _next(self) -> tuple[int, Values] | None:
+        """Next message of the subscription that can be read."""
+        while self.subscription is not None and (taken := self.subscription.take()) is not None:
+            self.received += 1
+            found = self._layout.decode_one(taken[0]) or self._read(taken[0])
+            if not isinstance(found, Refusal):
+                return found
+            self.refused[found] += 1
+        return None
+
+    def _take_held(self) -> bool:
+        """As :meth:`take`, of messages whose time has come."""
+        now_ns = time.monotonic_ns()
+        while (found := self._next()) is not None:
+            self._held.append((now_ns + self._delay_ns, *found))
+        while self._held and self._held[0][0] <= now_ns:
+            _, stamp_ns, values = self._held.popleft()
+            if self._accept(stamp_ns, values):
+                return True
+        return False
+
     def _accept(self, stamp_ns: int, values: Values) -> bool:
         now_ns, last_ns = time.monotonic_ns(), self.stamp_ns
-        if now_ns - self.arrival_ns > SILENCE_NS or (self._may_repeat and stamp_ns == 0):
+        may_repeat = self.topic.stamp.is_in_force
+        if now_ns - self.arrival_ns > SILENCE_NS or (may_repeat and stamp_ns == 0):
             last_ns = None
-        elif self._may_repeat and last_ns is not None:
+        elif may_repeat and last_ns is not None:
             last_ns -= 1
         reason = check(self.topic.kind, stamp_ns, values, last_ns)
         if reason is not None:
@@ -200,13 +229,14 @@ class Input:
         """Throw away what waits and start anew: the first message may have any stamp."""
         while self.subscription is not None and self.subscription.take() is not None:
             pass
+        self._held.clear()
         self._is_new = False
         self.stamp_ns = None
         self.arrival_ns = 0
 
     def publishers(self) -> int:
         """How many publishers the topic has now."""
-        return self._node.count_publishers(self.topic.name)  # type: ignore[no-any-return]
+        return self._node.count_publishers(self._name)  # type: ignore[no-any-return]
 
     # -- within a process that holds the sender too ----------------------------------------------
 
@@ -215,13 +245,16 @@ class Input:
         if is_inside and self.subscription is not None:
             self.close()
         elif not is_inside and self.subscription is None:
-            self.subscription = Subscription(self._node, self.topic, _WAITING)
+            self.subscription = Subscription(self._node, self.topic, self._name, _WAITING)
 
     def give(self, stamp_ns: int, values: Values) -> None:
         """Take a sound sample from a sender in this process."""
+        self.received += 1
+        if self._delay_ns:
+            self._held.append((time.monotonic_ns() + self._delay_ns, stamp_ns, values.copy()))
+            return
         self._target[:] = values
         self.stamp_ns, self.arrival_ns = stamp_ns, time.monotonic_ns()
-        self.received += 1
         self._is_new = True
 
     def close(self) -> None:

@@ -9,40 +9,43 @@ the topic instead: a real device, or a node elsewhere, takes its place.
 import sys
 import time
 
+from rclpy.parameter import Parameter
+
+from teleop_core.graph import RECORDER_NAME, Graph, Member
 from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.haptic_master import HapticMasterNode
-from teleop_core.nodes.inverse_kinematics import InverseKinematicsNode
+from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.loop import Loop
-from teleop_core.nodes.motion_scaling import MotionScalingNode
-from teleop_core.nodes.process import run
 from teleop_core.nodes.rate import Schedule
 from teleop_core.nodes.recorder import RecorderNode
-from teleop_core.nodes.slave_sim import SlaveSimNode
+from teleop_core.nodes.start import make_node
 from teleop_core.nodes.streams import Output
+from teleop_core.session.links import link_texts
+from teleop_core.stage import STAGES
 
 
 class TeleopSession:
-    """The five nodes and the loop that works for the first four.
+    """The nodes of a graph and the loop that works for all but the recorder.
 
-    The real-time options and the catch-up of that loop are those of ``slave_sim``.
+    The real-time options and the catch-up of that loop are those of the last stage, the slave. The
+    graph is what the group ``teleop`` of the parameter files says.
     """
 
     def __init__(self) -> None:
-        self._recorder = RecorderNode()
-        self._master, self._scaling = HapticMasterNode(), MotionScalingNode()
-        self._ik, self._slave = InverseKinematicsNode(), SlaveSimNode()
-        self._stages = (self._master, self._scaling, self._ik, self._slave)
+        graph = graph_of(sys.argv)
+        self._recorder = RecorderNode(STAGES.find(RECORDER_NAME), graph=graph)
+        self._stages = tuple(_node(graph, member) for member in graph.members)
         for node in self._stages:
             node.has_own_loop = False
-        self._schedule = Schedule(time.monotonic_ns, time.sleep, self._slave.options.max_catch_up)
+        last = self._stages[-1]
+        self._schedule = Schedule(time.monotonic_ns, time.sleep, last.options.max_catch_up)
         self._at_work: tuple[bool, ...] = ()
         self._pending: list[tuple[Output, int]] = []
-        Loop("session", self._turn, self._slave.fail, self._slave.prepare)
+        Loop("session", self._turn, last.fail, last.prepare)
 
     @property
     def nodes(self) -> tuple[CoreNode, ...]:
-        """The nodes, recorder first and master last: nothing that is sent is missed."""
-        return (self._recorder, self._slave, self._ik, self._scaling, self._master)
+        """The nodes, recorder first and masters last: nothing that is sent is missed."""
+        return (self._recorder, *reversed(self._stages))
 
     def _turn(self) -> None:
         """All ticks that are due, each through all stages."""
@@ -59,19 +62,10 @@ class TeleopSession:
 
     def _tick(self, tick_ns: int) -> None:
         """One tick [ns, monotonic]; a gate keeps a node from being closed while it works."""
-        master, scaling, ik, slave = self._stages
-        with master.gate:
-            if master.is_at_work:
-                master.work(tick_ns)
-        with scaling.gate:
-            if scaling.is_at_work:
-                scaling.work()
-        with ik.gate:
-            if ik.is_at_work:
-                ik.work()
-        with slave.gate:
-            if slave.is_at_work:
-                slave.work((tick_ns,))
+        for node in self._stages:
+            with node.gate:
+                if node.is_at_work:
+                    node.tick(tick_ns)
         # What travels furthest goes first: the slave's command before the master's sample.
         while self._pending:
             output, stamp_ns = self._pending.pop()
@@ -80,24 +74,23 @@ class TeleopSession:
     def _link(self) -> None:
         """Lead every stage's output to its readers in here, as far as both are at work."""
         active = [node for node in self._stages if node.is_at_work]
-        for node in (self._master, self._slave):  # what is late for one is for the other
-            node.schedule = self._schedule
-        outputs = {topic: out for node in active for topic, out in node.outputs.items()}
-        inputs = [entry for node in active for entry in node.inputs.values()]
-        for topic, out in outputs.items():
-            out.inputs = [entry for entry in inputs if entry.topic == topic]
-            channel = self._recorder.channels.get(topic)
+        for node in self._stages:  # what is late for one is for all that tick
+            if node.description.trigger is None:
+                node.schedule = self._schedule
+        outputs = {topic.name: out for node in active for topic, out in node.outputs.items()}
+        inputs = [entry for node in active for entry in node.all_inputs()]
+        for name, out in outputs.items():
+            out.inputs = [entry for entry in inputs if entry.topic.name == name]
+            channel = self._recorder.channels.get(name)
             out.tap, out.pending = channel.give if channel else None, self._pending
         for entry in inputs:
-            entry.join(entry.topic in outputs)
-        for topic, channel in self._recorder.channels.items():
-            channel.join(topic in outputs)
+            entry.join(entry.topic.name in outputs)
+        for name, channel in self._recorder.channels.items():
+            channel.join(name in outputs)
 
 
-def main() -> int:
-    """Entry point of ``ros2 run teleop_core teleop_session``."""
-    return run(TeleopSession)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def _node(graph: Graph, member: Member) -> CoreNode:
+    options = {"namespace": member.arm} if member.arm else {}
+    texts = link_texts(graph, member)
+    given = [Parameter("links", Parameter.Type.STRING_ARRAY, texts)] if texts else []
+    return make_node(member.stage, parameter_overrides=given, **options)

@@ -11,6 +11,7 @@ Source:
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,9 +38,20 @@ _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
+class Directions(NamedTuple):
+    """Cosine and sine of the angles of the three moving links."""
+
+    crank_x: float
+    crank_y: float
+    rocker_x: float
+    rocker_y: float
+    coupler_x: float
+    coupler_y: float
+
+
 @inner
-def _links(theta1: float, g: Array) -> tuple[float, float, float, float, float, float]:
-    """Cosine and sine of crank, rocker and coupler in the robot's mode; of least gap when open.
+def _links(theta1: float, g: Array) -> Directions:
+    """Directions of crank, rocker and coupler in the robot's mode; of least gap when open.
 
     Seen from the end of the crank, the right pivot is at (x, y) and the coupler's other end at
     (x, y) + l3 (cos phi1, sin phi1): never nearer than l2.
@@ -56,17 +68,17 @@ def _links(theta1: float, g: Array) -> tuple[float, float, float, float, float, 
     c3, s3 = along * cosine - across * sine, across * cosine + along * sine
     x, y = l3 * c3 + x, l3 * s3 + y
     length = math.sqrt(x * x + y * y)
-    return c1, s1, c3, s3, x / length, y / length
+    return Directions(c1, s1, c3, s3, x / length, y / length)
 
 
 @kernel
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip``, (4, 4), of the coupler point for theta1 (1,) [rad]."""
-    c1, s1, _, _, c, s = _links(q[0], geometry)
-    l1, a = geometry[1], geometry[4]
+    links = _links(q[0], geometry)
+    l1, a, c, s = geometry[1], geometry[4], links.coupler_x, links.coupler_y
     T[:] = 0.0
     T[0, 0], T[0, 1], T[1, 0], T[1, 1], T[2, 2], T[3, 3] = c, -s, s, c, 1.0, 1.0
-    T[0, 3], T[1, 3] = l1 * c1 + a * c, l1 * s1 + a * s
+    T[0, 3], T[1, 3] = l1 * links.crank_x + a * c, l1 * links.crank_y + a * s
 
 
 @inner
@@ -93,8 +105,9 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 @inner
 def _gap(theta1: float, T: Array, g: Array) -> tuple[float, float]:
     """Way [m] from the coupler point to T's, in x and y."""
-    c1, s1, _, _, c, s = _links(theta1, g)
-    return T[0, 3] - g[1] * c1 - g[4] * c, T[1, 3] - g[1] * s1 - g[4] * s
+    links = _links(theta1, g)
+    x = T[0, 3] - g[1] * links.crank_x - g[4] * links.coupler_x
+    return x, T[1, 3] - g[1] * links.crank_y - g[4] * links.coupler_y
 
 
 @inner
@@ -181,8 +194,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     pose_residual(reached, T, residual)
     if _distance(q[0], T, geometry) > REACHED:
         return _LIMITED if q[0] <= lower or q[0] >= upper else _UNREACHABLE
-    _, _, c3, s3, c, s = _links(q[0], geometry)
-    return _NEAR_SINGULAR if abs(s3 * c - c3 * s) < _NEAR else _FOLLOWED
+    links = _links(q[0], geometry)
+    sine = links.rocker_y * links.coupler_x - links.rocker_x * links.coupler_y
+    return _NEAR_SINGULAR if abs(sine) < _NEAR else _FOLLOWED
 
 
 @kernel

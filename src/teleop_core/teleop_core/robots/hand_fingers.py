@@ -9,6 +9,7 @@ Source:
 """
 
 import math
+from typing import NamedTuple
 
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
@@ -19,7 +20,16 @@ from teleop_core.robots.branches import bounded, turned, wrapped
 _STRAIGHT = 1e-8
 _HELD = 1e-12
 Triple = tuple[float, float, float]
-Branch = tuple[int, float, float, float, bool]
+
+
+class Branch(NamedTuple):
+    """A branch of a finger: its number, its angles [rad], whether the finger reaches at all."""
+
+    number: int
+    theta: float
+    psi: float
+    phi: float
+    is_reachable: bool
 
 
 @kernel
@@ -115,7 +125,7 @@ def _nearest_branch(p: Triple, links: Triple, seed: Array, limits: Array, first:
         cost = _cost(found[:3], seed, limits, first) + (0.0 if found[3] else 1000.0)
         if cost < least:
             number, best, least = begin ^ k, found, cost
-    return number, best[0], best[1], best[2], best[3]
+    return Branch(number, best[0], best[1], best[2], best[3])
 
 
 @inner
@@ -145,16 +155,18 @@ def finger_joints(
         q: Joints (n,), inside the limits and a step of the seed.
     """
     if math.isfinite(limits[2, first]):
-        branch = _side(seed[first + 1], seed[first + 2], links)
-        theta, psi, phi, is_reachable = finger_branch(p, links, branch, seed[first])
+        side = _side(seed[first + 1], seed[first + 2], links)
+        theta, psi, phi, is_reachable = finger_branch(p, links, side, seed[first])
+        branch = Branch(side, theta, psi, phi, is_reachable)
     else:
-        branch, theta, psi, phi, is_reachable = _nearest_branch(p, links, seed, limits, first)
-    is_held = _is_held(theta, first, seed, limits, q)
+        branch = _nearest_branch(p, links, seed, limits, first)
+    psi, phi = branch.psi, branch.phi
+    is_held = _is_held(branch.theta, first, seed, limits, q)
     r = p[0] * math.cos(q[first]) + p[1] * math.sin(q[first]) - links[0]
     if is_held:
-        psi, phi, _ = _bent(r, p[2], links, branch % 2 == 0)
+        psi, phi, _ = _bent(r, p[2], links, branch.number % 2 == 0)
     if _is_held(psi, first + 1, seed, limits, q):
         psi = q[first + 1]
         phi = math.atan2(p[2] - links[1] * math.sin(psi), r - links[1] * math.cos(psi)) - psi
     _is_held(phi, first + 2, seed, limits, q)
-    return bool(is_reachable)
+    return bool(branch.is_reachable)

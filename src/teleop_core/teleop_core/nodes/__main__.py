@@ -1,0 +1,7 @@
+"""``python -m teleop_core.nodes NAME``: the node of a stage, or a whole session."""
+
+import sys
+
+from teleop_core.nodes.start import main
+
+sys.exit(main())

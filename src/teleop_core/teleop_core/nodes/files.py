@@ -1,0 +1,94 @@
+"""Parameter files of a process: checked, readable in any namespace, and what graph they describe."""
+
+import atexit
+import os
+import tempfile
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from teleop_core.errors import TeleopError
+from teleop_core.graph import Graph, build_graph
+from teleop_core.parameters import build
+from teleop_core.session.configuration import SESSION, SessionParameters
+
+_FLAG = "--params-file"
+
+
+def checked_arguments(arguments: list[str]) -> list[str]:
+    """Arguments in which parameter files are readable, and hold in whatever namespace.
+
+    A file names nodes by their bare names, as ours do; the middleware would silently pass it over
+    for a node in a namespace. Such a file is copied with names that hold in every namespace.
+
+    Raises:
+        TeleopError: A file is missing or is not YAML.
+    """
+    out = list(arguments)
+    for index, (flag, file) in enumerate(pairwise(arguments)):
+        if flag != _FLAG:
+            continue
+        content = _read(Path(file))
+        if isinstance(content, dict) and any(not str(key).startswith("/") for key in content):
+            out[index + 1] = _copy({_anywhere(str(key)): value for key, value in content.items()})
+    return out
+
+
+def _anywhere(key: str) -> str:
+    """Key that a node matches in its namespace: a bare name in any, left/name in /left."""
+    if key.startswith("/"):
+        return key
+    return f"/{key}" if "/" in key else f"/**/{key}"
+
+
+def _read(path: Path) -> Any:
+    try:
+        return yaml.safe_load(path.read_text())
+    except OSError as error:
+        raise TeleopError(f"{path}: cannot be read: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise TeleopError(f"{path}: is not YAML: {' '.join(str(error).split())}") from error
+
+
+class _Plain(yaml.SafeDumper):
+    """Writes equal parts in full: rcl cannot read references."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _copy(content: dict[str, Any]) -> str:
+    with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
+        yaml.dump(content, file, Dumper=_Plain, allow_unicode=True)
+    atexit.register(_remove, file.name)
+    return file.name
+
+
+def _remove(name: str) -> None:
+    if Path(name).exists():
+        os.unlink(name)
+
+
+def _session_values(arguments: list[str]) -> Iterator[dict[str, Any]]:
+    for flag, file in pairwise(arguments):
+        if flag == _FLAG:
+            content = _read(Path(file)) or {}
+            for key, inner in content.items():
+                if str(key).rpartition("/")[2] == SESSION and isinstance(inner, dict):
+                    yield inner.get("ros__parameters") or {}
+
+
+def graph_of(arguments: list[str]) -> Graph:
+    """Graph that the group ``teleop`` of the parameter files describes.
+
+    Raises:
+        TeleopError: A file or the graph is wrong.
+    """
+    given: dict[str, Any] = {}
+    for values in _session_values(arguments):
+        given |= {name: values[name] for name in ("arms", "stages", "delays") if name in values}
+    session = build(SessionParameters, given, f"{SESSION}.")
+    return build_graph(session.arms, session.stages, session.delays)

@@ -1,0 +1,54 @@
+"""Start: the node of any stage, ours or a user's, from the command line.
+
+``ros2 run teleop_core slave_sim`` starts a built-in stage by the name of its executable;
+``ros2 run teleop_core stage NAME`` starts any registered one, such as that of another package.
+"""
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from teleop_core.errors import UnknownNameError
+from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.process import run
+from teleop_core.stage import STAGES, Stage
+
+SESSION = "teleop_session"
+"""Executable of a whole session in one process."""
+ANY = "stage"
+"""Executable of any stage."""
+
+
+def node_class(stage: Stage) -> Any:
+    """Class of the node of a stage: its own, or by what makes it work a general one."""
+    kind = "answering:AnsweringNode" if stage.trigger is not None else "ticking:TickingNode"
+    module, _, name = (stage.node or f"teleop_core.nodes.{kind}").partition(":")
+    return getattr(import_module(module), name)
+
+
+def make_node(stage: Stage, **options: Any) -> CoreNode:
+    """Node of a stage; ``options`` as of :class:`rclpy.lifecycle.LifecycleNode`."""
+    node: CoreNode = node_class(stage)(stage, **options)
+    return node
+
+
+def main() -> int:
+    """Entry point of every executable: the stage is what it is called, or what is said first.
+
+    Returns:
+        Exit code: 0; 1 after a failure at work; 2 if a name, parameter or file is wrong.
+    """
+    name = Path(sys.argv[0]).stem
+    if name not in {SESSION, *STAGES}:
+        name = sys.argv.pop(1) if len(sys.argv) > 1 and sys.argv[1][:1] != "-" else ANY
+    if name == SESSION:
+        from teleop_core.nodes.teleop_session import TeleopSession
+
+        return run(TeleopSession)
+    try:
+        stage = STAGES.find(name)
+    except UnknownNameError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return run(lambda: make_node(stage))

@@ -1,0 +1,36 @@
+"""Ticking node: one step of its stage per millisecond, on a clock of its own."""
+
+import time
+from collections.abc import Iterable
+
+from teleop_core.nodes.base import CoreNode
+
+
+class TickingNode(CoreNode):
+    """Node that makes exactly one step for every tick, however late its wake-ups are."""
+
+    def start(self) -> None:
+        """Relate the monotonic time of the loop to the stamps."""
+        self.epoch_ns = time.time_ns() - time.monotonic_ns()
+
+    def turn(self) -> None:
+        """Make all steps that are due."""
+        self.work(self.schedule.due())
+
+    def tick(self, tick_ns: int) -> None:
+        """Make the step of one tick [ns, monotonic]."""
+        self.work((tick_ns,))
+
+    def work(self, ticks: Iterable[int]) -> None:
+        """Take what has come, then make the steps of some ticks [ns, monotonic]."""
+        self.read_ports()
+        for tick_ns in ticks:
+            now_ns = tick_ns + self.epoch_ns
+            self.stage.signals["now_ns"] = now_ns
+            self.advance(now_ns)
+            self.send_all(now_ns)
+
+    def advance(self, now_ns: int) -> None:
+        """Make one step that starts at ``now_ns`` [ns]."""
+        with self.lock:
+            self.stage.step()
