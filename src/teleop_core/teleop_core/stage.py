@@ -47,6 +47,9 @@ class Runner(Protocol):
     def step(self) -> None:
         """Make one step."""
 
+    def load(self) -> object:
+        """Compile or load the kernel, so that the first step takes no longer than others."""
+
 
 @dataclass(frozen=True, repr=False)
 class Stage:
@@ -102,21 +105,19 @@ class Stage:
             self._insist(self.trigger.name in known, text)
         for topic in self.writes:
             is_known = topic.stamp.is_in_force or topic.stamp.of in {"", *known}
-            self._insist(is_known, f"with {topic.stamp.of}, whose stamp {topic.name} passes on, "
-                                   "among its reads")  # fmt: skip
+            text = f"with {topic.stamp.of}, whose stamp {topic.name} passes on, among its reads"
+            self._insist(is_known, text)
         if self.replaces is not None:
             is_like = bool(self.writes) and self.writes[0].kind is self.replaces.kind
-            self._insist(self.replaces.name in known and is_like,
-                         f"one that reads {self.replaces.name} and writes its like first")  # fmt: skip
-        self._insist(self._is_made() or not (self.reads or self.writes),
-                     "with a step, step(parameters, state, signals, dt), or a make")  # fmt: skip
+            text = f"one that reads {self.replaces.name} and writes its like first"
+            self._insist(self.replaces.name in known and is_like, text)
+        if self.reads or self.writes:
+            text = "with a step, step(parameters, state, signals, dt), or a make"
+            self._insist(callable(self.step) is not callable(self.make), text)
         names = {spec.name for spec in specs(self.parameters)}
         has_joints = any(topic.kind in _WITH_JOINTS for topic in (*self.reads, *self.writes))
-        self._insist("robot" in names or not has_joints,
-                     "one whose parameters inherit RobotParameters, for it has topics with joints")  # fmt: skip
-
-    def _is_made(self) -> bool:
-        return callable(self.step) is not callable(self.make)
+        text = "one whose parameters inherit RobotParameters, for it has topics with joints"
+        self._insist("robot" in names or not has_joints, text)
 
     def _insist(self, is_so: bool, expected: str) -> None:
         if not is_so:
@@ -178,10 +179,14 @@ class RunningStage:
     def step(self) -> None:
         """Make one step."""
         self.prepare(1)
+        self.load()()
+        raise_pending()
+
+    def load(self) -> Callable[[], object]:
+        """Compile the kernel or load it from disk, which takes longer than many ticks."""
         if self._bound is None:
             self._bound = bound(self.kernel, *self.arguments, self.signals, self.dt)
-        self._bound()
-        raise_pending()
+        return self._bound
 
 
 def _nothing() -> None:

@@ -98,10 +98,9 @@ def _try(part: Controller) -> None:
     n = robot.n
     try:
         gains = np.ascontiguousarray(part.gains(part.parameters(), robot, np.zeros(n)), np.float64)
-        rows = [np.zeros(n) for _ in range(3)]
-        effort, memory = np.zeros(n), np.zeros((n, max(part.memory, 1)))
-        part.begin(memory, rows[1], rows[2])
-        part.control(gains, memory, *rows, np.ones(n), 1e-3, effort)
+        zero, effort, memory = np.zeros(n), np.zeros(n), np.zeros((n, max(part.memory, 1)))
+        part.begin(memory, zero, zero)
+        part.control(gains, memory, zero, zero, zero, np.ones(n), 1e-3, effort)
     except Exception as error:
         reason = " ".join(str(error).split())
         raise PartError(

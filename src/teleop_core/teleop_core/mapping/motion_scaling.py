@@ -29,7 +29,7 @@ from teleop_core.topics import (
 )
 
 MODES = ("coarse", "fine")
-AXES = ("x", "-x", "y", "-y", "z", "-z")
+AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,11 +64,11 @@ class MotionScalingParameters:
         doc="turn of the slave's tool about its axis; π/2 aligns it with the home pose",
     )  # fmt: skip
     axes: tuple[str, ...] = parameter(
-        ("-z", "-x", "y"), choices=AXES, length=3,
+        ("-z", "-x", "+y"), choices=AXES, length=3,
         doc="the slave's x, y, z as axes of the master's base; the default is that of the source",
     )  # fmt: skip
     tool_axes: tuple[str, ...] = parameter(
-        ("x", "-y", "-z"), choices=AXES, length=3,
+        ("+x", "-y", "-z"), choices=AXES, length=3,
         doc="the tool's x, y, z as axes of the stylus, before tool_roll",
     )  # fmt: skip
     feedback_timeout: float = parameter(
@@ -101,7 +101,7 @@ _CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
 
 
 def axis_map(name: str, axes: tuple[str, ...]) -> Array:
-    """Rotation (3, 3) whose rows pick axes by name: ("-z", "-x", "y") maps z to -x and so on.
+    """Rotation (3, 3) whose rows pick axes by name: ("-z", "-x", "+y") maps z to -x and so on.
 
     Args:
         name: Of the parameter, for messages.

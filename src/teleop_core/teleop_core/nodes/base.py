@@ -119,6 +119,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
     def setup(self, parameters: Any) -> None:
         """Make the stage and open its topics."""
         self.stage = self.description.run(parameters, TICK_NS / 1e9)
+        self.stage.load()
         self.open_streams(joints_of(parameters))
 
     def turn(self) -> None:
@@ -175,12 +176,12 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
                 self.inputs.setdefault(port.name, []).append(entry)
                 if len(feeds) > 1:
                     self._summed.setdefault(port.field, []).append(target)
-        for plain in self.description.writes:
-            if plain.kind is not Kind.REPORT:
-                topic = plain.of_arm(self.arm)
-                publisher = self.open_publisher(plain)
+        for written in self.description.writes:
+            if written.kind is not Kind.REPORT:
+                topic = written.of_arm(self.arm)
+                publisher = self.open_publisher(written)
                 form = layout(topic, joint_names)
-                self.outputs[topic] = Output(publisher, form, signals[plain.field])
+                self.outputs[topic] = Output(publisher, form, signals[written.field])
 
     def open_publisher(self, topic: Topic) -> Any:
         """Publisher that is silent unless the node is active, and closed at cleanup."""
@@ -228,15 +229,15 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         if self._stamps is None:
             self._stamps = []
             ports = {port.name: port for port in self.description.reads}
-            for plain in self.description.writes:
-                if plain.kind is not Kind.REPORT:
-                    of = ports.get(plain.stamp.of)
+            for written in self.description.writes:
+                if written.kind is not Kind.REPORT:
+                    of = ports.get(written.stamp.of)
                     field_name = (
-                        f"{plain.field}_ns"
-                        if plain.stamp.is_in_force
+                        f"{written.field}_ns"
+                        if written.stamp.is_in_force
                         else (f"{of.field}_ns" if of else "")
                     )
-                    self._stamps.append((self.output(plain), field_name))
+                    self._stamps.append((self.output(written), field_name))
         return self._stamps
 
     def _close(self) -> None:

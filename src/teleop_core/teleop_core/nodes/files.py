@@ -1,4 +1,4 @@
-"""Parameter files of a process: checked, readable in any namespace, and what graph they describe."""
+"""Parameter files of a process: checked, made to hold in any namespace, and read for the graph."""
 
 import atexit
 import os

@@ -22,8 +22,9 @@ class FileParameters:
     """A table of what the hand wants."""
 
     path: str = parameter(
-        "", fixed=True, doc="CSV file with a head of t, x, y, z and, if wanted, rx, ry, rz, clutch, "
-        "fixture, mode [s, m, rad]",
+        "", fixed=True,
+        doc="CSV file with a head of t, x, y, z and, if wanted, rx, ry, rz, clutch, fixture, mode "
+        "[s, m, rad]",
     )  # fmt: skip
 
 

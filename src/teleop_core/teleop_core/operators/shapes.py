@@ -1,4 +1,4 @@
-"""Shapes: smooth motion of the hand as a pure function of time: random, line, circle, points, hold."""
+"""Shapes: smooth motion of the hand as a pure function of time: random, line, circle and more."""
 
 import math
 from collections.abc import Callable

@@ -20,7 +20,7 @@ from teleop_core.stage import Runner
 __all__ = ["Tick", "block_dtype", "compose"]
 
 
-def block_dtype(graph: Graph, joints: Mapping[str, int]) -> "np.dtype[np.record]":
+def block_dtype(graph: Graph, joints: Mapping[str, int]) -> Any:
     """Record of everything that happens in a tick: ``now_ns``, all topics with stamps, and notes.
 
     Args:

@@ -211,8 +211,8 @@ class StateReports:
 
     def write(self, writer: BagWriter, block: Any) -> None:
         """Record the changes of a block."""
-        for report in self._reports:
-            report.write(writer, block)
+        for one in self._reports:
+            one.write(writer, block)
 
 
 class _Report:
@@ -223,7 +223,7 @@ class _Report:
     def write(self, writer: BagWriter, block: Any) -> None:
         states, stamps = block[self._topic.field], block[f"{self._topic.field}_ns"]
         changed = (states != np.vstack((self._last, states[:-1]))).any(axis=1)
-        described = getattr(self._stage, "described", dict)()
+        described: dict[str, str] = getattr(self._stage, "described", dict)()
         for i in np.flatnonzero(changed):
             data = state_report(int(stamps[i]), states[i], described)
             writer.write(self._topic, int(block["now_ns"][i]), data)

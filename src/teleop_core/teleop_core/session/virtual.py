@@ -1,4 +1,4 @@
-"""Virtual time: all stages of a graph in one process, tick by tick, as fast as the machine allows."""
+"""Virtual time: a graph in one process, tick by tick, as fast as the machine allows."""
 
 from typing import Any
 

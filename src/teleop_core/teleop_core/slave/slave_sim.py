@@ -249,12 +249,18 @@ class SlaveSim(RunningStage):
         self.parameters, self.state = _records(n)
         self._law = CONTROLLERS.find(parameters.controller.kind.kind)
         gains = self._gains(parameters, self.robot.drives.viscous)
-        joints = [np.zeros(n) for _ in range(7)]
         self.arm = Arm(
-            self.robot.fk_pointer, pointer(model.acceleration, ACCELERATION),
-            pointer(model.gravity, GRAVITY), self._law.control_pointer,
-            self.robot.geometry_row.copy(), model.parameters.copy(), gains,
-            np.zeros((n, max(self._law.memory, 1))), *joints, np.zeros(n), np.zeros((4, 4)),
+            fk=self.robot.fk_pointer,
+            acceleration=pointer(model.acceleration, ACCELERATION),
+            gravity=pointer(model.gravity, GRAVITY),
+            control=self._law.control_pointer,
+            geometry=self.robot.geometry_row.copy(),
+            dynamics=model.parameters.copy(),
+            gains=gains,
+            memory=np.zeros((n, max(self._law.memory, 1))),
+            q=np.zeros(n), dq=np.zeros(n), effort=np.zeros(n), setpoint=np.zeros(n),
+            measured=np.zeros(n), feedforward=np.zeros(n), limit=np.zeros(n),
+            joints=np.zeros(n), T=np.zeros((4, 4)),
         )  # fmt: skip
         self.kernel, self.arguments = slave_step, (self.parameters, self.state, self.arm)
         self.retune(parameters)
