@@ -10,6 +10,7 @@ import yaml
 from teleop_core.errors import ParameterError, PartError, ShapeError, UnknownNameError
 from teleop_core.robots import (
     ROBOTS,
+    IkStatus,
     Kernels,
     Robot,
     list_robots,
@@ -19,7 +20,7 @@ from teleop_core.robots import (
     register_robot,
     robot_from_table,
 )
-from teleop_core.robots.drives import ENTRIES, Drives, electric_cylinders
+from teleop_core.robots.drives import ENTRIES, Drives, electric_cylinders, geared_motors
 
 robots = pytest.mark.parametrize("name", list_robots())
 
@@ -163,25 +164,60 @@ def test_what_is_no_robot_is_refused_by_name(registered, part):
     assert (caught.value.kind, "mine" not in list_robots()) == ("robot", True)
 
 
-def turned_by(q, geometry, T):
+def crank_fk(q, geometry, T):
+    c, s = np.cos(q[0]), np.sin(q[0])
     T[:] = np.eye(4)
-    T[0, 0] = T[1, 1] = np.cos(q[0])
-    T[1, 0] = np.sin(q[0])
-    T[0, 1] = -T[1, 0]
+    T[:2, :2], T[:2, 3] = [[c, -s], [s, c]], (geometry[0] * c, geometry[0] * s)
 
 
-def crooked(kernels):
-    values = {"lower": [-1.0], "upper": [1.0], "home": [0.0], "joint_names": ("q",)}
-    return Robot(name="crooked", geometry={"a": 1.0}, kernels=kernels, **values)
+def crank_jacobian(q, geometry, J):
+    J[:] = 0.0
+    J[:2, 0], J[5, 0] = (-geometry[0] * np.sin(q[0]), geometry[0] * np.cos(q[0])), 1.0
+
+
+def crank_ik(T, seed, limits, geometry, q, residual):
+    wanted = np.arctan2(T[1, 3], T[0, 3])
+    q[0] = np.clip(wanted, limits[0, 0], limits[1, 0])
+    residual[:] = 0.0
+    return IkStatus.FOLLOWED
+
+
+def crank_ik_all(T, geometry, solutions):
+    solutions[0, 0] = np.arctan2(T[1, 3], T[0, 3])
+    return 1
+
+
+def crank(reach=0.3, **kernels):
+    plain = {"fk": crank_fk, "jacobian": crank_jacobian, "ik": crank_ik, "ik_all": crank_ik_all}
+    return Robot(
+        name="crank", joint_names=("q",), lower=[-1.0], upper=[1.0], home=[0.0],
+        geometry={"reach": reach}, kernels=Kernels(**(plain | kernels)), drives=geared_motors(1),
+    )  # fmt: skip
+
+
+def test_a_robot_of_plain_python_functions_answers_like_any_other(registered):
+    registered(crank)
+    robot = load_robot("crank", reach=0.5)
+    angles = np.linspace(-0.5, 0.5, 9)[:, None]
+    assert np.allclose(robot.ik_batch(robot.fk(angles)).q, angles)
+    assert robot.ik(robot.fk([0.3])).status is IkStatus.FOLLOWED
+    assert robot.dynamics.parameters == robot.drives.inertia
+
+
+def test_an_error_in_a_plain_function_reaches_the_caller_of_a_batch():
+    def fk(q, geometry, T):
+        raise ZeroDivisionError(q[0])
+
+    with pytest.raises(ZeroDivisionError):
+        crank(fk=fk).fk(np.zeros((3, 1)))
 
 
 def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(registered):
     def ik(T, seed, q):
         return 0
 
-    kernels = Kernels(fk=turned_by, jacobian=turned_by, ik=ik, ik_all=turned_by)
-    with pytest.raises(PartError, match="crooked"):
-        registered(crooked(kernels))
+    with pytest.raises(PartError, match="crank"):
+        registered(crank(ik=ik))
 
 
 def test_ready_robots_take_no_geometry(registered):

@@ -94,8 +94,8 @@ class Dynamics:
     """Rigid-body model of a slave over its ``parameters`` row; arrays are read-only copies.
 
     ``acceleration(q, dq, effort, parameters, ddq)`` and ``gravity(q, parameters, effort)`` write
-    their last argument (n,); both are compiled. They take writable arrays: hand them a copy of
-    ``parameters``.
+    their last argument (n,); both are kernels or plain Python. They take writable arrays: hand
+    them a copy of ``parameters``.
 
     Args:
         acceleration: Joint accelerations under the net effort.

@@ -58,7 +58,7 @@ IkBatch: TypeAlias = IkResult[NDArray[np.int64]]
 
 @dataclass(frozen=True, kw_only=True)
 class Kernels:
-    """Compiled functions of one robot over its ``geometry`` row, made by ``kernel``.
+    """Functions of one robot over its ``geometry`` row: kernels, or plain Python, which is slower.
 
     ``fk(q, geometry, T)`` and ``jacobian(q, geometry, J)`` write their last argument.
     ``ik(T, seed, limits, geometry, q, residual)`` writes ``q`` and ``residual`` and returns an

@@ -11,7 +11,7 @@ import numpy as np
 
 from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import Array, checked_array, is_rigid
-from teleop_core.kernels import pointer
+from teleop_core.kernels import pointer, raise_pending
 from teleop_core.robots import kinematics
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.kinematics import (
@@ -151,6 +151,7 @@ class Robot:
             return transform
         transforms = np.empty((len(joints), 4, 4))
         kinematics.fk_batch(self.fk_pointer, joints, self._row, transforms)
+        raise_pending()
         return transforms
 
     def jacobian(self, q: object) -> Array:
@@ -250,6 +251,7 @@ class Robot:
         kinematics.ik_batch(
             self.ik_pointer, poses, seeds, is_path, limits, self._row, q, residual, status
         )
+        raise_pending()
         if count and status.min() < 0:
             bad = int(status.argmin())
             raise ParameterError(f"T[{bad}]", poses[bad].tolist(), _ASKABLE)
