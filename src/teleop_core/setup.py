@@ -22,7 +22,7 @@ def files(folder: str, pattern: str) -> tuple[str, list[str]]:
 
 setup(
     name="teleop_core",
-    version="0.1.0",
+    version="0.2.0",
     description="Master-slave teleoperation stack for ROS 2 Jazzy",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_core", "teleop_core.*"]),
@@ -42,6 +42,7 @@ setup(
     extras_require={
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "test": [
+            "coverage",
             "pytest",
             "pytest-rerunfailures",
             "pytest-xdist",
@@ -54,10 +55,12 @@ setup(
             "mypy",
             "types-PyYAML",
             "psutil",
+            "pandas",
             "sympy",
             "colcon-common-extensions",
             "colcon-ros",
         ],
+        "notebook": ["pandas"],
         "bench": ["EAIK", "ikpy"],
     },
     data_files=[

@@ -1,19 +1,114 @@
 """Master-slave teleoperation: haptic master, motion scaling, inverse kinematics, 1 kHz slave.
 
-Folders follow the data: ``master`` -> ``mapping`` -> ``robots`` -> ``slave`` -> ``bags`` ->
-``evaluation``; ``session`` wires them, ``nodes`` puts them on ROS 2 topics.
+Folders follow the data: ``operators`` -> ``master`` -> ``mapping`` and ``fixtures`` -> ``robots``
+-> ``slave`` and ``controllers`` -> ``bags`` -> ``evaluation``. ``graph`` says which stages there
+are and how they are linked, ``session`` runs them in virtual time, ``nodes`` puts them on ROS 2
+topics.
+
+Everything a user needs is here:
+
+- :func:`run`, :func:`replay`, :func:`open_recording`: sessions and what was recorded of them;
+- :func:`configuration`: what a session runs, checked;
+- :func:`load_robot`, :func:`list_robots`, :func:`robot_from_table`: arms;
+- :class:`Stage`, :class:`Fixture`, :class:`Controller`, :class:`Operator`, :class:`Metric` and the
+  ``register_...`` functions: parts of your own;
+- :func:`kernel`, :func:`parameter`, ``topics``: what parts are made of.
 """
 
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-__version__ = "0.1.0"
-__all__ = ["__version__", "list_robots", "load_robot"]
+__version__ = "0.2.0"
+
+if TYPE_CHECKING:
+    from teleop_core import topics
+    from teleop_core.api import configuration, replay, run
+    from teleop_core.controllers import Controller, register_controller
+    from teleop_core.errors import PartError, TeleopError
+    from teleop_core.evaluation import Key, Metric, Score, register_metric
+    from teleop_core.fixtures import Fixture, register_fixture
+    from teleop_core.graph import Graph, build_graph
+    from teleop_core.kernels import kernel
+    from teleop_core.operators import Operator, following, register_operator
+    from teleop_core.parameters import NoParameters, parameter
+    from teleop_core.recording import Recording, Stream, open_recording
+    from teleop_core.robots import (
+        Robot,
+        list_robots,
+        load_robot,
+        register_robot,
+        robot_from_table,
+    )
+    from teleop_core.robots.parameters import RobotParameters
+    from teleop_core.stage import Stage, register_stage
+    from teleop_core.topics import Kind, Topic
+
+_PLACES = {
+    "api": ("configuration", "replay", "run"),
+    "controllers": ("Controller", "register_controller"),
+    "errors": ("PartError", "TeleopError"),
+    "evaluation": ("Key", "Metric", "Score", "register_metric"),
+    "fixtures": ("Fixture", "register_fixture"),
+    "graph": ("Graph", "build_graph"),
+    "kernels": ("kernel",),
+    "operators": ("Operator", "following", "register_operator"),
+    "parameters": ("NoParameters", "parameter"),
+    "recording": ("Recording", "Stream", "open_recording"),
+    "robots": ("Robot", "list_robots", "load_robot", "register_robot", "robot_from_table"),
+    "robots.parameters": ("RobotParameters",),
+    "stage": ("Stage", "register_stage"),
+    "topics": ("Kind", "Topic"),
+}
+_HOME = {name: module for module, names in _PLACES.items() for name in names}
+
+__all__ = [
+    "Controller",
+    "Fixture",
+    "Graph",
+    "Key",
+    "Kind",
+    "Metric",
+    "NoParameters",
+    "Operator",
+    "PartError",
+    "Recording",
+    "Robot",
+    "RobotParameters",
+    "Score",
+    "Stage",
+    "Stream",
+    "TeleopError",
+    "Topic",
+    "__version__",
+    "build_graph",
+    "configuration",
+    "following",
+    "kernel",
+    "list_robots",
+    "load_robot",
+    "open_recording",
+    "parameter",
+    "register_controller",
+    "register_fixture",
+    "register_metric",
+    "register_operator",
+    "register_robot",
+    "register_stage",
+    "replay",
+    "robot_from_table",
+    "run",
+    "topics",
+]
 
 
-def __getattr__(name: str) -> Any:
-    """Load the robots on first use, so that importing the package stays cheap."""
-    if name in {"load_robot", "list_robots"}:
-        from teleop_core import robots
-
-        return getattr(robots, name)
+def __getattr__(name: str) -> object:
+    """Load a name on first use, so that importing the package stays cheap."""
+    if name == "topics":
+        return import_module("teleop_core.topics")
+    if name in _HOME:
+        return getattr(import_module(f"teleop_core.{_HOME[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

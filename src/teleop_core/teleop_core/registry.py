@@ -90,6 +90,10 @@ class Registry(Generic[Part]):
         self._parts[name] = checked
         return checked
 
+    def is_added(self, name: str) -> bool:
+        """Whether a part was added by this program."""
+        return name in self._own
+
     def _entries(self) -> dict[str, EntryPoint]:
         if self._installed is None:
             found: dict[str, EntryPoint] = {}

@@ -45,10 +45,28 @@ class Kind(Enum):
         """Name of the ROS message type."""
         return self.value.strip()
 
+    def columns(self, joint_names: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of the columns, for a robot with these joints; none for reports."""
+        if self is Kind.JOINTS:
+            return joint_names
+        if self is Kind.STATE:
+            parts = ("position", "velocity", "effort")
+            return tuple(f"{joint}.{part}" for part in parts for joint in joint_names)
+        return _COLUMNS[self]
+
     def width(self, joints: int) -> int:
         """Number of columns for a robot with this many joints."""
         fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0}
         return {Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed}[self]
+
+
+_COLUMNS = {
+    Kind.POSE: ("x", "y", "z", "qw", "qx", "qy", "qz"),
+    Kind.TWIST: ("vx", "vy", "vz", "wx", "wy", "wz"),
+    Kind.WRENCH: ("fx", "fy", "fz", "tx", "ty", "tz"),
+    Kind.BUTTONS: ("clutch", "fixture", "mode"),
+    Kind.REPORT: (),
+}
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,15 @@ __all__ = [
     "key_table",
     "keys",
     "line",
+    "register_metric",
     "row",
     "scores",
     "spread_rows",
     "time_axis",
     "tracked",
 ]
+
+
+def register_metric(metric: type[Metric], *, replace: bool = False) -> type[Metric]:
+    """Add a metric under its own name for the rest of the program; see :meth:`Registry.add`."""
+    return METRICS.add(metric.name, metric, replace=replace)

@@ -160,16 +160,29 @@ def parse_setting(text: str) -> Layer:
         TeleopError: No "=", or a value that is not YAML.
         UnknownNameError: No stage has the key; the nearest keys are listed.
     """
-    given, equals, value_text = text.partition("=")
+    key, equals, value_text = text.partition("=")
     if not equals:
         raise TeleopError(f"--set {text!r} must be key=value")
-    arm, slash, key = given.strip().rpartition("/")
     try:
         value = yaml.safe_load(value_text)
     except yaml.YAMLError as error:
         raise TeleopError(f"--set {text!r}: the value is not YAML") from error
+    return setting(key, value)
+
+
+def setting(key: str, value: object) -> Layer:
+    """Values of one key as :func:`parse_setting` describes it.
+
+    Args:
+        key: ``stage.name``, a bare name, or the name of a group with a kind.
+        value: Number, text, truth value, or a sequence of them.
+
+    Raises:
+        UnknownNameError: No stage has the key; the nearest keys are listed.
+    """
+    arm, slash, name = key.strip().rpartition("/")
     layer: Layer = {}
-    for stage, spec in _hits(key):
+    for stage, spec in _hits(name):
         layer.setdefault(arm + slash + stage, {})[spec.name] = _as_declared(spec, value)
     return layer
 

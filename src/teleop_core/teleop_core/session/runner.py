@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import yaml
@@ -42,7 +42,7 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = _sile
     """
     ticks = session_ticks(configuration)
     session = VirtualTime(configuration)
-    return _record(session, configuration, out, run_blocks(session, ticks), ticks, progress)
+    return record_blocks(session, configuration, out, run_blocks(session, ticks), ticks, progress)
 
 
 def session_ticks(configuration: Configuration) -> int:
@@ -77,7 +77,7 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
     """
     session = VirtualTime(configuration, is_replay=True)
     samples, ticks = replayed_blocks(session, bag)
-    return _record(session, configuration, out, samples, ticks, progress)
+    return record_blocks(session, configuration, out, samples, ticks, progress)
 
 
 def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]:
@@ -119,14 +119,30 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     return layer, bag.metadata.get("scenario", "")
 
 
-def _record(
+def record_blocks(
     session: VirtualTime,
     configuration: Configuration,
     out: Path,
     blocks: Iterable[Any],
     ticks: int,
-    progress: Progress,
+    progress: Progress = _silent,
 ) -> int:
+    """Record blocks of rows as they come.
+
+    Args:
+        session: Where they come from.
+        configuration: What is stored with them.
+        out: Directory of the recording, made here.
+        blocks: Rows of the session.
+        ticks: How many there will be, for the progress.
+        progress: Called with ticks done and ticks in all.
+
+    Returns:
+        Number of ticks.
+
+    Raises:
+        RecordingError: The directory exists, cannot be written, or there are no ticks.
+    """
     done = 0
     with open_writer(session, configuration, out) as writer:
         reports = StateReports(session)
@@ -198,6 +214,13 @@ def state_text(state: Array, fixture: str = "box") -> str:
     return f"{doing} {mode}{f', {fixture} on' if named['is_fixture_on'] else ''}"
 
 
+class ReportWriter(Protocol):
+    """What takes single messages."""
+
+    def write(self, topic: Topic, log_ns: int, data: bytes) -> None:
+        """Take one message."""
+
+
 class StateReports:
     """Recorder of the reports of a session's stages, where they change."""
 
@@ -209,7 +232,7 @@ class StateReports:
             if topic.kind is Kind.REPORT
         ]
 
-    def write(self, writer: BagWriter, block: Any) -> None:
+    def write(self, writer: ReportWriter, block: Any) -> None:
         """Record the changes of a block."""
         for one in self._reports:
             one.write(writer, block)
@@ -220,7 +243,7 @@ class _Report:
         self._topic, self._stage = topic, session.stages.get(member.name)
         self._last = np.full(len(topic.columns), np.nan)
 
-    def write(self, writer: BagWriter, block: Any) -> None:
+    def write(self, writer: ReportWriter, block: Any) -> None:
         states, stamps = block[self._topic.field], block[f"{self._topic.field}_ns"]
         changed = (states != np.vstack((self._last, states[:-1]))).any(axis=1)
         described: dict[str, str] = getattr(self._stage, "described", dict)()

@@ -1,0 +1,106 @@
+"""Memory bag: a recording that was never written, to be read and scored like any other."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from teleop_core.bags.layouts import layout
+from teleop_core.bags.messages import read_reports
+from teleop_core.bags.reader import Bag, TopicInfo
+from teleop_core.bags.reports import Report
+from teleop_core.bags.series import Series
+from teleop_core.errors import RecordingError
+from teleop_core.topics import Kind, Topic
+
+Message = tuple[int, bytes]
+"""Log time [ns] and CDR bytes."""
+
+
+class MemoryBag(Bag):
+    """Recording held in arrays.
+
+    Args:
+        name: What it is called in scores.
+        series: Streams with their samples, by topic.
+        reports: Messages of reports in the order of their log times, by topic.
+        metadata: Names and texts, as a writer would store them.
+
+    Raises:
+        RecordingError: There is no sample at all.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        series: Mapping[Topic, Series],
+        reports: Mapping[Topic, list[Message]],
+        metadata: Mapping[str, str],
+    ) -> None:
+        self.path, self.metadata = Path(name), dict(metadata)
+        self.streams = dict(series)
+        self._series = {topic.name: found for topic, found in series.items()}
+        self._reports = {topic.name: found for topic, found in reports.items()}
+        counts = {topic: len(found) for topic, found in series.items()}
+        counts |= {topic: len(found) for topic, found in reports.items()}
+        self.topics = {t.name: TopicInfo(t.kind.ros_type, n) for t, n in counts.items()}
+        logs = [found.log_ns for found in series.values() if len(found)]
+        if not logs:
+            raise RecordingError(self.path, "holds no messages; record it again")
+        self.start_ns = min(int(log[0]) for log in logs)
+        self.end_ns = max(int(log[-1]) for log in logs)
+
+    def read_many(
+        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
+    ) -> dict[str, Series]:
+        """As of any recording."""
+        wanted = [topic.name if isinstance(topic, Topic) else topic.strip("/") for topic in topics]
+        self.require(wanted)
+        for name in wanted:
+            if name not in self._series:
+                raise RecordingError(self.path, f"{name} is a report, which is not read as numbers")
+        return {name: _ordered(self._series[name], joint_names) for name in wanted}
+
+    def blocks(
+        self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
+    ) -> Iterator[dict[str, Series]]:
+        """As of any recording, in one piece."""
+        yield self.read_many(topics, joint_names)
+
+    def reports(self, topic: Topic | str) -> list[Report]:
+        """As of any recording."""
+        self.require([topic])
+        name = topic.name if isinstance(topic, Topic) else topic.strip("/")
+        return [one for _, data in self._reports.get(name, ()) for one in read_reports(data)]
+
+    def raw(
+        self, topics: Iterable[Topic | str] | None = None
+    ) -> Iterator[tuple[str, str, int, bytes]]:
+        """As of any recording; the bytes are made as they are asked for."""
+        given = self.topics if topics is None else topics
+        names = [topic.name if isinstance(topic, Topic) else topic.strip("/") for topic in given]
+        self.require(names if topics is not None else ())
+        yield from sorted(self._messages(names), key=lambda message: message[2])
+
+    def _messages(self, names: Iterable[str]) -> Iterator[tuple[str, str, int, bytes]]:
+        by_name = {topic.name: topic for topic in self.streams}
+        for name in names:
+            for log_ns, data in self._reports.get(name, ()):
+                yield name, Kind.REPORT.ros_type, log_ns, data
+            if (topic := by_name.get(name)) is not None:
+                series = self._series[name]
+                form = layout(topic, series.names)
+                for i in range(len(series)):
+                    data = form.encode_one(int(series.stamp_ns[i]), series.values[i])
+                    yield name, topic.kind.ros_type, int(series.log_ns[i]), data
+
+
+def _ordered(series: Series, joint_names: tuple[str, ...] | None) -> Series:
+    """The series with its joints in a wanted order."""
+    if not joint_names or joint_names == series.names or not series.names:
+        return series
+    parts = series.values.shape[1] // len(series.names)
+    at = [series.names.index(name) for name in joint_names]
+    columns = [part * len(series.names) + joint for part in range(parts) for joint in at]
+    values = np.ascontiguousarray(series.values[:, columns])
+    return Series(series.stamp_ns, series.log_ns, values, joint_names, series.frame_id)
