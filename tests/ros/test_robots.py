@@ -16,10 +16,10 @@ from teleop_core.nodes.children import environment
 from teleop_core.nodes.live import live
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.session.configuration import configure
-from teleop_core.session.graph import Graph
+from teleop_core.session.virtual import VirtualTime
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
-SHORT = ("teleop.duration=2.0", "path.approach_time=0.5", "path.size=[0.02, 0.02, 0.02]")
+SHORT = ("teleop.duration=2.0", "operator.approach_time=0.5", "operator.size=[0.02, 0.02, 0.02]")
 SLAVES = [name for name in list_robots() if load_robot(name).drives is not None]
 GRID = 55e-6  # m, reading step of the Phantom Omni
 MS = 1_000_000
@@ -32,11 +32,11 @@ def short_session(setting, folder):
     """
     configuration = configure("free_motion", settings=[*SHORT, setting])
     live(configuration, folder / "bag", Console(file=io.StringIO()), is_composed=True)
-    bag, graph = Bag(folder / "bag"), Graph(configuration.groups)
-    measured, wanted = bag.read(topics.SLAVE_MEASURED_JS), graph.run(2000)["slave_measured_js"]
-    assert measured.names == graph.robot.joint_names
+    bag, session = Bag(folder / "bag"), VirtualTime(configuration)
+    measured, wanted = bag.read(topics.SLAVE_MEASURED_JS), session.run(2000)["slave_measured_js"]
+    assert measured.names == session.joint_names[""]
     travel, wanted_travel = (
-        np.ptp(rows[:, : graph.robot.n], axis=0) for rows in (measured.values, wanted)
+        np.ptp(rows[:, : len(measured.names)], axis=0) for rows in (measured.values, wanted)
     )
     assert wanted_travel.max() > 1e-3
     return bag, travel < 0.5 * wanted_travel
@@ -78,9 +78,9 @@ def beside_home(robot):
 @pytest.fixture
 def hybrid_node(peer):
     """Inverse kinematics of the hybrid as ``ros2 run ... -p robot:=scara_stewart`` starts it."""
-    command = [sys.executable, "-m", "teleop_core.nodes.inverse_kinematics", "--ros-args"]
+    command = [sys.executable, "-m", "teleop_core.nodes", "inverse_kinematics"]
     process = subprocess.Popen(
-        [*command, "-p", "robot:=scara_stewart"],
+        [*command, "--ros-args", "-p", "robot:=scara_stewart"],
         env=environment() | {"ROS_DOMAIN_ID": peer.domain},
     )
     try:

@@ -12,7 +12,7 @@ from teleop_core.bags.messages import write_values
 from teleop_core.robots import load_robot
 from teleop_core.robots.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.session.configuration import configure
-from teleop_core.session.graph import Graph
+from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 
 pytestmark = pytest.mark.ros
@@ -23,8 +23,8 @@ MS = 1_000_000
 STILL = 3e-4  # [rad or m], a few encoder steps: what counts as not moving
 # A hand without tremor and noise that goes 20 mm away and stays there.
 STEADY = {
-    "path__kind": "hold", "path__center": [0.0, 0.0, 0.02], "path__approach_time": 2.0,
-    "path__rotation": 0.0,
+    "operator__kind": "hold", "operator__center": [0.0, 0.0, 0.02], "operator__approach_time": 2.0,
+    "operator__rotation": 0.0,
     "hand__tremor_amplitude": 0.0, "device__gimbal_noise": 0.0,
 }  # fmt: skip
 
@@ -233,7 +233,7 @@ def test_restarting_a_node_does_not_move_the_slave(peer, name):
 
     peer.wait(holds, "slave holds")
     # A new master starts in the inkwell, 20 mm away, and leaves it very slowly.
-    slow = STEADY | {"path__approach_time": 60.0}
+    slow = STEADY | {"operator__approach_time": 60.0}
     peer.start(name, **(slow if name == "haptic_master" else {}))
     follows(peer, setpoints)
     assert measured.take() > 1000
@@ -246,7 +246,7 @@ def test_restarting_a_node_does_not_move_the_slave(peer, name):
 @pytest.mark.slow
 def test_slave_holds_when_the_master_dies(peer):
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
-    circle = {"path__kind": "circle", "path__approach_time": 0.5, "path__period": 4.0}
+    circle = {"operator__kind": "circle", "operator__approach_time": 0.5, "operator__period": 4.0}
     chain(peer, circle)
     peer.wait(
         lambda: measured.take() and np.abs(measured.values[-1][:6] - HOME).max() > 5e-3, "motion"
@@ -269,8 +269,8 @@ def test_a_second_publisher_of_commands_is_reported(peer):
 
 @pytest.mark.slow
 def test_nodes_give_bit_equal_motion_to_the_core_for_the_same_commands(peer):
-    graph = Graph(configure("free_motion").groups)
-    poses = graph.run(2500)["slave_servo_cp"]
+    session = VirtualTime(configure("free_motion"))
+    poses = session.run(2500)["slave_servo_cp"]
     listeners = [
         peer.listen(topic)
         for topic in (topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS, topics.SLAVE_MEASURED_JS)
@@ -308,14 +308,13 @@ def test_nodes_give_bit_equal_motion_to_the_core_for_the_same_commands(peer):
 def _slave_ticks(peer, measured, setpoints):
     """Ticks that the slave took before the first one that was seen; ends the slave."""
     (slave,) = [node for node in peer.nodes if node.name == "slave_sim"]
-    slave.process.send_signal(signal.SIGINT)
-    assert slave.process.wait(60) == 0
+    assert slave.end(signal.SIGINT) == 0
     peer.wait(lambda: peer.status("slave_sim").values["state"] == "finalized", "last report")
     total = int(peer.status("slave_sim").number("ticks"))
     assert peer.status("slave_sim").number("dropped_time_ms") == 0
-    measured.take()
-    setpoints.take()
-    assert (np.diff(measured.stamps) == MS).all(), "the middleware lost samples"
+    measured.insist_on_all()
+    setpoints.insist_on_all()
+    assert (np.diff(measured.stamps) == MS).all()
     return total - len(measured.stamps)
 
 
@@ -323,7 +322,7 @@ def _core_answers(poses, stamps):
     stage = InverseKinematics(InverseKinematicsParameters(feedback_timeout=5.0))
     answers = []
     for stamp in stamps:
-        stage.signals["stamp_ns"] = stamp
+        stage.signals["slave_servo_cp_ns"] = stamp
         stage.signals["slave_servo_cp"] = poses[stamp // MS - 1]
         stage.step()
         answers.append(stage.signals["slave_servo_jp"].copy())
@@ -334,13 +333,15 @@ def _assert_core_slave_moves_alike(unseen, commands, setpoints, measured):
     stage = SlaveSim(SlaveSimParameters())
     row = stage.signals
     for tick in range(unseen):
-        stage.step(measured.stamps[0] - (unseen - tick) * MS)
-    assert len(setpoints.stamps) == len(measured.stamps), "the middleware lost samples"
+        row["now_ns"] = measured.stamps[0] - (unseen - tick) * MS
+        stage.step()
+    assert len(setpoints.stamps) == len(measured.stamps)
     for i, now_ns in enumerate(measured.stamps):
         in_force = setpoints.stamps[i]
-        if in_force != row["servo_stamp_ns"]:
-            row["servo_stamp_ns"], row["slave_servo_jp"] = in_force, commands[in_force]
-        stage.step(now_ns)
-        assert row["setpoint_stamp_ns"] == in_force
+        if in_force != row["slave_servo_jp_ns"]:
+            row["slave_servo_jp_ns"], row["slave_servo_jp"] = in_force, commands[in_force]
+        row["now_ns"] = now_ns
+        stage.step()
+        assert row["slave_setpoint_js_ns"] == in_force
         assert (row["slave_setpoint_js"] == setpoints.values[i]).all(), i
         assert (row["slave_measured_js"] == measured.values[i]).all(), i

@@ -19,11 +19,12 @@ from teleop_core.nodes.children import environment
 from teleop_core.nodes.live import live
 from teleop_core.nodes.real_time import apply_options
 from teleop_core.session.configuration import RealTimeParameters, configure
-from teleop_core.session.graph import STAGES, Graph
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.stage import STAGES
 from teleop_core.topics import STREAMS
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
-NODES = [stage.name for stage in STAGES]
+NODES = list(STAGES)
 MS = 1_000_000
 
 
@@ -32,11 +33,11 @@ def session(peer, tmp_path):
     """Process of the composed session, all its nodes active."""
     parameters = {
         "recorder": {"out": str(tmp_path / "bag")},
-        "haptic_master": {"path": {"approach_time": 1.0}, "patience": 0.0},
+        "haptic_master": {"operator": {"approach_time": 1.0}, "patience": 0.0},
     }
     file = tmp_path / "session.yaml"
     file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))
-    command = [sys.executable, "-m", "teleop_core.nodes.teleop_session", "--ros-args"]
+    command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session", "--ros-args"]
     process = subprocess.Popen(
         [*command, "--params-file", str(file)], env=environment() | {"ROS_DOMAIN_ID": peer.domain}
     )
@@ -84,8 +85,8 @@ def test_a_composed_session_computes_what_virtual_time_computes(peer, session, t
     assert session.wait(30) == 0
     bag = Bag(tmp_path / "bag")
     live_poses = bag.read(topics.MASTER_MEASURED_CP).values
-    settings = ["path.approach_time=1.0"]
-    virtual = Graph(configure(settings=settings).groups).run(len(live_poses))
+    settings = ["operator.approach_time=1.0"]
+    virtual = VirtualTime(configure(settings=settings)).run(len(live_poses))
     # No force acts without a box, so the hand moves alike; its sample is the same, bit for bit.
     assert np.array_equal(live_poses, virtual["master_measured_cp"])
 
