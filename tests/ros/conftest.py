@@ -21,6 +21,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
+from middleware_faults import MiddlewareLossError, check_end
 from teleop_core.bags.messages import discover, layout
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.observer import Observer
@@ -34,23 +35,6 @@ with warnings.catch_warnings():
 
 TIMEOUT = 90.0
 JOINTS = load_robot("rcrt1").joint_names
-_CRASHES = (-signal.SIGSEGV, -signal.SIGABRT, -signal.SIGBUS)
-
-
-class MiddlewareLossError(Exception):
-    """Samples did not arrive: the numbers that the middleware itself gives them have a gap."""
-
-
-class MiddlewareCrashError(Exception):
-    """A process crashed in a thread of the middleware, in which no Python ever ran."""
-
-
-def is_of_middleware(exit_code: int, log: str) -> bool:
-    """Whether a process with this exit code and output of ``faulthandler`` crashed there.
-
-    The handler marks the thread that crashed as the current one if it is one of Python's.
-    """
-    return exit_code in _CRASHES and "Fatal Python error" in log and "Current thread" not in log
 
 
 def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
@@ -134,8 +118,7 @@ class NodeProcess:
             MiddlewareCrashError: That is how it ended.
         """
         code = self.process.wait(timeout)
-        if is_of_middleware(code, self.stderr.read_text(errors="replace")):
-            raise MiddlewareCrashError(f"{self.name} at its end, with {code}")
+        check_end(self.name, code, self.stderr.read_text(errors="replace"))
         return code
 
 
@@ -288,14 +271,3 @@ def peer(tmp_path: Path) -> Iterator[Peer]:
             yield made
         finally:
             made.close()
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Rerun a test of live nodes after what the middleware is known to do, and after nothing else.
-
-    A race of ours fails at once. What was rerun is counted and named at the end of the run.
-    """
-    known = [MiddlewareLossError, MiddlewareCrashError]
-    for item in items:
-        if item.get_closest_marker("ros"):
-            item.add_marker(pytest.mark.flaky(reruns=2, only_rerun=known))
