@@ -31,6 +31,7 @@ from teleop_core.session.configuration import (
     Layer,
     config_folder,
     load_file,
+    parse_setting,
     scenario_file,
     setting,
 )
@@ -67,6 +68,7 @@ def configuration(
     *,
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
+    texts: Iterable[str] = (),
     operator: OperatorLike | None = None,
     fixture: str | Fixture | None = None,
     controller: str | Controller | None = None,
@@ -83,6 +85,7 @@ def configuration(
         files: ROS 2 parameter files over the scenario.
         settings: Parameters by name over all files: ``{"motion_scaling.fine_gain": 0.2}``; a bare
             name sets every stage that has it, ``left/...`` that arm alone.
+        texts: The same as ``key=value``, as the command line takes them, over the settings.
         operator: Who moves the hand; see :data:`OperatorLike`.
         fixture: Shape around the hand: a name, or a part of your own.
         controller: Control law of the slave's joints: a name, or a part of your own.
@@ -121,6 +124,7 @@ def configuration(
         layers.append(load_file(scenario_file(scenario)))
     layers += [load_file(Path(file)) for file in files]
     layers += [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
+    layers += [parse_setting(text) for text in texts]
     return Configuration.from_layers(layers, scenario or "")
 
 
@@ -171,14 +175,14 @@ def run(
     if duration is not None:
         given[f"{SESSION}.duration"] = float(duration)
     if seed is not None:
-        given["haptic_master.seed"] = seed
+        given["seed"] = seed
     if isinstance(scenario, Configuration):
         made = scenario
         if given:
             raise ParameterError("settings", sorted(given), "part of the configuration given")
     else:
         made = configuration(
-            scenario, files=files, settings=given, operator=operator, fixture=fixture,
+            scenario, files=files, settings=given, texts=(), operator=operator, fixture=fixture,
             controller=controller, robot=robot, stages=stages, arms=arms, delays=delays,
             **parameters,
         )  # fmt: skip
@@ -194,6 +198,7 @@ def replay(
     progress: Progress = _silent,
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
+    texts: Iterable[str] = (),
     **parameters: Setting,
 ) -> Recording:
     """Run the recorded masters of a session through the graph again, in virtual time.
@@ -206,6 +211,7 @@ def replay(
         progress: As in :func:`run`.
         files: Parameter files over its configuration.
         settings: Parameters over the files, as in :func:`configuration`.
+        texts: As there.
         **parameters: As in :func:`configuration`.
 
     Raises:
@@ -216,6 +222,7 @@ def replay(
     named = {name.replace("__", "."): value for name, value in parameters.items()}
     changes = [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
     layers = [layer, *(load_file(Path(file)) for file in files), *changes]
+    layers += [parse_setting(text) for text in texts]
     made = Configuration.from_layers(layers, scenario)
     session = VirtualTime(made, is_replay=True)
     blocks, ticks = replayed_blocks(session, bag)

@@ -8,9 +8,13 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from teleop_core.errors import TeleopError
+
+if TYPE_CHECKING:
+    from teleop_core.recording import Recording
+    from teleop_core.session.configuration import Configuration
 
 FAILED = 2
 INTERRUPTED = 130
@@ -34,6 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Entry point of ``teleop``; returns the exit code: 0, 2 for wrong use, 130 for Ctrl-C."""
     parsed = _parser().parse_args(arguments)
     try:
+        _take_parts(parsed.parts)
         code: int = parsed.run(parsed)
     except TeleopError as error:
         print(f"teleop {parsed.command}: {error}", file=sys.stderr)
@@ -50,6 +55,13 @@ def main(arguments: list[str] | None = None) -> int:
     return code
 
 
+def _take_parts(files: list[Path]) -> None:
+    """Load files with own parts here, and in every process that is started from here."""
+    from teleop_core.own_parts import load_own_parts
+
+    load_own_parts(files)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="teleop",
@@ -59,6 +71,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     from teleop_core import __version__
 
+    parser.add_argument(
+        "--parts", type=Path, action="append", default=[], metavar="FILE.py",
+        help="Python file that registers parts of your own, which --set then takes by name",
+    )  # fmt: skip
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for add in (_add_sim, _add_live, _add_replay, _add_play, _add_evaluate, _add_lookups):
@@ -107,6 +123,8 @@ def _add_lookups(commands: Any) -> None:
     recover.add_argument("bag", type=Path, help="recording that was not closed")
     recover.add_argument("--out", type=Path, help="new recording (default: BAG_recovered)")
     _command(commands, "scenarios", _scenarios, "list the scenarios")
+    text = "list the parts that --set and teleop.stages take by name, also your own"
+    _command(commands, "parts", _parts, text)
     text = "list every parameter with unit, bounds and meaning"
     parameters = _command(commands, "parameters", _parameters, text)
     parameters.add_argument("stage", nargs="?", help="only this stage")
@@ -172,45 +190,56 @@ def _settings(arguments: argparse.Namespace) -> list[str]:
     if arguments.duration is not None:
         given.append(f"teleop.duration={arguments.duration!r}")
     if getattr(arguments, "seed", None) is not None:
-        given.append(f"haptic_master.seed={arguments.seed}")
+        given.append(f"seed={arguments.seed}")
     return given
 
 
 def _sim(arguments: argparse.Namespace) -> int:
-    from teleop_core.session.configuration import configure
-    from teleop_core.session.runner import simulate
+    from teleop_core import api
 
-    configuration = configure(arguments.scenario, arguments.config, _settings(arguments))
+    configuration = _configured(arguments)
     with _progress("simulating") as progress:
-        ticks = simulate(configuration, arguments.out, progress)
-    print(f"{arguments.out}: {ticks / 1e3:g} s recorded; next: teleop evaluate {arguments.out}")
+        recording = api.run(configuration, out=arguments.out, progress=progress)
+    print(_done(arguments.out, f"{_seconds(recording):g} s recorded"))
     return 0
 
 
 def _replay(arguments: argparse.Namespace) -> int:
-    from teleop_core.bags.reader import Bag
-    from teleop_core.session.configuration import Configuration, load_file, parse_setting
-    from teleop_core.session.runner import recorded_configuration, replay
+    from teleop_core import api
 
-    bag = Bag(arguments.bag)
-    layer, scenario = recorded_configuration(bag)
-    layers = [layer, *map(load_file, arguments.config), *map(parse_setting, arguments.settings)]
     with _progress("replaying") as progress:
-        configuration = Configuration.from_layers(layers, scenario)
-        ticks = replay(bag, configuration, arguments.out, progress)
-    print(f"{arguments.out}: {ticks / 1e3:g} s replayed; next: teleop evaluate {arguments.out}")
+        recording = api.replay(
+            arguments.bag, out=arguments.out, progress=progress,
+            files=arguments.config, texts=arguments.settings,
+        )  # fmt: skip
+    print(_done(arguments.out, f"{_seconds(recording):g} s replayed"))
     return 0
+
+
+def _configured(arguments: argparse.Namespace) -> "Configuration":
+    from teleop_core import api
+
+    return api.configuration(arguments.scenario, files=arguments.config, texts=_settings(arguments))
+
+
+def _seconds(recording: "Recording") -> float:
+    """Time of a session: its last tick takes as long as the others."""
+    from teleop_core.signals import DT
+
+    return round(recording.duration + DT, 9)
+
+
+def _done(out: Path, what: str) -> str:
+    return f"{out}: {what}; next: teleop evaluate {out}"
 
 
 def _live(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
-    from teleop_core.session.configuration import configure
-
-    configuration = configure(arguments.scenario, arguments.config, _settings(arguments))
+    configuration = _configured(arguments)
     composed = arguments.composed
     _ros("live").live(configuration, arguments.out, Console(), is_composed=composed)
-    print(f"{arguments.out}: recorded; next: teleop evaluate {arguments.out}")
+    print(_done(arguments.out, "recorded"))
     return 0
 
 
@@ -259,6 +288,19 @@ def _scenarios(_: argparse.Namespace) -> int:
 
     for name, description in list_scenarios().items():
         print(f"{name:16} {description}")
+    return 0
+
+
+def _parts(_: argparse.Namespace) -> int:
+    from teleop_core.controllers import CONTROLLERS
+    from teleop_core.evaluation import METRICS
+    from teleop_core.fixtures import FIXTURES
+    from teleop_core.operators import OPERATORS
+    from teleop_core.robots import ROBOTS
+    from teleop_core.stage import STAGES
+
+    for registry in (OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, STAGES, METRICS):
+        print(f"{registry.kinds:12} {', '.join(registry)}")
     return 0
 
 

@@ -237,6 +237,11 @@ class Graph:
             ordered.append(ready)
         return tuple(ordered)
 
+    @property
+    def masters(self) -> tuple[Member, ...]:
+        """The stage of each arm at which a sample begins its way; replay plays it."""
+        return tuple(m for m in self.members if m.stage.name == BUILT_IN[0])
+
     def links_of(self, member: Member) -> tuple[Link, ...]:
         """Links that end at a stage."""
         return tuple(link for link in self.links if link.reader == member)
@@ -247,7 +252,7 @@ class Graph:
         It begins at the first stage of the order and follows the stamps: each next stage answers
         the topic before it under its stamp.
         """
-        first = next(m for m in self.members if m.arm == arm)
+        first = next(member for member in self.masters if member.arm == arm)
         found = [(first.stage.name, first.writes[0])]
         while (nxt := self._answer(found[-1][1], {name for name, _ in found})) is not None:
             found.append(nxt)

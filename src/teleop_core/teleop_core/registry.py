@@ -39,7 +39,7 @@ class Registry(Generic[Part]):
         check: Callable[[str, object], Part],
         trial: Callable[[Part], None] | None = None,
     ) -> None:
-        self.kind, self.group = kind, f"teleop_core.{kinds}"
+        self.kind, self.kinds, self.group = kind, kinds, f"teleop_core.{kinds}"
         self._builtin, self._check, self._trial = dict(builtin), check, trial
         self._parts: dict[str, Part] = {}
         self._own: set[str] = set()

@@ -1,10 +1,11 @@
 """Context: what a metric knows of the recording when it is made, and what metrics share."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Protocol, TypeVar, cast
 
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import EvaluationError
+from teleop_core.evaluation.origin import Origin
 from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.evaluation.windows import Window
 from teleop_core.topics import Topic
@@ -27,12 +28,14 @@ class Context:
         bag: The recording; it holds this arm only, under the plain names.
         arm: Name of the arm; empty for the default arm of a recording that names none.
         history: What teleop/state said at any time.
+        origin: The session it was made in: graph, streams, chain of stages, map of axes.
         robot: Name of the robot; None if unknown.
     """
 
-    def __init__(self, bag: Bag, arm: str, history: StateHistory) -> None:
-        self.bag, self.arm, self.history = bag, arm, history
+    def __init__(self, bag: Bag, arm: str, history: StateHistory, origin: Origin) -> None:
+        self.bag, self.arm, self.history, self.origin = bag, arm, history, origin
         self.robot = bag.metadata.get("robot") or None
+        self._read: dict[str, Topic] = {}
         self._parts: dict[Callable[[Context], Accumulator], Accumulator] = {}
         self._has_begun = False
 
@@ -40,6 +43,28 @@ class Context:
         """Messages of a topic in the recording."""
         info = self.bag.topics.get(topic.name)
         return 0 if info is None else info.count
+
+    def read(self, topics: Iterable[Topic]) -> None:
+        """Ask for streams that depend on the recording, beside those that metrics declare.
+
+        Those that it lacks have no samples.
+
+        Args:
+            topics: Streams, under their plain names.
+
+        Raises:
+            EvaluationError: The recording is being read; ask while a metric is made.
+        """
+        for topic in topics:
+            if self._has_begun:
+                raise EvaluationError(f"{topic.name} is asked for too late, must be in __init__")
+            if self.expected(topic):
+                self._read.setdefault(topic.name, topic)
+
+    @property
+    def topics(self) -> list[Topic]:
+        """Streams that windows hold: all that were asked for and recorded."""
+        return list(self._read.values())
 
     def shared(self, kind: Callable[["Context"], Shared]) -> Shared:
         """The one accumulator of a kind, metrics included, that all metrics of a score share.

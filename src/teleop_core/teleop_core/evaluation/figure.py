@@ -8,11 +8,11 @@ import numpy as np
 
 from teleop_core.geometry import Array
 
-COMMAND, REFERENCE, MEASURED, BOX = "#8a94a0", "#9ed0fb", "#c2370a", "#2b8a3e"
+COMMAND, REFERENCE, MEASURED, FIXTURE = "#8a94a0", "#9ed0fb", "#c2370a", "#2b8a3e"
 # Three curves that must be told apart, also without seeing red or green (Okabe and Ito 2008).
 FIRST, SECOND, THIRD = "#0072b2", "#009e73", "#cc79a7"
 DARK = "#343a40"
-DRAWN_BOXES = 4
+DRAWN_FIXTURES = 4
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,7 +54,9 @@ class Metric(ABC):
         name: What it is called, in JSON too.
         keys: Its keys in JSON; each path begins with the name and a dot. Without keys a metric
             is not in JSON and only draws.
-        topics: Streams it reads. Those that a recording lacks have no samples in its windows.
+        topics: Streams it reads. Those that a recording lacks have no samples in its windows. For
+            streams that depend on the recording see
+            :meth:`~teleop_core.evaluation.context.Context.read`.
     """
 
     name: ClassVar[str]

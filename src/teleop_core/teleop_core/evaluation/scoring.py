@@ -1,6 +1,6 @@
 """Scoring: a recording becomes a score, in one pass and in memory that does not grow with it."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -13,13 +13,14 @@ from teleop_core.evaluation.context import Accumulator, Context
 from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import Metric
+from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.plain import Plain, leaves, plain
 from teleop_core.evaluation.registry import all_metrics
 from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Result, Score, Session
-from teleop_core.evaluation.state_history import read_history
+from teleop_core.evaluation.state_history import StateHistory, read_history
 from teleop_core.evaluation.windows import DisorderError, Window, whole, windows
-from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP
+from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
 """Topics without which there is no score; what needs others is None without them."""
@@ -89,33 +90,31 @@ def studies(bag: Bag, further: Sequence[type[Metric]] = ()) -> list[Study]:
     return [study(bag, arm, further) for arm in arm_names(bag)]
 
 
+Cut = Callable[[Bag, Iterable[Topic], StateHistory], Iterable[Window]]
+
+
 def _run(bag: Bag, arm: str, makers: Sequence[type[Metric]]) -> tuple[Context, list[Metric]]:
     """Metrics after the whole recording."""
-    wanted = dict.fromkeys(topic for maker in makers for topic in maker.topics)
-    topics = [
-        topic for topic in wanted if topic.name in bag.topics and bag.topics[topic.name].count
-    ]
-    history = read_history(bag)
+    history, origin = read_history(bag), read_origin(bag, arm)
     try:
-        context = Context(bag, arm, history)
-        return context, _feed(context, makers, windows(bag, topics, history))
+        context = Context(bag, arm, history, origin)
+        return context, _feed(context, makers, windows)
     except DisorderError:
-        context = Context(bag, arm, history)
-        return context, _feed(context, makers, whole(bag, topics, history))
+        context = Context(bag, arm, history, origin)
+        return context, _feed(context, makers, whole)
 
 
-def _feed(
-    context: Context, makers: Sequence[type[Metric]], parts: Iterable[Window]
-) -> list[Metric]:
+def _feed(context: Context, makers: Sequence[type[Metric]], cut: Cut) -> list[Metric]:
     place, metrics = str(context.bag.path), []
     for maker in makers:
         with _named(place, maker):
+            context.read(maker.topics)
             metrics.append(context.shared(maker))
     context.shared(Gains)
     accumulators = context.begin()
     # What foreign devices record may be infinite; such samples are left out and counted.
     with np.errstate(invalid="ignore", over="ignore"):
-        for window in parts:
+        for window in cut(context.bag, context.topics, context.history):
             for accumulator in accumulators:
                 with _named(place, accumulator):
                     accumulator.add(window)

@@ -5,24 +5,25 @@ import numpy as np
 from teleop_core.evaluation.accumulators import Distribution
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.windows import Window
-from teleop_core.topics import STREAMS, Topic
+from teleop_core.topics import Topic
 
 
 class StampTally:
     """Accumulator of the steps between the stamps of one topic."""
 
-    def __init__(self) -> None:
-        self._steps = Distribution()
+    def __init__(self, topic: Topic) -> None:
+        self._topic, self._steps = topic, Distribution()
         self._repeats = 0
 
-    def add(self, window: Window, topic: Topic) -> None:
+    def add(self, window: Window) -> None:
         """Take the topic's samples of a window."""
-        own = window.own(topic)
+        own = window.own(self._topic)
         if own.stop > own.start:
-            stamps = window.series[topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
+            stamps = window.series[self._topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
             # A slave without any command yet holds its pose under the stamp 0.
             steps = np.diff(stamps)[stamps[:-1] > 0]
-            self._repeats += int((steps == 0).sum())
+            if self._topic.stamp.of:
+                self._repeats += int((steps == 0).sum())
             self._steps.add(steps[steps > 0])
 
     @property
@@ -33,8 +34,9 @@ class StampTally:
     def gaps(self) -> int:
         """Samples that are missing at the nominal period.
 
-        A stamp that came again makes up for one that was passed over: the slave holds a command
-        when none came, and takes the newest when several did.
+        A stamp that is another topic's makes up for one that was passed over when it comes again:
+        the slave holds a command when none came, and takes the newest when several did. A time of
+        sampling that comes again is the same sample twice.
         """
         period = self.period_us
         if not period:
@@ -51,11 +53,12 @@ class StampTallies:
     """
 
     def __init__(self, context: Context) -> None:
-        topics = context.bag.topics
-        self._topics = [topic for topic in STREAMS if topic.name in topics]
-        self.of = {topic.name: StampTally() for topic in self._topics}
+        streams = context.origin.streams
+        context.read(streams)
+        recorded = context.bag.topics
+        self.of = {topic.name: StampTally(topic) for topic in streams if topic.name in recorded}
 
     def add(self, window: Window) -> None:
         """Take one window."""
-        for topic in self._topics:
-            self.of[topic.name].add(window, topic)
+        for tally in self.of.values():
+            tally.add(window)

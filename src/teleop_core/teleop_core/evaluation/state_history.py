@@ -1,6 +1,6 @@
-"""State history: what teleop/state said at any time, as columns."""
+"""State history: what teleop/state said at any time, as columns and fixtures."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.errors import EvaluationError
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.pairing import NONE, latest
+from teleop_core.evaluation.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.geometry import Array
 from teleop_core.signals import STATE, STATE_FIELDS
 from teleop_core.topics import TELEOP_STATE
@@ -24,24 +25,31 @@ class StateHistory:
     Attributes:
         stamp_ns: Time from which a row holds, shape (N,), [ns].
         rows: Columns as in :data:`~teleop_core.signals.STATE_FIELDS`, shape (N, 11).
+        fixture: Which of ``fixtures`` each row tells, shape (N,).
+        fixtures: All that were told, each once; on or off.
     """
 
     stamp_ns: Integers
     rows: Array
+    fixture: Integers = field(default_factory=lambda: np.empty(0, np.int64))
+    fixtures: tuple[ReportedFixture, ...] = ()
 
     def at(self, stamp_ns: Integers) -> "States":
         """State in force at each stamp, shape (N,), [ns]; all zero before the first report."""
         index = latest(stamp_ns, self.stamp_ns)
         if not len(self.rows):
-            return States(np.zeros((len(stamp_ns), len(STATE_FIELDS))))
-        return States(np.where((index != NONE)[:, None], self.rows[index], 0.0))
+            return States(np.zeros((len(stamp_ns), len(STATE_FIELDS))), index, ())
+        rows = np.where((index != NONE)[:, None], self.rows[index], 0.0)
+        return States(rows, self.fixture[index], self.fixtures)
 
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """State at N times; ``rows`` as in :class:`StateHistory`, shape (N, 11)."""
+    """State at N times; all as in :class:`StateHistory`."""
 
     rows: Array
+    fixture: Integers
+    fixtures: tuple[ReportedFixture, ...]
 
     def column(self, name: str) -> Array:
         """One field, shape (N,)."""
@@ -54,16 +62,16 @@ class States:
 
     def only(self, is_kept: NDArray[np.bool_]) -> "States":
         """States of some of the times; ``is_kept`` has the shape (N,)."""
-        return States(self.rows[is_kept])
+        return States(self.rows[is_kept], self.fixture[is_kept], self.fixtures)
 
     @property
     def center(self) -> Array:
-        """Centre of the box in the slave's base, shape (N, 3), [m]."""
+        """Middle of the fixture in the slave's base, shape (N, 3), [m]."""
         return self.rows[:, _CENTER]
 
     @property
     def size(self) -> Array:
-        """Wall to wall on the slave's x, y, z, shape (N, 3), [m]."""
+        """Extent of the fixture on the slave's x, y, z, shape (N, 3), [m]."""
         return self.rows[:, _SIZE]
 
 
@@ -80,13 +88,19 @@ def read_history(bag: Bag) -> StateHistory:
     """
     info = bag.topics.get(TELEOP_STATE.name)
     stamps: list[int] = []
-    rows: list[list[float]] = []
+    rows: list[Array] = []
+    fixtures: dict[ReportedFixture, int] = {}
+    which: list[int] = []
     for report in bag.reports(TELEOP_STATE) if info is not None and info.count else ():
         stamps.append(report.stamp_ns)
-        rows.append([_number(bag, name, report.values.get(name)) for name in STATE_FIELDS])
+        row = np.array([_number(bag, name, report.values.get(name)) for name in STATE_FIELDS])
+        rows.append(row)
+        fixture = reported_fixture(report.values, row[_SIZE])
+        which.append(fixtures.setdefault(fixture, len(fixtures)))
     columns = np.array(rows).reshape(len(rows), len(STATE_FIELDS))
-    order = np.argsort(np.array(stamps, np.int64), kind="stable")
-    return StateHistory(np.array(stamps, np.int64)[order], columns[order])
+    times, told = np.array(stamps, np.int64), np.array(which, np.int64)
+    order = np.argsort(times, kind="stable")
+    return StateHistory(times[order], columns[order], told[order], tuple(fixtures))
 
 
 def _number(bag: Bag, name: str, text: str | None) -> float:

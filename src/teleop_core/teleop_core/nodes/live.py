@@ -134,8 +134,7 @@ class _Session:
 
     def _await_operator(self) -> None:
         """Wait until the hand moves; it does after a while even if nothing follows it."""
-        first = self._graph.stages[0]
-        masters = [m.name for m in self._graph.members if m.stage is first]
+        masters = [member.name for member in self._graph.masters]
         while not all(self._observer.statuses[m].number("has_begun") for m in masters):
             self._observer.listen(0.1)
             self._check()

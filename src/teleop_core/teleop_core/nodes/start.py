@@ -9,9 +9,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from teleop_core.errors import UnknownNameError
+from teleop_core.errors import TeleopError
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.process import run
+from teleop_core.own_parts import load_own_parts
 from teleop_core.stage import STAGES, Stage
 
 SESSION = "teleop_session"
@@ -39,6 +40,15 @@ def main() -> int:
     Returns:
         Exit code: 0; 1 after a failure at work; 2 if a name, parameter or file is wrong.
     """
+    try:
+        load_own_parts()
+        return _start()
+    except TeleopError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+def _start() -> int:
     name = Path(sys.argv[0]).stem
     if name not in {SESSION, *STAGES}:
         name = sys.argv.pop(1) if len(sys.argv) > 1 and sys.argv[1][:1] != "-" else ANY
@@ -46,9 +56,5 @@ def main() -> int:
         from teleop_core.nodes.teleop_session import TeleopSession
 
         return run(TeleopSession)
-    try:
-        stage = STAGES.find(name)
-    except UnknownNameError as error:
-        print(error, file=sys.stderr)
-        return 2
+    stage = STAGES.find(name)
     return run(lambda: make_node(stage))

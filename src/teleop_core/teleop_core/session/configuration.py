@@ -277,6 +277,16 @@ class Configuration:
         """Parameters of a stage of an arm, by the arm's namespace."""
         return self.groups[f"{arm}/{stage}" if arm else stage]
 
+    def value(self, name: str, arm: str = "") -> Any:
+        """Parameter of the first stage of an arm that has it; None if none has.
+
+        Args:
+            name: A parameter, such as ``robot`` or ``seed``.
+            arm: Namespace of the arm.
+        """
+        groups = (self.group(stage.name, arm) for stage in self.graph.stages)
+        return next((getattr(group, name) for group in groups if hasattr(group, name)), None)
+
     def text(self) -> str:
         """All values as a ROS 2 parameter file, which :func:`parse_layer` reads back."""
         plain = {

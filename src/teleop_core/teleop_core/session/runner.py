@@ -177,8 +177,7 @@ def describe(configuration: Configuration) -> dict[str, str]:
         about["arms"] = " ".join(graph.arms)
     for arm in graph.namespaces:
         prefix = f"{arm}/" if arm else ""
-        about[f"{prefix}robot"] = configuration.group("slave_sim", arm).robot
-        about[f"{prefix}seed"] = str(configuration.group("haptic_master", arm).seed)
+        about |= {f"{prefix}{n}": str(configuration.value(n, arm)) for n in ("robot", "seed")}
     return about | {"configuration": configuration.text()}
 
 

@@ -35,10 +35,7 @@ class VirtualTime:
     ) -> None:
         self.graph, self._tick_ns = configuration.graph, tick_ns
         groups, dt = configuration.groups, tick_ns / 1e9
-        first = self.graph.stages[0]
-        self._played = frozenset(
-            m.name for m in self.graph.members if is_replay and m.stage is first
-        )
+        self._played = frozenset(m.name for m in self.graph.masters) if is_replay else frozenset()
         self.stages: dict[str, Runner] = {
             member.name: member.stage.run(groups[member.name], dt)
             for member in self.graph.members

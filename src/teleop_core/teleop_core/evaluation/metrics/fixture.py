@@ -1,35 +1,40 @@
 """Fixture: how far hand and slave got out of the virtual fixture while it was on."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.bags.reader import Series
 from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.fixture_depth import fixture_depth
 from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.evaluation.published import BOX_OVERSHOOT_MM
+from teleop_core.evaluation.reported_fixture import ReportedFixture
 from teleop_core.evaluation.rows import MISSING, Row, row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.state_history import States
 from teleop_core.evaluation.windows import Window
+from teleop_core.fixtures.box import BOX
 from teleop_core.geometry import Array
-from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP
+from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Topic
 
 GROUP = "virtual fixture"
 
 
 @dataclass(frozen=True)
 class FixtureScore:
-    """What happened while the box was on; None where it never was.
+    """What happened while a fixture was on; None where none ever was.
 
     Attributes:
-        on_s: Time with the box on, [s].
+        on_s: Time with a fixture on, [s].
         outside_share: Share of that time during which the slave's tip was outside, 0 to 1.
-        penetration_max_mm: Largest distance of the slave's tip from the box, [mm].
+        penetration_max_mm: Largest distance of the slave's tip from the fixture, [mm].
         penetration_rms_mm: Root mean square of it, zero inside, [mm].
-        hand_penetration_max_mm: Largest distance of the hand from its box, on the master, [mm].
+        hand_penetration_max_mm: Largest distance of the hand from its fixture, on the master, [mm].
+        kind: Kind of the fixture; those that were on, with "and" between them.
+        unscored: Those of them whose shape is not known here, each with the reason. Their time
+            counts in ``on_s`` only.
     """
 
     on_s: float
@@ -37,6 +42,8 @@ class FixtureScore:
     penetration_max_mm: float | None
     penetration_rms_mm: float | None
     hand_penetration_max_mm: float | None
+    kind: str | None
+    unscored: str | None
 
 
 class FixtureMetric(Metric):
@@ -44,55 +51,71 @@ class FixtureMetric(Metric):
 
     name = "fixture"
     keys = (
-        Key("fixture.on_s", "s", "time with the box on"),
+        Key("fixture.on_s", "s", "time with the fixture on"),
         Key("fixture.outside_share", "1", "share of that time with the slave's tip outside"),
-        Key("fixture.penetration_max_mm", "mm", "largest distance of the slave's tip from the box"),
+        Key("fixture.penetration_max_mm", "mm",
+            "largest distance of the slave's tip from the fixture"),
         Key("fixture.penetration_rms_mm", "mm", "root mean square of it, zero inside"),
-        Key("fixture.hand_penetration_max_mm", "mm", "largest distance of the hand from its box"),
-    )
+        Key("fixture.hand_penetration_max_mm", "mm",
+            "largest distance of the hand from its fixture"),
+        Key("fixture.kind", "1", "kinds of fixture that were on; null if none was"),
+        Key("fixture.unscored", "1",
+            "those whose shape is not known here, for which there is only on_s; null if none"),
+    )  # fmt: skip
     topics = (SLAVE_MEASURED_CP, SLAVE_SERVO_CP)
 
     def __init__(self, context: Context) -> None:
         self._slave, self._hand, self._outside = Moments(), Moments(), 0
-        self._stamps = context.shared(StampTallies)
+        self._axes, self._stamps = context.origin.axes, context.shared(StampTallies)
+        self._on: Counter[ReportedFixture] = Counter()
 
     def add(self, window: Window) -> None:
         """Take one window."""
-        depth, _ = _depth(window.samples(SLAVE_MEASURED_CP), window.states(SLAVE_MEASURED_CP))
+        depth, held = self._depth(window, SLAVE_MEASURED_CP)
         self._outside += int((depth > 0.0).sum())
         self._slave.add(depth * 1e3)
-        depth, held = _depth(window.samples(SLAVE_SERVO_CP), window.states(SLAVE_SERVO_CP))
+        for index, count in zip(*np.unique(held.fixture, return_counts=True), strict=True):
+            self._on[held.fixtures[index]] += int(count)
+        depth, held = self._depth(window, SLAVE_SERVO_CP)
         with np.errstate(divide="ignore", invalid="ignore"):
             self._hand.add(depth * 1e3 / held.column("gain"))
+
+    def _depth(self, window: Window, topic: Topic) -> tuple[Array, States]:
+        """Distance (N,) [m] from the fixture at the samples with it on, and their states."""
+        states = window.states(topic)
+        is_on = states.is_fixture_on
+        held = states.only(is_on)
+        return fixture_depth(window.samples(topic).values[is_on, :3], held, self._axes), held
 
     def values(self) -> FixtureScore:
         """Score of everything so far."""
         slave, count = self._slave.spread(), self._slave.count
         period_us = self._stamps.of[SLAVE_MEASURED_CP.name].period_us
         period_s = 0.0 if period_us is None else period_us * 1e-6
+        unknown = {fixture.kind: fixture.fault for fixture in self._on if fixture.fault}
+        unscored = sum(count for fixture, count in self._on.items() if fixture.fault)
         return FixtureScore(
-            on_s=count * period_s,
+            on_s=(count + unscored) * period_s,
             outside_share=self._outside / count if count else None,
             penetration_max_mm=slave.max,
             penetration_rms_mm=slave.rms,
             hand_penetration_max_mm=self._hand.spread().max,
+            kind=" and ".join(dict.fromkeys(fixture.kind for fixture in self._on)) or None,
+            unscored="; ".join(f"{kind}: {fault}" for kind, fault in unknown.items()) or None,
         )
 
     def rows(self) -> list[Row]:
-        """All of it, the slave beside the overshoot that was published."""
-        box = self.values()
-        share = None if box.outside_share is None else 100.0 * box.outside_share
-        return [
-            Row(GROUP, "box on for", "s", f"{box.on_s:.1f}"),
-            row(GROUP, "slave outside, max", "mm", box.penetration_max_mm, BOX_OVERSHOOT_MM),
-            row(GROUP, "slave outside, RMS", "mm", box.penetration_rms_mm),
+        """All of it, the slave beside the overshoot that was published of a box."""
+        score = self.values()
+        share = None if score.outside_share is None else 100.0 * score.outside_share
+        kind = score.kind or BOX.name
+        published = BOX_OVERSHOOT_MM if kind == BOX.name else None
+        rows = [
+            Row(GROUP, f"{kind} on for", "s", f"{score.on_s:.1f}"),
+            row(GROUP, "slave outside, max", "mm", score.penetration_max_mm, published),
+            row(GROUP, "slave outside, RMS", "mm", score.penetration_rms_mm),
             Row(GROUP, "slave outside, time", "%", MISSING if share is None else f"{share:.1f}"),
-            row(GROUP, "hand outside, max", "mm", box.hand_penetration_max_mm),
+            row(GROUP, "hand outside, max", "mm", score.hand_penetration_max_mm),
         ]
-
-
-def _depth(poses: Series, states: States) -> tuple[Array, States]:
-    """Distance (N,) [m] from the fixture at the N samples with the fixture on, and their states."""
-    is_on = states.is_fixture_on
-    held = states.only(is_on)
-    return fixture_depth(poses.values[is_on, :3], held), held
+        unknown = dict.fromkeys(fixture.kind for fixture in self._on if fixture.fault)
+        return rows + [Row(GROUP, "shape not known", "", ", ".join(unknown))] * bool(unknown)

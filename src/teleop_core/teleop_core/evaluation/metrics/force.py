@@ -3,11 +3,11 @@
 import numpy as np
 
 from teleop_core.evaluation.accumulators import Moments, Spread
-from teleop_core.evaluation.boxes import boxes_of
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics.fixture import GROUP
+from teleop_core.evaluation.outlines import kinds_of, outlines_of
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
@@ -54,13 +54,12 @@ class ForceMetric(Metric):
             for i, (axis, color) in enumerate(zip("xyz", (FIRST, SECOND, THIRD), strict=True))
         ]
         traces.append(line(times, values[:, 3], "magnitude", DARK, 1.4, "N"))
-        has_box = bool(boxes_of(self._context))
+        kinds = kinds_of(outlines_of(self._context))
         sentence = f"The device pushes the hand with {number(self.values().max)} N at most"
-        sentence += "; the box pushes back only where the hand is beyond a wall." * has_box
-        sentence += "." * (not has_box)
+        sentence += f"; the {kinds} pushes back only where the hand is beyond a wall" * bool(kinds)
         layout = {
             "xaxis": time_axis(),
             "yaxis": {"title": {"text": "force [N]"}},
             "hovermode": "x unified",
         }
-        return [Figure("Force on the hand", sentence, traces, layout, 340)]
+        return [Figure("Force on the hand", f"{sentence}.", traces, layout, 340)]

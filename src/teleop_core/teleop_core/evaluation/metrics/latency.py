@@ -5,7 +5,6 @@ from itertools import cycle
 import numpy as np
 
 from teleop_core.evaluation.accumulators import Delay, Distribution, Integers
-from teleop_core.evaluation.chain import CHAIN, COMMAND, STAGES, TOTAL
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line
 from teleop_core.evaluation.metric import Key, Metric
@@ -17,7 +16,8 @@ from teleop_core.topics import Topic
 _NEVER = 2**62
 _BINS = 150
 _COLORS = (FIRST, "#e69f00", SECOND, THIRD, DARK)
-_LAST = CHAIN[-1][1].name.partition("/")[2]
+TOTAL = "total"
+"""Name of the delay of the whole chain."""
 
 
 class LatencyMetric(Metric):
@@ -31,26 +31,29 @@ class LatencyMetric(Metric):
     name = "latency_ms"
     keys = (
         Key("latency_ms.<stage>.median|p99|max", "ms",
-            f"own delay of {', '.join(stage for stage, _ in CHAIN)}: from the arrival at the "
-            "recorder of what it answers to that of its answer; "
-            f"{CHAIN[0][0]} and {TOTAL}: from the stamp of the sample to the arrival of "
-            f"measured_cp and {_LAST}"),
+            "own delay of each stage between the hand and the slave: from the arrival at the "
+            "recorder of what it answers to that of its answer; of the first, and "
+            f"{TOTAL}: from the stamp of the hand's sample to the arrival of the sample and of the "
+            "last answer"),
     )  # fmt: skip
-    topics = (*(topic for _, topic in CHAIN), COMMAND)
 
     def __init__(self, context: Context) -> None:
-        self._delays = {stage: Distribution() for stage in STAGES}
+        self._chain = context.origin.chain
+        self._command = self._chain[:2][-1][1]  # what is made of the hand's sample first
+        self._delays = {stage: Distribution() for stage, _ in self._chain}
+        self._delays[TOTAL] = Distribution()
+        context.read(topic for _, topic in self._chain)
 
     def add(self, window: Window) -> None:
         """Take one window."""
         before: Topic | None = None
-        for stage, topic in CHAIN:
+        for stage, topic in self._chain:
             stamps, logs = _first_arrivals(window, topic)
             arrivals = logs - (stamps if before is None else _arrivals(window, before, stamps))
             self._delays[stage].add(arrivals[arrivals > -_NEVER // 2])
             before = topic
         # The last stage holds what nobody sent when it starts: only commands count.
-        is_command = same_stamp(stamps, window.around(COMMAND).stamp_ns) != NONE
+        is_command = same_stamp(stamps, window.around(self._command).stamp_ns) != NONE
         self._delays[TOTAL].add((logs - stamps)[is_command])
 
     def values(self) -> dict[str, Delay]:
@@ -69,7 +72,7 @@ class LatencyMetric(Metric):
     def figures(self) -> list[Figure]:
         """Distribution of each stage's delay; a line of text where all are zero."""
         known = {stage: delay for stage, delay in self._delays.items() if delay.count}
-        if len(known) == len(STAGES) and not any(d.values_us.any() for d in known.values()):
+        if len(known) == len(self._delays) and not any(d.values_us.any() for d in known.values()):
             return [Figure("Latency", "none, as in virtual time.", [])]
         if not any(delay.values_us.any() for delay in known.values()):
             return []

@@ -4,12 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.evaluation.boxes import Box, boxes_of, largest
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import (
-    BOX,
     COMMAND,
-    DRAWN_BOXES,
+    DRAWN_FIXTURES,
+    FIXTURE,
     MEASURED,
     REFERENCE,
     Figure,
@@ -21,6 +20,7 @@ from teleop_core.evaluation.figure import (
 from teleop_core.evaluation.metric import Metric
 from teleop_core.evaluation.metrics.fixture import FixtureMetric
 from teleop_core.evaluation.metrics.position_error import PositionErrorMetric
+from teleop_core.evaluation.outlines import Outline, kinds_of, largest, outlines_of
 from teleop_core.evaluation.plain import Values
 from teleop_core.evaluation.rows import Row, number
 from teleop_core.evaluation.traces import Envelope, Thinned
@@ -34,7 +34,7 @@ _CAMERA = {"eye": {"x": 1.25, "y": -1.52, "z": 0.76}, "center": {"x": 0, "y": 0,
 
 
 class PathMetric(Metric):
-    """Draws the paths of command, reference and tip, with the box."""
+    """Draws the paths of command, reference and tip, with the fixture."""
 
     name = "path"
     topics = TRACKED
@@ -45,7 +45,7 @@ class PathMetric(Metric):
         self._fixture = context.shared(FixtureMetric)
         # x, y, z of command, setpoint and measured, [mm].
         self._position = Envelope(context.bag.start_ns, context.bag.end_ns, columns=9)
-        # Setpoint x, y, z and measured x, y, z [mm], and whether the box was on.
+        # Setpoint x, y, z and measured x, y, z [mm], and whether a fixture was on.
         self._path = Thinned(context.expected(SLAVE_MEASURED_CP))
 
     def add(self, window: Window) -> None:
@@ -67,37 +67,38 @@ class PathMetric(Metric):
 
     def figures(self) -> list[Figure]:
         """Paths in space and per plane, and positions against time."""
-        boxes = boxes_of(self._context)
+        outlines = outlines_of(self._context)
         reference, measured = self._paths()
         return [
-            _in_space(reference, measured, boxes, self._sentence(boxes)),
-            _in_planes(reference, measured, boxes),
-            self._against_time(boxes),
+            _in_space(reference, measured, outlines, self._sentence(outlines)),
+            _in_planes(reference, measured, outlines),
+            self._against_time(outlines),
         ]
 
     def _paths(self) -> tuple[Array, Array]:
-        """Setpoint and measured points (N, 3) [mm] while the box was on, or all if it never was."""
+        """Setpoint and measured points (N, 3) [mm] with a fixture on, or all if none ever was."""
         rows = self._path.rows()
         if rows[:, 6].any():
             rows = np.where(rows[:, 6:] > 0.0, rows, np.nan)
         return rows[:, :3], rows[:, 3:6]
 
-    def _sentence(self, boxes: list[Box]) -> str:
+    def _sentence(self, outlines: list[Outline]) -> str:
         largest_mm = number(self._error.values().max)
         text = f"The tip stays within {largest_mm} mm of its reference"
-        shown = largest(boxes)
+        shown, score = largest(outlines), self._fixture.values()
         if not shown:
-            return text + "; no box was on."
-        sizes = " and ".join(" × ".join(f"{side:.3g}" for side in box.size) for box in shown)
-        outside_mm = number(self._fixture.values().penetration_max_mm)
-        return (
-            f"{text} and leaves the box ({sizes} mm) by at most "
-            f"{outside_mm} mm. Only the time with the box on is drawn."
-        )
+            return text + "; no fixture was on."
+        kinds, sizes = kinds_of(outlines), " and ".join(map(_size, shown))
+        outside_mm = number(score.penetration_max_mm)
+        if score.unscored is None:
+            text += f" and leaves the {kinds} ({sizes} mm) by at most {outside_mm} mm."
+        else:
+            text += f". Drawn as a box and not scored: {score.unscored}."
+        return f"{text} Only the time with the {kinds} on is drawn."
 
-    def _against_time(self, boxes: list[Box]) -> Figure:
+    def _against_time(self, outlines: list[Outline]) -> Figure:
         times, values = self._position.line()
-        begin, end = self._interesting(boxes)
+        begin, end = self._interesting(outlines)
         is_shown = (times >= begin) & (times <= end)
         layout, shapes, traces = stacked_axes("xyz", "mm"), [], []
         for row in range(3):
@@ -111,34 +112,43 @@ class PathMetric(Metric):
                     line(times, values[:, row + 6], "measured", MEASURED, 1.6),
                 )
             ]
-            for box in boxes[:DRAWN_BOXES]:
-                shapes += box.wall_lines(row, suffix)
+            for outline in outlines[:DRAWN_FIXTURES]:
+                shapes += outline.wall_lines(row, suffix)
         layout |= {"shapes": shapes, "hovermode": "x unified"}
         layout["xaxis"]["range"] = [begin, end]
         sentence = (
             "The reference is the command after the low-pass and lags behind it; the tip stays "
             f"within {number(self._error.values().max)} mm of the reference."
         )
-        if boxes:
-            sentence += " Dashed: walls of the box. Double-click to see the whole recording."
+        if outlines:
+            sentence += f" Dashed: where the {kinds_of(outlines)} ends."
+            sentence += " Double-click to see the whole recording."
         return Figure("Position against time", sentence, traces, layout, 640)
 
-    def _interesting(self, boxes: list[Box]) -> tuple[float, float]:
-        """Time [s] that is shown first: with the box on, or all if it never was."""
-        if not boxes:
+    def _interesting(self, outlines: list[Outline]) -> tuple[float, float]:
+        """Time [s] that is shown first: with a fixture on, or all if none ever was."""
+        if not outlines:
             bag = self._context.bag
             return 0.0, (bag.end_ns - bag.start_ns) / 1e9
-        return boxes[0].begin_s, boxes[-1].end_s
+        return outlines[0].begin_s, outlines[-1].end_s
 
 
-def _in_space(reference: Array, measured: Array, boxes: list[Box], sentence: str) -> Figure:
-    """Paths of reference and tip in 3-D, with the box."""
+def _size(outline: Outline) -> str:
+    return " × ".join(f"{side:.3g}" for side in outline.size)
+
+
+def _in_space(reference: Array, measured: Array, outlines: list[Outline], sentence: str) -> Figure:
+    """Paths of reference and tip in 3-D, with the fixture."""
     traces = [
         # Both lines at once would hide each other in turns.
         {**_line3(reference, "reference", REFERENCE, 4), "visible": "legendonly"},
         _line3(measured, "measured", MEASURED, 4),
-        *(_line3(box.edges(), "box", BOX, 3, hidden=i > 0) for i, box in enumerate(largest(boxes))),
     ]
+    named: set[str] = set()
+    for outline in largest(outlines):
+        is_known = outline.kind in named
+        traces.append(_line3(outline.points, outline.kind, FIXTURE, 3, hidden=is_known))
+        named.add(outline.kind)
     axes = {f"{axis}axis": {"title": {"text": f"{axis} [mm]"}} for axis in "xyz"}
     scene = {**axes, "aspectmode": "data", "camera": _CAMERA}
     return Figure("Path in space", sentence, traces, {"scene": scene}, 560)
@@ -156,29 +166,27 @@ def _line3(
     }  # fmt: skip
 
 
-def _in_planes(reference: Array, measured: Array, boxes: list[Box]) -> Figure:
+def _in_planes(reference: Array, measured: Array, outlines: list[Outline]) -> Figure:
     """The same along each axis."""
-    shown = largest(boxes)
-    corners = [box.edges() for box in shown]
-    ranges = [span(np.concatenate((reference, measured, *corners))[:, axis]) for axis in range(3)]
+    shown = [(o.points, o.kind, FIXTURE, 2.0) for o in largest(outlines)]
+    lines = [
+        (reference, "reference", REFERENCE, 6.0), (measured, "measured", MEASURED, 1.6), *shown
+    ]  # fmt: skip
+    every = np.concatenate([points for points, *_ in lines])
+    ranges = [span(every[:, axis]) for axis in range(3)]
     traces: list[dict[str, Any]] = []
     layout: dict[str, Any] = {"grid": {"rows": 1, "columns": 3, "pattern": "independent"}}
     for plot, (across, up) in enumerate(_PLANES, start=1):
-        place = {"xaxis": f"x{plot}", "yaxis": f"y{plot}", "showlegend": plot == 1}
-        traces += [
-            {**line(points[:, across], points[:, up], name, color, width), **place}
-            for points, name, color, width in (
-                (reference, "reference", REFERENCE, 6.0),
-                (measured, "measured", MEASURED, 1.6),
-            )
-        ]
+        named: set[str] = set()
+        for points, name, color, width in lines:
+            has_entry = plot == 1 and name not in named
+            place = {"xaxis": f"x{plot}", "yaxis": f"y{plot}", "showlegend": has_entry}
+            traces.append({**line(points[:, across], points[:, up], name, color, width), **place})
+            named.add(name)
         layout |= _plane_axes(plot, "xyz"[across], "xyz"[up], ranges[across], ranges[up])
-    layout["shapes"] = [
-        box.outline(across, up, plot)
-        for plot, (across, up) in enumerate(_PLANES, start=1)
-        for box in shown
-    ]
-    sentence = "The same path seen along each axis" + ("; green: the box." if shown else ".")
+    sentence = (
+        f"The same path seen along each axis{f', in the {kinds_of(outlines)}' * bool(shown)}."
+    )
     return Figure("Path per plane", sentence, traces, layout, 420)
 
 

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from teleop_core.evaluation.chain import SLAVE_STAGE
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.evaluation.metrics.nodes import NodesMetric
@@ -42,13 +41,14 @@ class TicksMetric(Metric):
     def __init__(self, context: Context) -> None:
         self._nodes, self._stamps = context.shared(NodesMetric), context.shared(StampTallies)
         self._samples = context.expected(SLAVE_MEASURED_CP)
+        self._slave = context.origin.writer(SLAVE_MEASURED_CP)
 
     def add(self, window: Window) -> None:
         """Nothing: stamps and reports are counted by others."""
 
     def values(self) -> Ticks:
         """Ticks of the whole recording."""
-        own = self._nodes.values().get(SLAVE_STAGE, {})
+        own = self._nodes.values().get(self._slave, {})
         gaps = self._stamps.of[SLAVE_MEASURED_CP.name].gaps()
         return Ticks(own.get("ticks", self._samples), own.get("late"), own.get("missed", gaps))
 

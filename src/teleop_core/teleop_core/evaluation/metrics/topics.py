@@ -8,7 +8,6 @@ from teleop_core.evaluation.metrics.ticks import GROUP
 from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.windows import Window
-from teleop_core.topics import STREAMS
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,6 @@ class TopicsMetric(Metric):
             "messages missing by their stamps, lost or passed over by a stage that takes only the "
             "newest; null if not a stream"),
     )  # fmt: skip
-    topics = STREAMS
 
     def __init__(self, context: Context) -> None:
         self._infos, self._stamps = context.bag.topics, context.shared(StampTallies)

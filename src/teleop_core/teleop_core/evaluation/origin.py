@@ -1,0 +1,95 @@
+"""Origin: what a recording says of the session it was made in: its graph, and how axes map."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import yaml
+
+from teleop_core.bags.reader import Bag
+from teleop_core.errors import TeleopError
+from teleop_core.geometry import Array
+from teleop_core.graph import Graph, build_graph
+from teleop_core.mapping.motion_scaling import MOTION_SCALING, MotionScalingParameters, axis_map
+from teleop_core.parameters import build
+from teleop_core.session.configuration import SESSION, Layer, SessionParameters, parse_layer
+from teleop_core.stage import STAGES
+from teleop_core.topics import Topic
+
+_GRAPH = ("arms", "stages", "delays")
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """Session that a recording was made in, as one of its arms sees it: topics have plain names.
+
+    Attributes:
+        graph: What ran; the built-in stages where nothing is known or a stage is not installed.
+        axes: Rotation (3, 3) from the master's base to the slave's axes.
+    """
+
+    graph: Graph
+    axes: Array
+
+    @cached_property
+    def chain(self) -> tuple[tuple[str, Topic], ...]:
+        """Way of a master's sample to the slave: stages, each with the topic it answers with."""
+        return self.graph.chain()
+
+    @property
+    def streams(self) -> tuple[Topic, ...]:
+        """Topics of an arm with one message per step."""
+        return tuple(topic for topic in self.graph.streams if not topic.arm)
+
+    def writer(self, topic: Topic) -> str:
+        """Name of the stage that writes a topic; empty if none does."""
+        names = (stage.name for stage in self.graph.stages if topic in stage.writes)
+        return next(names, "")
+
+
+def read_origin(bag: Bag, arm: str = "") -> Origin:
+    """Origin of a recording.
+
+    What is missing, or cannot be built any more, is that of the built-in stages with their
+    published values: scores of what was recorded do not depend on it.
+
+    Args:
+        bag: The recording, or the view of one arm.
+        arm: Name of the arm.
+    """
+    layer = _layer(bag)
+    return Origin(_graph(layer), _axes(layer, arm))
+
+
+def _layer(bag: Bag) -> Layer:
+    """What is stored about stages that are installed."""
+    try:
+        content = yaml.safe_load(bag.metadata.get("configuration", ""))
+        if not isinstance(content, Mapping):
+            return {}
+        known = {SESSION, *STAGES}
+        kept = {k: v for k, v in content.items() if str(k).rpartition("/")[2] in known}
+        return parse_layer(kept, f"{bag.path}: configuration")
+    except (yaml.YAMLError, TeleopError):
+        return {}
+
+
+def _graph(layer: Layer) -> Graph:
+    given = layer.get(SESSION, {})
+    try:
+        values = {name: given[name] for name in _GRAPH if name in given}
+        session = build(SessionParameters, values, f"{SESSION}.")
+        return build_graph(session.arms, session.stages, session.delays)
+    except TeleopError:
+        return build_graph()
+
+
+def _axes(layer: Layer, arm: str) -> Array:
+    """Map of the arm, of all arms, or the published one."""
+    name = MOTION_SCALING.name
+    said = layer.get(name, {}) | layer.get(f"{arm}/{name}", {})
+    values = {"axes": said["axes"]} if "axes" in said else {}
+    try:
+        return axis_map("axes", build(MotionScalingParameters, values).axes)
+    except TeleopError:
+        return axis_map("axes", MotionScalingParameters().axes)
