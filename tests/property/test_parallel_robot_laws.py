@@ -6,7 +6,7 @@ import pytest
 from teleop_core.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot_set
 from teleop_core.session.configuration import configure
-from teleop_core.session.graph import Graph
+from teleop_core.session.virtual import VirtualTime
 
 ROBOTS = [
     ("four_bar", ""),
@@ -77,8 +77,8 @@ def test_a_batch_is_the_same_as_its_single_questions(name, geometry):
 
 @pytest.mark.parametrize(("name", "geometry"), ROBOTS)
 def test_every_robot_is_led_through_the_graph_with_all_its_actuators(name, geometry):
-    graph = Graph(configure(settings=[f"robot={name}", f"geometry=[{geometry}]"]).groups)
-    signals, robot = graph.run(6000), graph.robot
+    session = VirtualTime(configure(settings=[f"robot={name}", f"geometry=[{geometry}]"]))
+    signals, robot = session.run(6000), session.stages["slave_sim"].robot
     measured = signals["slave_measured_cp"]
     assert np.isfinite(measured).all()
     servo = signals["slave_servo_jp"][:, : robot.n]

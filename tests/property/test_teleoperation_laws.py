@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from teleop_core.mapping.motion_scaling import (
-    R_SLAVE_MASTER,
     MotionScaling,
     MotionScalingParameters,
+    axis_map,
 )
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
-from teleop_core.session.graph import Graph
-from teleop_core.signals import STATE, TICK_NS, make_signals
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.signals import STATE, TICK_NS
 
 # A command of 0.5 m is rounded to 1e-16 m at every sample.
 ROUNDING = 1e-14
@@ -25,6 +25,7 @@ ANGLE_ROUNDING = 1e-14
 # Box centres are reported to a nanometre.
 NANOMETRE = 1.0e-9
 TIMEOUT_NS = 100_000_000
+R_SLAVE_MASTER = axis_map("axes", MotionScalingParameters().axes)
 HOME = load_robot("rcrt1").fk(load_robot("rcrt1").home)
 
 
@@ -58,20 +59,21 @@ class Desk:
         quaternion = Rotation.from_matrix(HOME[:3, :3]).as_quat(scalar_first=True)
         self.row["slave_setpoint_cp"][3:] = quaternion
         self.row["slave_servo_cp"] = self.row["slave_setpoint_cp"]
-        self.row["stamp_ns"] = self.row["setpoint_stamp_ns"] = TICK_NS
+        self.row["master_measured_cp_ns"] = self.row["slave_setpoint_cp_ns"] = TICK_NS
         self.sample(np.zeros(3), np.zeros(3))
 
     def sample(self, step, turn, gap_ns=TICK_NS):
         row, before = self.row, self.row["slave_servo_cp"].copy()
         stylus_before = row["master_measured_cp"].copy()
         self.hand, self.attitude = self.hand + step, Rotation.from_rotvec(turn) * self.attitude
-        row["stamp_ns"] += gap_ns
+        row["master_measured_cp_ns"] += gap_ns
         row["master_measured_cp"][:3] = self.hand
         row["master_measured_cp"][3:] = self.attitude.as_quat(scalar_first=True)
         row["master_buttons"] = self.buttons
         self.scaling.step()
         after = row["slave_servo_cp"].copy()
-        row["slave_setpoint_cp"], row["setpoint_stamp_ns"] = after, row["stamp_ns"]
+        row["slave_setpoint_cp"] = after
+        row["slave_setpoint_cp_ns"] = row["master_measured_cp_ns"]
         return Sample(
             after[:3] - before[:3],
             turn_between(before[3:], after[3:]),
@@ -246,14 +248,14 @@ seconds = st.floats(0.0, 2.9).map(lambda t: round(t, 3))
 presses = st.lists(st.integers(0, 19).map(lambda k: round(0.15 * k, 3)), max_size=4, unique=True)
 
 
-def graph_of(seed, clutch=(), fixture=(), mode=(), **settings_):
+def session_of(seed, clutch=(), fixture=(), mode=(), **settings_):
     text = [f"{key}={value}" for key, value in settings_.items()]
     texts = [
-        f"seed={seed}", "path.approach_time=0.5", "path.center=[0.01, 0.0, 0.03]",
-        "path.period=4.0", f"buttons.clutch={sorted(clutch)}", f"buttons.fixture={list(fixture)}",
-        f"buttons.mode={list(mode)}",
+        f"seed={seed}", "operator.approach_time=0.5", "operator.center=[0.01, 0.0, 0.03]",
+        "operator.period=4.0", f"buttons.clutch={sorted(clutch)}",
+        f"buttons.fixture={list(fixture)}", f"buttons.mode={list(mode)}",
     ]  # fmt: skip
-    return Graph(configure(settings=[*texts, *text]).groups)
+    return VirtualTime(configure(settings=[*texts, *text]))
 
 
 def assert_command_moves_with_the_hand(block, first):
@@ -278,7 +280,7 @@ def assert_command_moves_with_the_hand(block, first):
 )  # fmt: skip
 @settings(max_examples=25)
 def test_buttons_in_a_running_session_never_move_the_slave(seed, clutch, fixture, mode):
-    block = graph_of(seed, clutch, fixture, mode).run(3000)
+    block = session_of(seed, clutch, fixture, mode).run(3000)
     assert_command_moves_with_the_hand(block, 0)
     is_clutched = block["teleop_state"][:, STATE["is_clutched"]] > 0.0
     held = is_clutched[1:] & is_clutched[:-1]
@@ -290,10 +292,10 @@ def test_buttons_in_a_running_session_never_move_the_slave(seed, clutch, fixture
 @given(st.integers(0, 1000), st.integers(600, 2500))
 @settings(max_examples=10)
 def test_restarting_the_scaling_in_motion_holds_the_slave_where_it_is(seed, at):
-    graph = graph_of(seed)
-    before = graph.run(at)[-1]
-    graph.scaling.reset()
-    after = graph.run(500)
+    session = session_of(seed)
+    before = session.run(at)[-1]
+    session.stages["motion_scaling"].reset()
+    after = session.run(500)
     assert np.array_equal(after["slave_servo_cp"][0], before["slave_setpoint_cp"])
     assert_command_moves_with_the_hand(after, 0)
     # The filter passes a tenth of the way that the slave still had to go, back at once.
@@ -305,14 +307,15 @@ def test_restarting_the_scaling_in_motion_holds_the_slave_where_it_is(seed, at):
 @given(st.integers(0, 1000), st.integers(600, 2500), st.sampled_from(["scaling", "ik", "both"]))
 @settings(max_examples=10)
 def test_restarting_at_rest_moves_nothing_at_all(seed, at, what):
-    rest = {"path.kind": "hold", "path.center": [0.0, 0.0, 0.0], "path.rotation": 0.0}
-    graph = graph_of(seed, **rest, gimbal_noise=0.0, tremor_amplitude=0.0)
-    before = graph.run(at)[-1]
+    rest = {"operator.kind": "hold", "operator.center": [0.0, 0.0, 0.0], "operator.rotation": 0.0}
+    session = session_of(seed, **rest, gimbal_noise=0.0, tremor_amplitude=0.0)
+    before = session.run(at)[-1]
     if what in {"scaling", "both"}:
-        graph.scaling.reset()
+        session.stages["motion_scaling"].reset()
     if what in {"ik", "both"}:
-        graph.ik.work[1][:] = graph.signals["slave_setpoint_js"]
-    after = graph.run(200)
+        setpoint = session.stages["slave_sim"].signals["slave_setpoint_js"]
+        session.stages["inverse_kinematics"].arguments[0].seed[:] = setpoint
+    after = session.run(200)
     assert np.abs(after["slave_servo_cp"] - before["slave_servo_cp"]).max() <= 1e-12
     assert np.abs(after["slave_setpoint_js"] - before["slave_setpoint_js"]).max() <= 1e-9
 
@@ -320,24 +323,25 @@ def test_restarting_at_rest_moves_nothing_at_all(seed, at, what):
 @given(st.integers(0, 1000))
 @settings(max_examples=5)
 def test_parameters_changed_in_a_running_session_never_move_the_slave(seed):
-    rng, graph = np.random.default_rng(seed), graph_of(seed)
-    before = graph.run(800)
+    rng, session = np.random.default_rng(seed), session_of(seed)
+    before = session.run(800)
     for _ in range(6):
         coarse, roll = rng.uniform(0.1, 3.0), rng.uniform(-3.0, 3.0)
         mode = ("coarse", "fine")[rng.integers(2)]
-        graph.scaling.retune(MotionScalingParameters(coarse_gain=coarse, mode=mode, tool_roll=roll))
-        block = graph.run(200)
+        session.stages["motion_scaling"].retune(
+            MotionScalingParameters(coarse_gain=coarse, mode=mode, tool_roll=roll)
+        )
+        block = session.run(200)
         assert_command_moves_with_the_hand(np.concatenate((before[-1:], block)), 0)
         before = block
 
 
 def test_quaternions_stay_unit_over_a_long_session_of_turning_and_clutching():
     count = 60_000
-    rng, graph = np.random.default_rng(8), graph_of(0)
-    graph.run(1)
+    rng, session = np.random.default_rng(8), VirtualTime(configure(), is_replay=True)
     turns = Rotation.from_rotvec(0.002 * rng.standard_normal((count, 3)))
     # Products of 100 turns each keep the path smooth and its making fast.
-    samples, attitude = make_signals(6, count), Rotation.identity()
+    samples, attitude = session.rows(count), Rotation.identity()
     path = samples["master_measured_cp"]
     for start in range(0, count, 100):
         part = turns[start : start + 100]
@@ -345,8 +349,10 @@ def test_quaternions_stay_unit_over_a_long_session_of_turning_and_clutching():
         attitude = part[-1] * attitude
     path[:, :3] = 1e-3 * rng.standard_normal((count, 3))
     samples["master_buttons"][:, 0] = (np.arange(count) // 37) % 2
-    samples["stamp_ns"] = graph.now_ns + TICK_NS * np.arange(1, count + 1)
-    block = graph.replay(samples)
+    samples["now_ns"] = TICK_NS * np.arange(1, count + 1)
+    for topic in session.played_topics:
+        samples[f"{topic.field}_ns"] = samples["now_ns"]
+    block = session.replay(samples)
     for topic in ("slave_servo_cp", "slave_setpoint_cp", "slave_measured_cp"):
         norms = np.linalg.norm(block[topic][:, 3:], axis=1)
         assert np.abs(norms - 1.0).max() < 1e-15, topic

@@ -9,10 +9,10 @@ from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.session.configuration import configure
-from teleop_core.session.graph import Graph
 from teleop_core.session.runner import simulate
+from teleop_core.session.virtual import VirtualTime
 
-SHORT = ("teleop.duration=3.0", "path.approach_time=1.0", "path.size=[0.02, 0.02, 0.02]")
+SHORT = ("teleop.duration=3.0", "operator.approach_time=1.0", "operator.size=[0.02, 0.02, 0.02]")
 
 
 TABLES = sorted(map(str, Path("config/robots").glob("*.yaml")))
@@ -40,7 +40,7 @@ def test_every_robot_follows_a_session_inside_its_limits_and_drives(name, tmp_pa
 def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model):
     handle = ("device.handle=mma", f"device.handle_geometry=[model={model}]")
     poses = [
-        Graph(configure("coarse_box", settings=[*SHORT, *extra]).groups).run(3000)[
+        VirtualTime(configure("coarse_box", settings=[*SHORT, *extra])).run(3000)[
             "master_measured_cp"
         ]
         for extra in ((), handle)
@@ -50,7 +50,8 @@ def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model):
 
 
 def test_an_option_of_a_robot_reaches_both_stages_that_need_it():
-    graph = Graph(configure(settings=["robot=scara_stewart", "geometry=[heading=carried]"]).groups)
+    session = VirtualTime(configure(settings=["robot=scara_stewart", "geometry=[heading=carried]"]))
     fixed = load_robot("scara_stewart")
-    assert graph.robot.geometry != fixed.geometry
-    assert graph.slave.robot.geometry == graph.robot.geometry
+    solver, slave = (session.stages[name].robot for name in ("inverse_kinematics", "slave_sim"))
+    assert solver.geometry != fixed.geometry
+    assert slave.geometry == solver.geometry

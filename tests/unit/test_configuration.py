@@ -6,8 +6,9 @@ import pytest
 import yaml
 
 from teleop_core.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.session.configuration import (
-    GROUPS,
+    SESSION,
     Configuration,
     config_folder,
     configure,
@@ -23,7 +24,7 @@ SCENARIOS = ("coarse_box", "fine_box", "free_motion", "mode_switching")
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_scenario_builds_every_group_and_says_what_it_is(name):
     assert list_scenarios()[name]
-    assert set(configure(name).groups) == set(GROUPS)
+    assert set(configure(name).groups) == {SESSION, *BUILT_IN, RECORDER_NAME}
 
 
 def test_unknown_scenario_is_refused_with_the_scenarios():
@@ -39,7 +40,7 @@ def test_default_file_changes_no_default_of_the_code():
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_text_of_a_configuration_reads_back_the_same(name):
-    configuration = configure(name, settings=["seed=7", "bandwidth=[50,50,50,70,70,70]"])
+    configuration = configure(name, settings=["seed=7", "pid.bandwidth=[50,50,50,70,70,70]"])
     layer = parse_layer(yaml.safe_load(configuration.text()), "text")
     assert Configuration.from_layers([layer], name) == configuration
 
@@ -63,9 +64,9 @@ def test_bare_key_sets_every_stage_that_has_it():
         (" duration = 3 ", "teleop", "duration", 3.0),
         ("hand.mass=0.2", "haptic_master", "hand.mass", 0.2),
         ("seed=5", "haptic_master", "seed", 5),
-        ("path.kind=circle", "haptic_master", "path.kind", "circle"),
-        ("path.bag=17", "haptic_master", "path.bag", "17"),
-        ("path.center=[0, 0.01, 1e-3]", "haptic_master", "path.center", (0.0, 0.01, 0.001)),
+        ("operator.kind=circle", "haptic_master", "operator.kind", "circle"),
+        ("operator.bag=17", "haptic_master", "operator.bag", "17"),
+        ("operator.center=[0, 0.01, 1e-3]", "haptic_master", "operator.center", (0.0, 0.01, 0.001)),
         ("buttons.clutch=[]", "haptic_master", "buttons.clutch", ()),
         ("reference_filter.is_on=false", "slave_sim", "reference_filter.is_on", False),
     ],
@@ -115,8 +116,8 @@ def test_setting_whose_value_is_no_yaml_is_refused():
         ("duration=soon", "teleop.duration"),
         ("duration=", "teleop.duration"),
         ("seed=1.5", "haptic_master.seed"),
-        ("path.kind=square", "haptic_master.path.kind"),
-        ("path.center=[0, 0]", "haptic_master.path.center"),
+        ("operator.kind=square", "haptic_master.operator.kind"),
+        ("operator.center=[0, 0]", "haptic_master.operator.center"),
         ("fine_gain=11", "motion_scaling.fine_gain"),
     ],
 )
@@ -147,12 +148,12 @@ def test_settings_win_over_files_and_files_over_the_scenario(tmp_path):
     def file(name, **values):
         return write(tmp_path / name, {"haptic_master": {"ros__parameters": values}})
 
-    first = file("first.yaml", seed=11, path={"period": 5.0, "rotation": 0.1})
-    second = file("second.yaml", path={"period": 6.0})
-    groups = configure("coarse_box", [first, second], ["path.rotation=0.3"]).groups
+    first = file("first.yaml", seed=11, operator={"period": 5.0, "rotation": 0.1})
+    second = file("second.yaml", operator={"period": 6.0})
+    groups = configure("coarse_box", [first, second], ["operator.rotation=0.3"]).groups
     master = groups["haptic_master"]
-    assert (master.seed, master.path.period, master.path.rotation) == (11, 6.0, 0.3)
-    assert master.path.tilt == (-0.5, 0.0, 0.0)
+    assert (master.seed, master.operator.period, master.operator.rotation) == (11, 6.0, 0.3)
+    assert master.operator.tilt == (-0.5, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.mapping.fixtures import box_penetration, wall_force
+from teleop_core.fixtures.box import box_depth
+from teleop_core.mapping.walls import wall_force
 
 # Products of numbers up to four.
 ROUNDING = 1e-12
@@ -17,14 +18,14 @@ CENTER = np.zeros(3)
 places = st.tuples(*[st.floats(-0.05, 0.05)] * 3).map(np.array)
 
 
-def penetration(position, center=CENTER, size=BOX):
+def penetration(offset, size=BOX):
     depth = np.full(3, math.nan)
-    length = box_penetration(np.asarray(position, dtype=float), center, size, depth)
+    length = box_depth(np.asarray(offset, dtype=float), size, depth)
     return depth, length
 
 
-def force(position, stiffness=STIFFNESS, largest=LARGEST, center=CENTER, size=BOX):
-    depth, length = penetration(position, center, size)
+def force(position, stiffness=STIFFNESS, largest=LARGEST, size=BOX):
+    depth, length = penetration(position, size)
     push = np.full(3, math.nan)
     wall_force(depth, length, stiffness, largest, push)
     return push
@@ -84,12 +85,12 @@ def test_per_axis_force_of_the_source_is_too_large_in_a_corner():
     assert math.isclose(np.linalg.norm(force(corner)), LARGEST, rel_tol=ROUNDING)
 
 
-@given(places, places, st.tuples(*[st.floats(1e-4, 0.05)] * 3).map(np.array))
-def test_penetration_leads_to_the_nearest_point_of_the_box(position, center, size):
-    depth, length = penetration(position, center, size)
-    nearest = np.clip(position, center - 0.5 * size, center + 0.5 * size)
-    assert np.allclose(position - depth, nearest, rtol=0, atol=1e-16)
-    assert math.isclose(length, np.linalg.norm(position - nearest), abs_tol=1e-16)
+@given(places, st.tuples(*[st.floats(1e-4, 0.05)] * 3).map(np.array))
+def test_penetration_leads_to_the_nearest_point_of_the_box(offset, size):
+    depth, length = penetration(offset, size)
+    nearest = np.clip(offset, -0.5 * size, 0.5 * size)
+    assert np.allclose(offset - depth, nearest, rtol=0, atol=1e-16)
+    assert math.isclose(length, np.linalg.norm(offset - nearest), abs_tol=1e-16)
 
 
 @given(places)

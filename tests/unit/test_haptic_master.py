@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.errors import ParameterError
 from teleop_core.master.haptic_master import (
+    HAPTIC_MASTER,
     REST_POSITION,
     REST_TILT,
     ButtonParameters,
@@ -17,26 +18,43 @@ from teleop_core.master.haptic_master import (
     HapticMaster,
     HapticMasterParameters,
 )
-from teleop_core.master.paths import PathParameters
+from teleop_core.operators import OPERATORS, Setting
+from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.operators.shapes import PHASES
+from teleop_core.parameters import build
 from teleop_core.signals import make_signals
 
 RESOLUTION, NOISE, PEAK = 0.055e-3, 2e-3, 3.3
 REST = Rotation.from_euler("x", REST_TILT)
-STILL = PathParameters(kind="hold", rotation=0.0)
 QUIET = {"position_resolution": 0.0, "gimbal_noise": 0.0}
 TOPICS = ("master_measured_cp", "master_measured_cv", "master_measured_cf", "master_buttons")
 
 
-def parameters(*, seed=1, device=None, hand=None, path=STILL, buttons=None):
+def operator(**values):
+    return build(OperatorParameters, values)
+
+
+STILL = operator(kind="hold", rotation=0.0)
+
+
+def parameters(*, seed=1, device=None, hand=None, operator=STILL, buttons=None):
     return HapticMasterParameters(
         seed=seed, device=DeviceParameters(**(device or {})), hand=HandParameters(**(hand or {})),
-        path=path, buttons=ButtonParameters(**(buttons or {})),
+        operator=operator, buttons=ButtonParameters(**(buttons or {})),
     )  # fmt: skip
+
+
+def wanted_places(wanted, ticks, seed=1):
+    """Places (ticks, 3) [m] that the operator wants, tick by tick, in the master's base."""
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * math.pi, PHASES)
+    setting = Setting(wanted, phases, seed)
+    motion = OPERATORS.find(wanted.kind.kind).make(wanted.kind.parameters, setting)
+    return motion(1e-3 * np.arange(1, ticks + 1))[:, :3] + REST_POSITION
 
 
 def run(master, ticks, force=(0.0, 0.0, 0.0)):
     """Signals of the next ticks (ticks,) under a constant commanded force [N]."""
-    out = make_signals(1, ticks)
+    out = make_signals(HAPTIC_MASTER.ports, 0, count=ticks)
     for i in range(ticks):
         master.signals["master_servo_cf"][:3] = force
         master.step()
@@ -70,16 +88,16 @@ def test_hand_feels_no_more_than_the_peak_force():
 
 
 def test_place_readings_are_multiples_of_the_resolution():
-    path = PathParameters(kind="random", approach_time=0.5)
-    counts = places(run(HapticMaster(parameters(path=path)), 3000)) / RESOLUTION
+    path = operator(kind="random", approach_time=0.5)
+    counts = places(run(HapticMaster(parameters(operator=path)), 3000)) / RESOLUTION
     # A reading of 0.1 m is 2000 steps, known to 1e-12 of a step.
     assert np.abs(counts - np.round(counts)).max() < 1e-10
     assert len(np.unique(np.round(counts))) > 100
 
 
 def test_reading_is_within_half_a_step_of_the_tip():
-    path = PathParameters(kind="random", approach_time=0.5)
-    master = HapticMaster(parameters(path=path))
+    path = operator(kind="random", approach_time=0.5)
+    master = HapticMaster(parameters(operator=path))
     for _ in range(1000):
         reading = places(run(master, 1))[0]
         assert np.abs(reading - master.state["position"]).max() <= 0.5 * RESOLUTION + 1e-15
@@ -159,17 +177,17 @@ def test_hand_returns_when_the_force_ends():
 
 
 def test_wanted_path_is_followed():
-    path = PathParameters(kind="circle", center=(0, 0, 0.03), approach_time=1.0, period=8.0)
-    master = HapticMaster(parameters(path=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
-    wanted = HapticMaster(parameters(path=path)).draw(10_000)[0]
+    path = operator(kind="circle", center=(0.0, 0.0, 0.03), approach_time=1.0, period=8.0)
+    master = HapticMaster(parameters(operator=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
+    wanted = wanted_places(path, 10_000)
     off = np.linalg.norm(places(run(master, 10_000)) - wanted, axis=1)
     # Backdrive friction of 0.26 N against the hand's 300 N/m.
     assert off.max() < 1.1 * 0.26 / 300.0 * math.sqrt(3.0)
 
 
 def test_tip_stops_at_the_ends_of_the_workspace():
-    far = PathParameters(kind="hold", center=(0.2, -0.2, 0.2), approach_time=0.5, rotation=0.0)
-    last = run(HapticMaster(parameters(path=far, device=QUIET)), 2000)[-1:]
+    far = operator(kind="hold", center=(0.2, -0.2, 0.2), approach_time=0.5, rotation=0.0)
+    last = run(HapticMaster(parameters(operator=far, device=QUIET)), 2000)[-1:]
     middle = np.subtract(REST_POSITION, (0.0, 0.0, -0.03))
     expected = middle + 0.5 * np.array((0.16, -0.12, 0.07))
     assert np.allclose(places(last)[0], expected, rtol=0, atol=1e-15)
@@ -178,14 +196,14 @@ def test_tip_stops_at_the_ends_of_the_workspace():
 
 def test_tip_leaves_its_stop_again():
     points = (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
-    path = PathParameters(kind="points", points=points, approach_time=0.1, period=1.5)
-    signals = run(HapticMaster(parameters(path=path, device=QUIET)), 4000)
+    path = operator(kind="points", points=points, approach_time=0.1, period=1.5)
+    signals = run(HapticMaster(parameters(operator=path, device=QUIET)), 4000)
     assert math.isclose(places(signals)[:, 0].max(), 0.08, abs_tol=1e-12)
     assert abs(places(signals)[-1, 0]) < 1e-3
 
 
 def test_master_starts_at_rest_in_the_inkwell():
-    master = HapticMaster(parameters(path=PathParameters(), device={"gimbal_noise": 0.0}))
+    master = HapticMaster(parameters(operator=operator(), device={"gimbal_noise": 0.0}))
     start = master.signals["master_measured_cp"].copy()
     assert np.allclose(start[3:], REST.as_quat(scalar_first=True), rtol=0, atol=1e-15)
     first = run(master, 20)
@@ -204,8 +222,8 @@ def test_first_reading_is_the_start_itself_and_reports_no_motion():
 
 
 def test_twist_is_the_filtered_rate_of_the_readings():
-    path = PathParameters(kind="circle", center=(0, 0, 0.03), approach_time=1.0, period=4.0)
-    master = HapticMaster(parameters(path=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
+    path = operator(kind="circle", center=(0.0, 0.0, 0.03), approach_time=1.0, period=4.0)
+    master = HapticMaster(parameters(operator=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
     signals = run(master, 4000)
     rate = np.gradient(places(signals), 1e-3, axis=0)[2000:3990]
     # 5 ms late and half a tick early: 4.5 ms of the rate's own change.
@@ -215,8 +233,8 @@ def test_twist_is_the_filtered_rate_of_the_readings():
 
 
 def test_turning_rate_is_that_of_the_stylus_in_base_axes():
-    path = PathParameters(kind="hold", tilt=(0.0, 0.0, 1.0), approach_time=2.0, rotation=0.0)
-    signals = run(HapticMaster(parameters(path=path, device=QUIET)), 1500)
+    path = operator(kind="hold", tilt=(0.0, 0.0, 1.0), approach_time=2.0, rotation=0.0)
+    signals = run(HapticMaster(parameters(operator=path, device=QUIET)), 1500)
     about_stylus_z = REST.apply((0.0, 0.0, 1.0))
     measured = signals["master_measured_cv"][1000, 3:]
     # Peak of the smooth step in its middle: 1.875 times the mean of 0.5 rad/s.
@@ -255,12 +273,12 @@ def test_presses_need_no_order():
     assert np.count_nonzero(np.diff(pressed[:, 2]) > 0) == 2
 
 
-RANDOM = PathParameters(kind="random", approach_time=0.5)
+RANDOM = operator(kind="random", approach_time=0.5)
 
 
 def test_same_seed_gives_the_same_bits_and_another_seed_others():
     first, again, other = (
-        run(HapticMaster(parameters(seed=seed, path=RANDOM)), 1500) for seed in (5, 5, 6)
+        run(HapticMaster(parameters(seed=seed, operator=RANDOM)), 1500) for seed in (5, 5, 6)
     )
     for topic in TOPICS:
         assert np.array_equal(first[topic], again[topic])
@@ -268,7 +286,7 @@ def test_same_seed_gives_the_same_bits_and_another_seed_others():
 
 
 def test_reset_repeats_the_session_to_the_bit():
-    master = HapticMaster(parameters(path=RANDOM))
+    master = HapticMaster(parameters(operator=RANDOM))
     first = run(master, 1200)
     master.reset()
     again = run(master, 1200)
@@ -276,23 +294,27 @@ def test_reset_repeats_the_session_to_the_bit():
         assert np.array_equal(first[topic], again[topic])
 
 
-@pytest.mark.parametrize("sizes", [(1,) * 50, (7, 993, 1000), (3000,), (1999, 1)])
+@pytest.mark.parametrize("sizes", [(1,) * 50, (7, 993, 1000), (1000,) * 3, (999, 1)])
 def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(sizes):
     buttons = {"clutch": (0.5, 1.0), "mode": (0.02,)}
-    whole = HapticMaster(parameters(path=RANDOM, buttons=buttons)).draw(sum(sizes))
-    master = HapticMaster(parameters(path=RANDOM, buttons=buttons))
-    for piece, total in zip(zip(*map(master.draw, sizes), strict=True), whole, strict=True):
-        assert np.array_equal(np.concatenate(piece), total)
+    one_by_one = run(HapticMaster(parameters(operator=RANDOM, buttons=buttons)), sum(sizes))
+    master = HapticMaster(parameters(operator=RANDOM, buttons=buttons))
+    blocks = []
+    for size in sizes:
+        master.prepare(size)
+        blocks.append(run(master, size))
+    for topic in TOPICS:
+        assert np.array_equal(np.concatenate(blocks)[topic], one_by_one[topic]), topic
 
 
 def test_new_hand_is_felt_from_the_next_tick_and_does_not_jump():
-    master = HapticMaster(parameters(path=RANDOM, device=QUIET))
+    master = HapticMaster(parameters(operator=RANDOM, device=QUIET))
     before = places(run(master, 1000))
     stiff = HandParameters(stiffness=2000.0, damping=30.0)
     master.retune(HapticMasterParameters(hand=stiff, device=DeviceParameters(**QUIET)))
     after = places(run(master, 200))
     assert np.abs(after[0] - before[-1]).max() < 2e-4
-    off = after - HapticMaster(parameters(path=RANDOM)).draw(1200)[0][1000:]
+    off = after - wanted_places(RANDOM, 1200)[1000:]
     # Friction of 0.26 N and the tremor's tenth of a millimetre against 2000 N/m.
     assert np.abs(off[-50:]).max() < 0.5e-3
 

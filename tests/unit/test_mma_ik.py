@@ -9,8 +9,8 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.damped import is_near_singular, pose_error
-from teleop_core.robots.mma_branches import branch, unwrapped
 from teleop_core.robots.kinematics import REACHED
+from teleop_core.robots.mma_branches import branch, unwrapped
 
 DT = 0.001
 SOLVED = {IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR}

@@ -21,6 +21,7 @@ from teleop_core.mapping.motion_scaling import (
     to_slave_axes,
 )
 from teleop_core.master.haptic_master import REST_POSITION, REST_TILT
+from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.signals import STATE, TICK_NS
 
@@ -40,20 +41,20 @@ class Desk:
         self.row = self.scaling.signals
         self.hand, self.turn = np.array(REST_POSITION), np.eye(3)
         self.pressed = np.zeros(3)
-        self.row["stamp_ns"] = self.row["setpoint_stamp_ns"] = TICK_NS
+        self.row["master_measured_cp_ns"] = self.row["slave_setpoint_cp_ns"] = TICK_NS
         pose_from_transform(HOME, self.row["slave_setpoint_cp"])
 
     def step(self, move=(0, 0, 0), turn=None, *, stamp_step_ns=TICK_NS, does_follow=True):
         """One sample after the hand's step [m]; returns the slave command's place."""
         row, self.hand = self.row, self.hand + np.asarray(move, dtype=float)
         self.turn = self.turn if turn is None else turn @ self.turn
-        row["stamp_ns"] += stamp_step_ns
+        row["master_measured_cp_ns"] += stamp_step_ns
         pose_from_transform(transform(self.turn, self.hand), row["master_measured_cp"])
         row["master_buttons"] = self.pressed
         self.scaling.step()
         if does_follow:
             row["slave_setpoint_cp"] = row["slave_servo_cp"]
-            row["setpoint_stamp_ns"] = row["stamp_ns"]
+            row["slave_setpoint_cp_ns"] = row["master_measured_cp_ns"]
         return row["slave_servo_cp"][:3].copy()
 
     def press(self, button):
@@ -90,15 +91,19 @@ def mapped(stylus, tool_roll):
     return out
 
 
+def slave_axes(master, **values):
+    scaling, out = MotionScaling(MotionScalingParameters(**values)), np.empty(3)
+    to_slave_axes(scaling.parameters, np.array(master), out)
+    return out
+
+
 def test_identity_stylus_maps_to_the_published_rotation():  # case 17
     published = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
     assert np.allclose(mapped(np.eye(3), 0.0), published, rtol=0, atol=ROUNDING)
 
 
 def test_place_maps_to_the_published_axes():  # case 17
-    out = np.empty(3)
-    to_slave_axes(np.array([1.0, 2.0, 3.0]), out)
-    assert np.array_equal(out, (-3.0, -1.0, 2.0))
+    assert np.array_equal(slave_axes((1.0, 2.0, 3.0)), (-3.0, -1.0, 2.0))
 
 
 def test_every_stylus_attitude_maps_to_the_published_product():  # case 17
@@ -113,8 +118,7 @@ def test_every_stylus_attitude_maps_to_the_published_product():  # case 17
 def test_stylus_in_the_inkwell_points_the_tool_as_at_home():  # case 18
     tool = mapped(rotation("x", -23.4 * DEGREE), math.pi / 2)
     assert np.allclose(tool, HOME[:3, :3], rtol=0, atol=ROUNDING)
-    out = np.empty(3)
-    to_slave_axes(np.array([0.0, -194.414, -416.901]), out)
+    out = slave_axes((0.0, -194.414, -416.901))
     assert np.allclose(out, (416.901, 0.0, -194.414), rtol=0, atol=ROUNDING)
 
 
@@ -300,7 +304,7 @@ def test_button_that_stays_pressed_toggles_once(button):
 
 
 def test_box_is_put_around_the_slave_where_the_button_was_pressed():
-    desk = Desk(fixture=FixtureParameters(size=(0.01, 0.02, 0.03)))
+    desk = Desk(fixture=build(FixtureParameters, {"box.size": (0.01, 0.02, 0.03)}))
     desk.step()
     desk.step((2 * MM, 0, 0))
     desk.hold("fixture")

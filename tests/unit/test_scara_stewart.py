@@ -12,7 +12,7 @@ from teleop_core.geometry import rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.stewart import Layout
 from teleop_core.session.configuration import configure
-from teleop_core.session.graph import Graph
+from teleop_core.session.virtual import VirtualTime
 
 # The source prints centimetres with four decimals; its inputs are rounded likewise, and near the
 # stretched arm that becomes 2e-4 degrees.
@@ -349,8 +349,8 @@ def test_it_is_a_slave_with_nine_actuators_and_a_home_it_can_hold():
 
 @pytest.mark.parametrize("options", ["", "heading=carried", "sigma_b=0.26, sigma_m=0.26"])
 def test_nine_simulated_actuators_follow_the_master_in_the_graph(options):
-    graph = Graph(configure(settings=["robot=scara_stewart", f"geometry=[{options}]"]).groups)
-    signals = graph.run(3000)
+    settings = ["robot=scara_stewart", f"geometry=[{options}]"]
+    signals = VirtualTime(configure(settings=settings)).run(3000)
     measured, setpoint = signals["slave_measured_cp"], signals["slave_setpoint_cp"]
     assert signals["slave_measured_js"].shape[1] >= 9
     assert np.isfinite(measured).all()

@@ -11,13 +11,14 @@ from scipy.linalg import expm
 
 from teleop_core.errors import ParameterError
 from teleop_core.kernels import pointer
+from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ACCELERATION, independent_acceleration
-from teleop_core.signals import TICK_NS
+from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.slave_sim import (
     CommandStatus,
-    PidParameters,
+    ControllerParameters,
     ReferenceFilterParameters,
     SlaveSim,
     SlaveSimParameters,
@@ -32,6 +33,11 @@ TIMEOUT_TICKS = 100
 JOINTS = range(6)
 
 
+def pid(**values):
+    """Controller parameters with some of the PID's."""
+    return build(ControllerParameters, {f"pid.{name}": value for name, value in values.items()})
+
+
 class Bench:
     """A slave and the ticks that its commands come in."""
 
@@ -44,8 +50,9 @@ class Bench:
         self.now_ns += TICK_NS
         if command is not None:
             self.row["slave_servo_jp"] = command
-            self.row["servo_stamp_ns"] = self.now_ns if stamp_ns is None else stamp_ns
-        self.slave.step(self.now_ns)
+            self.row["slave_servo_jp_ns"] = self.now_ns if stamp_ns is None else stamp_ns
+        self.row["now_ns"] = self.now_ns
+        self.slave.step()
         return CommandStatus(self.row["command_status"])
 
     def trace(self, command, ticks):
@@ -64,7 +71,7 @@ class Bench:
 
     @property
     def joints(self):
-        return self.slave.work[0].copy()
+        return self.slave.arm.q.copy()
 
     @property
     def setpoint(self):
@@ -81,7 +88,7 @@ def one_tick_error(rate, steps):
     q, dq = np.zeros(1), np.ones(1)
     one, none = np.ones(1), np.zeros(1)
     effort = np.array([0.3 * rate])
-    integrate(SPIN, one, rate * one, none, one, steps, effort, q, dq)
+    integrate(SPIN, one, rate * one, none, one, steps, effort, q, dq, DT)
     exact = expm(np.array([[0, 1, 0], [0, -rate, 1], [0, 0, 0]]) * 1e-3) @ [0.0, 1.0, effort[0]]
     return max(abs(q[0] - exact[0]) / 1e-3, abs(dq[0] - exact[1]))
 
@@ -111,8 +118,8 @@ def test_more_steps_change_the_path_of_the_arm_less_and_less():
         q, dq = MIDDLE.copy(), np.array([1.0, -1.0, 0.02, 1.0, -1.0, 1.0])
         for _ in range(100):
             integrate(
-                slave.pointers[1], slave.dynamics, DRIVES.viscous, DRIVES.coulomb,
-                DRIVES.friction_speed, steps, effort, q, dq,
+                slave.arm.acceleration, slave.arm.dynamics, DRIVES.viscous, DRIVES.coulomb,
+                DRIVES.friction_speed, steps, effort, q, dq, DT,
             )  # fmt: skip
         ends.append(q)
     in_counts = np.array([np.abs((b - a) / COUNT).max() for a, b in pairwise(ends)])
@@ -197,7 +204,7 @@ def test_setpoint_that_starts_to_move_kicks_the_drive_no_more_than_its_speed_doe
     bench = Bench()
     bench.go_to(MIDDLE)
     rest = bench.row["slave_measured_js"][12:].copy()
-    gains = bench.slave.parameters["gains"].copy()
+    gains = bench.slave.arm.gains.copy()
     speed = np.array([0.05, 0.05, 0.002, 0.05, 0.05, 0.05])
     efforts = []
     for k in range(1, 20):
@@ -224,7 +231,7 @@ def test_drives_and_setpoint_keep_their_limits_under_any_commands(shares):
             assert (np.abs(setpoint - last) <= DRIVES.speed_limit * 1e-3 + 1e-15).all()
             assert ((setpoint >= ARM.lower) & (setpoint <= ARM.upper)).all()
             # Beyond its rated speed a motor gives nothing after another tenth.
-            assert (np.abs(bench.slave.work[1]) <= 1.1 * DRIVES.speed_limit).all()
+            assert (np.abs(bench.slave.arm.dq) <= 1.1 * DRIVES.speed_limit).all()
             assert np.isfinite(bench.joints).all()
             last = setpoint
 
@@ -237,7 +244,7 @@ def test_long_move_runs_at_the_speed_limit_and_recovers_without_windup(joint):
     for _ in range(900):
         goal[joint] = min(goal[joint] + 1e-3 * DRIVES.speed_limit[joint], target)
         bench.tick(goal)
-        fastest = max(fastest, abs(bench.slave.work[1][joint]))
+        fastest = max(fastest, abs(bench.slave.arm.dq[joint]))
     joints, _ = bench.trace(goal, 1500)
     assert fastest <= 1.1 * DRIVES.speed_limit[joint]
     assert np.abs(joints[:, joint]).max() <= target + COUNT[joint]
@@ -249,7 +256,7 @@ def test_integral_stays_bounded_while_an_overload_holds_the_arm_back():
     bench = Bench(coulomb=(20.0, *DRIVES.coulomb[1:]))
     goal = ARM.home + np.array([0.2, 0, 0, 0, 0, 0])
     bench.trace(goal, 5000)
-    integral = abs(bench.slave.work[3][0, 0])
+    integral = abs(bench.slave.arm.memory[0, 0])
     assert integral <= DRIVES.effort_limit[0]
     bench.slave.retune(SlaveSimParameters())
     joints, _ = bench.trace(goal, 2000)
@@ -394,9 +401,9 @@ def test_command_outside_the_limits_is_followed_up_to_them():
 def test_stamp_of_the_command_in_force_is_passed_on():
     bench = Bench()
     bench.tick(ARM.home, stamp_ns=1234)
-    assert bench.row["setpoint_stamp_ns"] == 1234
+    assert bench.row["slave_setpoint_js_ns"] == 1234
     bench.tick(ARM.home + DRIVES.speed_limit, stamp_ns=5678)
-    assert bench.row["setpoint_stamp_ns"] == 1234
+    assert bench.row["slave_setpoint_js_ns"] == 1234
 
 
 # Repeating and retuning.
@@ -420,7 +427,7 @@ def test_reset_repeats_the_motion_to_the_bit():
     first = wander(bench)
     bench.slave.reset()
     bench.now_ns = 0
-    bench.row["servo_stamp_ns"] = bench.row["stamp_ns"] = 0
+    bench.row["slave_servo_jp_ns"] = 0
     second = wander(bench)
     for name in ("slave_setpoint_js", "slave_measured_js", "slave_measured_cp"):
         assert np.array_equal(first[name], second[name]), name
@@ -432,7 +439,7 @@ def test_reset_repeats_the_motion_to_the_bit():
         {"gravity_compensation": "none"},
         {"gravity_compensation": "all"},
         {"viscous": tuple(2.0 * DRIVES.viscous)},
-        {"pid": PidParameters(bandwidth=tuple(0.8 * DRIVES.bandwidth))},
+        {"controller": pid(bandwidth=tuple((0.8 * DRIVES.bandwidth).tolist()))},
         {"reference_filter": ReferenceFilterParameters(is_on=False)},
         {"integration_steps": 8},
     ],
@@ -457,14 +464,15 @@ def test_list_of_another_length_than_the_joints_is_refused(name, length):
 @pytest.mark.parametrize("name", ["bandwidth", "kp", "ki", "kd"])
 def test_gains_of_another_length_than_the_joints_are_refused(name):
     with pytest.raises(ParameterError) as error:
-        SlaveSim(SlaveSimParameters(pid=PidParameters(**{name: (1.0,) * 5})))
-    assert error.value.name == f"slave_sim.pid.{name}"
+        SlaveSim(SlaveSimParameters(controller=pid(**{name: (1.0,) * 5})))
+    assert error.value.name == f"slave_sim.controller.pid.{name}"
 
 
 def test_refused_retuning_changes_nothing():
     bench = Bench()
-    before = bench.slave.parameters.copy()
-    wrong = SlaveSimParameters(viscous=(1.0,) * 6, pid=PidParameters(kp=(1.0,) * 5))
+    before, gains = bench.slave.parameters.copy(), bench.slave.arm.gains.copy()
+    wrong = SlaveSimParameters(viscous=(1.0,) * 6, controller=pid(kp=(1.0,) * 5))
     with pytest.raises(ParameterError):
         bench.slave.retune(wrong)
     assert bench.slave.parameters == before
+    assert np.array_equal(bench.slave.arm.gains, gains)
