@@ -76,11 +76,17 @@ class JerkMetric(Metric):
 
 
 @pytest.fixture
-def added(monkeypatch):
+def added():
     """Add metrics for the time of one test."""
-    monkeypatch.setattr(METRICS, "_parts", dict(METRICS._parts))
-    monkeypatch.setattr(METRICS, "_own", set(METRICS._own))
-    return METRICS.add
+    names = []
+
+    def add(name, part):
+        METRICS.add(name, part)
+        names.append(name)
+
+    yield add
+    for name in names:
+        METRICS.remove(name)
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +150,7 @@ def test_metric_of_a_user_leaves_the_others_as_they_are(bag):
 def test_recording_without_a_state_has_a_page(path, tmp_path):
     page = tmp_path / "page.html"
     evaluate_bags([path], None, page, Console(file=io.StringIO()))
-    assert "no box was on" in page.read_text()
+    assert "no fixture was on" in page.read_text()
 
 
 def test_scores_with_and_without_a_metric_stand_side_by_side(bag):

@@ -90,6 +90,17 @@ class Registry(Generic[Part]):
         self._parts[name] = checked
         return checked
 
+    def remove(self, name: str) -> None:
+        """Take away a part that the program added; its name is free again.
+
+        Raises:
+            UnknownNameError: The program added no part of this name; those that it did are listed.
+        """
+        if name not in self._own:
+            raise UnknownNameError(f"added {self.kind}", name, sorted(self._own) or ["none"])
+        self._own.remove(name)
+        del self._parts[name]
+
     def is_added(self, name: str) -> bool:
         """Whether a part was added by this program."""
         return name in self._own
