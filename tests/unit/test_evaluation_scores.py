@@ -13,7 +13,6 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import EvaluationError, RecordingError
-from teleop_core.evaluation.chain import STAGES
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.page import report_page
 from teleop_core.evaluation.score import key_table, keys
@@ -39,6 +38,7 @@ START_NS = 1_700_000_000 * 1_000_000_000
 # Positions of some hundred millimetres in doubles, scaled to millimetres.
 EXACT_MM = 1e-9
 EXACT_DEG = 1e-7
+STAGES = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "total")
 BOX = {"is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_center_z": -0.18,
        "fixture_size_x": 0.03, "fixture_size_y": 0.03, "fixture_size_z": 0.03}  # fmt: skip
 

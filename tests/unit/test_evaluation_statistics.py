@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from teleop_core.evaluation.accumulators import Distribution, Moments
-from teleop_core.evaluation.fixture_depth import penetration
 from teleop_core.evaluation.pairing import NONE, latest, same_stamp, same_tick
 from teleop_core.evaluation.pose_errors import pose_errors
 from teleop_core.evaluation.published import COARSE, FINE, published_for
@@ -261,16 +260,7 @@ def test_quaternion_order_is_that_of_the_package():
     assert np.allclose(rotations_from_quaternions(row[:, 3:])[0], quarter.as_matrix())
 
 
-# -- box and published figures ---------------------------------------------------------------------
-
-
-def test_penetration_is_the_distance_to_the_nearest_point_of_the_box():
-    center, size = np.array([[1.0, 2.0, 3.0]]), np.array([[2.0, 4.0, 6.0]])
-    points = center + np.array(
-        [[0.9, -1.9, 2.9], [1.5, 0, 0], [0, 2.3, 0], [1.3, 2.4, 0], [1.2, -2.4, 3.9]]
-    )
-    depth = penetration(points, np.repeat(center, 5, 0), np.repeat(size, 5, 0))
-    assert np.allclose(depth, [0, 0.5, 0.3, 0.5, np.sqrt(0.04 + 0.16 + 0.81)])
+# -- published figures ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,10 @@ Topics of the default arm have the plain names; those of an arm called ``left`` 
 The metadata name the arms under ``arms``, with blanks between them and the default one first; robot
 and seed of a further arm are in ``left/robot`` and ``left/seed``. All arms share ``diagnostics``,
 in which the nodes of an arm are called ``left/slave_sim``.
+
+Where no metadata name the arms, as in what a recorder records alone in a namespace, an arm is
+whatever measures a slave's pose: ``left/slave/measured_cp``. Then there may be no default arm with
+plain topics.
 """
 
 from collections.abc import Iterable, Iterator
@@ -11,22 +15,31 @@ from collections.abc import Iterable, Iterator
 from teleop_core.bags.reader import Bag, Series, TopicInfo
 from teleop_core.bags.reports import Report
 from teleop_core.errors import RecordingError, UnknownNameError
-from teleop_core.topics import DIAGNOSTICS, Topic
+from teleop_core.topics import DIAGNOSTICS, SLAVE_MEASURED_CP, Topic
 
 ARMS_KEY = "arms"
 _OF_ONE_ARM = {"robot", "seed"}
 
 
 def arm_names(bag: Bag) -> tuple[str, ...]:
-    """Arms of a recording, the default one first; ``("",)`` if the recording does not name them.
+    """Arms of a recording, the default one first; ``("",)`` if there is one without a name.
 
     Raises:
         RecordingError: Its metadata name an arm twice.
     """
-    names = tuple(bag.metadata.get(ARMS_KEY, "").split()) or ("",)
+    names = tuple(bag.metadata.get(ARMS_KEY, "").split()) or _measured_arms(bag)
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
         raise RecordingError(bag.path, f"names the arm {twice[0]} twice: {' '.join(names)}")
     return names
+
+
+def _measured_arms(bag: Bag) -> tuple[str, ...]:
+    """Namespaces with a measured pose of a slave; the one of plain topics is empty and first."""
+    names = [name for name, info in bag.topics.items() if info.count]
+    end = f"/{SLAVE_MEASURED_CP.name}"
+    found = [name.removesuffix(end) for name in names if name.endswith(end)]
+    is_plain = SLAVE_MEASURED_CP.name in names or not found
+    return ("",) * is_plain + tuple(sorted(found))
 
 
 def of_arm(bag: Bag, arm: str = "") -> Bag:
@@ -44,9 +57,13 @@ def of_arm(bag: Bag, arm: str = "") -> Bag:
     if arm and arm not in arms:
         known = list(filter(None, arms)) or ["'' (the recording names no arms)"]
         raise UnknownNameError(f"arm of {bag.path}", arm, known)
-    if len(arms) == 1:
+    wanted = arm or arms[0]
+    has_default = ARMS_KEY in bag.metadata or not arms[0]
+    prefixes = {name: f"{name}/" for name in arms} | ({arms[0]: ""} if has_default else {})
+    if prefixes == {wanted: ""}:
         return bag
-    return _ArmBag(bag, "" if arm in {"", arms[0]} else f"{arm}/", arms[1:])
+    others = tuple(prefix for prefix in prefixes.values() if prefix)
+    return _ArmBag(bag, prefixes[wanted], others, has_default=has_default)
 
 
 class _ArmBag(Bag):
@@ -55,12 +72,15 @@ class _ArmBag(Bag):
     Args:
         bag: The whole recording.
         prefix: What stands before the names of the arm; empty for the default one.
-        further: Names of all arms but the default one.
+        others: What stands before the names of all arms but the default one.
+        has_default: Whether there is a default arm, which texts without an arm are about.
     """
 
-    def __init__(self, bag: Bag, prefix: str, further: tuple[str, ...]) -> None:
-        self._bag, self._prefix = bag, prefix
-        self._others = tuple(f"{arm}/" for arm in further)
+    def __init__(
+        self, bag: Bag, prefix: str, others: tuple[str, ...], *, has_default: bool
+    ) -> None:
+        self._bag, self._prefix, self._others = bag, prefix, others
+        self._foreign = _OF_ONE_ARM if has_default else set[str]()
         self.path, self.start_ns, self.end_ns = bag.path, bag.start_ns, bag.end_ns
         self.topics: dict[str, TopicInfo] = {}
         for name, info in bag.topics.items():
@@ -74,7 +94,7 @@ class _ArmBag(Bag):
         common = texts if self._prefix else {}
         own = {self._plain(name): text for name, text in texts.items()}
         return {
-            **{name: text for name, text in common.items() if name not in _OF_ONE_ARM},
+            **{name: text for name, text in common.items() if name not in self._foreign},
             **{name: text for name, text in own.items() if name is not None},
         }
 
