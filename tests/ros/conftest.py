@@ -229,10 +229,10 @@ class Peer:
         wait_until(lambda: own.get_subscription_count() >= readers, f"readers of {topic.name}")
         return own
 
-    def send(self, topic: Topic, stamp_ns: int, values: Any) -> None:
-        """Publish one message as our own nodes would."""
+    def send(self, topic: Topic, stamp_ns: int, values: Any, readers: int = 1) -> None:
+        """Publish one message as our own nodes would, once that many subscriptions are there."""
         data = layout(topic, JOINTS).encode_one(stamp_ns, np.asarray(values, np.float64))
-        self.publisher(topic).publish(data)
+        self.publisher(topic, readers).publish(data)
 
     # -- services --------------------------------------------------------------------------------
 

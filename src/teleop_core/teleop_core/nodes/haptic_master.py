@@ -13,7 +13,7 @@ from teleop_core.parameters import parameter
 from teleop_core.session.runner import state_report
 from teleop_core.signals import STATE_FIELDS
 from teleop_core.stage import Stage
-from teleop_core.topics import MASTER_SERVO_CF, TELEOP_STATE
+from teleop_core.topics import MASTER_SERVO_CF, TELEOP_STATE, Topic
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +54,15 @@ class HapticMasterNode(TickingNode):
         """Stop listening to the state."""
         self._state.close()
 
+    def read_ports(self, trigger: Topic | None = None) -> None:
+        """Bring the signals up to date; a source of force that fell silent adds none."""
+        for entry in self.inputs[MASTER_SERVO_CF.name]:
+            if entry.age() > self.parameters.force_timeout:
+                entry.zero()
+        super().read_ports(trigger)
+
     def advance(self, now_ns: int) -> None:
-        """Take the sample of one tick; without a fresh force none acts, at first the hand rests."""
-        if self.input(MASTER_SERVO_CF).age() > self.parameters.force_timeout:
-            self._force[:] = 0.0
+        """Take the sample of one tick; at first the hand rests."""
         if self._has_begun or self._begins(now_ns):
             super().advance(now_ns)
 

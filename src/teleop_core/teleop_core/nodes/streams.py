@@ -234,6 +234,10 @@ class Input:
         self.stamp_ns = None
         self.arrival_ns = 0
 
+    def zero(self) -> None:
+        """Write zeros in place of the newest values, as for a force that ended."""
+        self._target[:] = 0.0
+
     def publishers(self) -> int:
         """How many publishers the topic has now."""
         return self._node.count_publishers(self._name)  # type: ignore[no-any-return]

@@ -1,0 +1,89 @@
+"""Arms as nodes: namespaces keep parameters and topics apart; two arms make one recording."""
+
+import io
+
+import numpy as np
+import pytest
+from rcl_interfaces.srv import GetParameters
+from rich.console import Console
+
+from teleop_core import topics
+from teleop_core.bags.reader import Bag
+from teleop_core.evaluation import scores
+from teleop_core.nodes.live import live
+from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
+
+pytestmark = pytest.mark.ros
+
+MS = 1_000_000
+REST = [0.0, -0.06, -0.08, 1.0, 0.0, 0.0, 0.0]
+LEFT_JOINTS = topics.SLAVE_MEASURED_JS.of_arm("left")
+LEFT_MASTER = topics.MASTER_MEASURED_CP.of_arm("left")
+
+
+def test_a_node_in_a_namespace_keeps_the_parameters_that_a_file_gives_its_bare_name(peer):
+    peer.start("slave_sim", arm="left", robot="puma560", command_timeout=0.25)
+    request = GetParameters.Request(names=["robot", "command_timeout"])
+    robot, timeout = peer.call(GetParameters, "/left/slave_sim/get_parameters", request).values
+    assert robot.string_value == "puma560"
+    assert timeout.double_value == 0.25
+
+
+def test_a_node_in_a_namespace_publishes_and_reports_below_it(peer):
+    inside, outside = peer.listen(LEFT_JOINTS), peer.listen(topics.SLAVE_MEASURED_JS)
+    peer.start("slave_sim", arm="left", robot="puma560")
+    peer.wait(lambda: inside.take() > 100, "left/slave/measured_js")
+    np.testing.assert_allclose(inside.values[0][:6], load_robot("puma560").home, atol=1e-3)
+    assert outside.take() == 0
+    assert set(peer.observer.statuses) == {"left/slave_sim"}
+
+
+def test_a_refused_parameter_of_a_node_in_a_namespace_is_named_with_it(peer):
+    node = peer.start("slave_sim", wait="", arm="left", command_timeout=50.0)
+    assert node.wait() == 2
+    assert "left/slave_sim.command_timeout is 50.0" in node.stderr.read_text()
+
+
+def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer, tmp_path):
+    recorder = peer.start("recorder", arm="left", out=str(tmp_path / "bag"))
+    stamp = 0
+
+    def heard():
+        nonlocal stamp
+        stamp += MS
+        peer.send(LEFT_MASTER, stamp, REST)
+        peer.send(topics.MASTER_MEASURED_CP, stamp, [0.1, *REST[1:]], readers=0)
+        return peer.status("left/recorder").number(f"received.{LEFT_MASTER.name}") > 100
+
+    peer.wait(heard, "samples at the recorder")
+    assert recorder.end() == 0
+    bag = Bag(tmp_path / "bag")
+    streams = {name for name in bag.topics if bag.topics[name].count}
+    assert streams == {LEFT_MASTER.name, topics.DIAGNOSTICS.name}
+    assert all(name.startswith("left/") for name in {*bag.topics} - {topics.DIAGNOSTICS.name})
+    assert (bag.read(LEFT_MASTER).values == REST).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_composed", [False, True], ids=["processes", "composed"])
+def test_two_arms_are_recorded_together_and_scored_one_by_one(tmp_path, is_composed):
+    show = Console(file=io.StringIO(), width=200)
+    settings = ["teleop.arms=[right, left]", "left/robot=puma560", "teleop.duration=4.0",
+                "operator.approach_time=1.0"]  # fmt: skip
+    live(
+        configure("coarse_box", settings=settings), tmp_path / "bag", show, is_composed=is_composed
+    )
+    assert all(f"{arm}slave_sim is ready" in show.file.getvalue() for arm in ("", "left/"))
+    bag = Bag(tmp_path / "bag")
+    for arm, robot in (("", "rcrt1"), ("left", "puma560")):
+        assert all(bag.topics[t.of_arm(arm).name].count > 300 for t in topics.STREAMS), arm
+        measured = bag.read(topics.SLAVE_MEASURED_JS.of_arm(arm))
+        home = load_robot(robot).home
+        assert measured.names == load_robot(robot).joint_names
+        np.testing.assert_allclose(measured.values[0][:6], home, atol=1e-3)
+        assert np.abs(measured.values[-1][:6] - home).max() > 1e-3
+    right, left = scores(bag)
+    assert (right.session.arm, right.session.robot) == ("right", "rcrt1")
+    assert (left.session.arm, left.session.robot) == ("left", "puma560")
+    assert min(right.session.duration_s, left.session.duration_s) > 3.0
