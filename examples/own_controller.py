@@ -1,0 +1,58 @@
+"""Control the slave's joints by a law of your own: PD that feeds the setpoint's speed forward."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import teleop_core as tc
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FollowingParameters:
+    """What ``--set controller.following.bandwidth=...`` sets."""
+
+    bandwidth: float = tc.parameter(80.0, unit="rad/s", lower=1.0, upper=200.0, doc="double pole")
+
+
+def gains(parameters: FollowingParameters, robot: tc.Robot, viscous: Array) -> Array:
+    """Kp, Kd and viscous friction of each joint, (n, 3)."""
+    assert robot.drives is not None
+    inertia, pole = robot.drives.inertia, parameters.bandwidth
+    return np.stack((pole**2 * inertia, 2.0 * pole * inertia, viscous), axis=1)
+
+
+@tc.kernel
+def control(
+    gains: Array, memory: Array, setpoint: Array, measured: Array, feedforward: Array,
+    limit: Array, dt: float, effort: Array,
+) -> None:  # fmt: skip
+    """Pull to the setpoint and to its speed; memory holds the last setpoint and error."""
+    for i in range(effort.shape[0]):
+        error = setpoint[i] - measured[i]
+        speed = (setpoint[i] - memory[i, 0]) / dt
+        memory[i, 2] += ((error - memory[i, 1]) / dt - memory[i, 2]) / 4.0
+        effort[i] = gains[i, 0] * error + gains[i, 1] * memory[i, 2]
+        effort[i] += gains[i, 2] * speed + feedforward[i]
+        memory[i, 0], memory[i, 1] = setpoint[i], error
+
+
+def begin(memory: Array, measured: Array, effort: Array) -> None:
+    """Start at rest, with no error."""
+    memory[:, 0] = measured
+
+
+def main() -> None:
+    """Print the slave's position error with each law."""
+    following = tc.Controller("following", FollowingParameters, gains, control, 3, begin)
+    for law in ("pid", "pd", following):
+        settings = {"gravity_compensation": "all"}
+        score = tc.run("coarse_box", duration=15.0, controller=law, settings=settings).score()
+        name = law if isinstance(law, str) else law.name
+        print(f"{name}: {score.value('position_error_mm.rms'):.3f} mm RMS")
+
+
+if __name__ == "__main__":
+    main()

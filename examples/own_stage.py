@@ -1,0 +1,68 @@
+"""Put a stage of your own between two others: no pose moves faster than a limit.
+
+It stands between motion_scaling and inverse_kinematics, and nothing else changes: it says which
+topic it answers to and that its readers read its answer in that topic's place.
+"""
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+import teleop_core as tc
+from teleop_core.topics import SLAVE_SERVO_CP, passed_on
+
+LIMITED = tc.Topic("slave/limited_cp", tc.Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitParameters:
+    """What ``--set velocity_limit.speed=...`` sets."""
+
+    speed: float = tc.parameter(0.02, unit="m/s", lower=1e-4, upper=10.0, doc="largest speed")
+
+
+@tc.kernel
+def limit(p: Any, s: Any, row: Any, dt: float) -> None:
+    """Go towards the pose commanded, no farther in a tick than the speed allows."""
+    wanted, limited = row.slave_servo_cp, row.slave_limited_cp
+    if s.has_begun == 0:
+        for i in range(3):
+            s.held[i] = wanted[i]
+        s.has_begun = 1
+    distance = 0.0
+    for i in range(3):
+        distance += (wanted[i] - s.held[i]) ** 2
+    share = min(1.0, p.speed * dt / max(math.sqrt(distance), 1e-12))
+    for i in range(3):
+        s.held[i] += share * (wanted[i] - s.held[i])
+        limited[i] = s.held[i]
+    for i in range(3, 7):
+        limited[i] = wanted[i]
+
+
+VELOCITY_LIMIT = tc.Stage(
+    "velocity_limit", LimitParameters, reads=(SLAVE_SERVO_CP,), writes=(LIMITED,), step=limit,
+    state=(("held", "f8", (3,)), ("has_begun", "i8")), trigger=SLAVE_SERVO_CP,
+    replaces=SLAVE_SERVO_CP,
+)  # fmt: skip
+
+
+def main() -> None:
+    """Run it as a kernel and as plain Python: the same bits, in another time."""
+    results = []
+    for stage in (VELOCITY_LIMIT, replace(VELOCITY_LIMIT, step=limit.py_func)):
+        tc.run("free_motion", duration=0.1, stages=[stage])  # what is compiled once
+        begin = time.perf_counter()
+        recording = tc.run("free_motion", duration=6.0, stages=[stage])
+        results.append(recording["slave/measured_js"].values)
+        position = recording["slave/limited_cp"][["x", "y", "z"]]
+        fastest = np.linalg.norm(np.diff(position, axis=0), axis=1).max() / 1e-3
+        print(f"fastest command {1e3 * fastest:.2f} mm/s, {time.perf_counter() - begin:.1f} s")
+    print("same bits:", np.array_equal(results[0], results[1]))
+
+
+if __name__ == "__main__":
+    main()
