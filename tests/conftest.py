@@ -12,7 +12,7 @@ from hypothesis import settings
 settings.register_profile("teleop", deadline=None, derandomize=True, database=None)
 settings.load_profile("teleop")
 
-pytest_plugins = ["middleware_faults"]
+pytest_plugins = ["forgotten_parts", "middleware_faults"]
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 

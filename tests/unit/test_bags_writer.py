@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Chunk, MessageIndex
+from mcap.records import Channel, Chunk, Message, MessageIndex
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -77,6 +77,22 @@ def test_rosbags_reads_every_value_that_was_written(tmp_path, rng, compression):
     for topic, (stamps, values, logs) in written.items():
         rows = layout(topic, JOINTS).encode(stamps, values)
         assert found[topic.name] == [(t, r.tobytes()) for t, r in zip(logs, rows, strict=True)]
+
+
+def test_messages_of_one_time_stand_in_the_order_of_their_topics(tmp_path, rng):
+    with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
+        writer.write_block(block(rng, 0, 1000))
+    order = [topic.name for topic in topics.STREAMS]
+    with mcap_file(tmp_path / "bag").open("rb") as file:
+        stream = StreamReader(file)  # record by record, as they stand in the file
+        names, found = {}, {}
+        for record_ in stream.records:
+            if isinstance(record_, Channel):
+                names[record_.id] = record_.topic.removeprefix("/")
+            elif isinstance(record_, Message):
+                found.setdefault(record_.log_time, []).append(names[record_.channel_id])
+    assert len(found) == 1000
+    assert all(there == order for there in found.values())
 
 
 @EVERY_COMPRESSION

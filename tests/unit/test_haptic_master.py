@@ -18,7 +18,7 @@ from teleop_core.master.haptic_master import (
     HapticMaster,
     HapticMasterParameters,
 )
-from teleop_core.operators import OPERATORS, Setting
+from teleop_core.operators import OPERATORS, Setting, register_operator
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.shapes import PHASES
 from teleop_core.parameters import build
@@ -194,6 +194,15 @@ def test_tip_stops_at_the_ends_of_the_workspace():
     assert np.abs(last["master_measured_cv"][0, :3]).max() < 1e-9
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_tip_at_its_stop_is_at_rest(sign):
+    far = operator(kind="hold", center=(0.2 * sign,) * 3, approach_time=0.5, rotation=0.0)
+    master = HapticMaster(parameters(operator=far, device=QUIET, hand={"tremor_amplitude": 0.0}))
+    run(master, 2000)
+    # The hand still pulls with 20 N; what it would gather against the stop is not kept.
+    assert not master.state["speed"].any()
+
+
 def test_tip_leaves_its_stop_again():
     points = (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
     path = operator(kind="points", points=points, approach_time=0.1, period=1.5)
@@ -239,6 +248,24 @@ def test_turning_rate_is_that_of_the_stylus_in_base_axes():
     measured = signals["master_measured_cv"][1000, 3:]
     # Peak of the smooth step in its middle: 1.875 times the mean of 0.5 rad/s.
     assert np.allclose(measured, 0.9375 * about_stylus_z, rtol=0, atol=1e-3)
+
+
+def test_turning_rate_does_not_see_that_opposite_quaternions_are_one_attitude(own_parts):
+    rate = 3.0
+
+    def wrapped(times):
+        angle = (rate * times + math.pi) % (2.0 * math.pi) - math.pi
+        return np.column_stack((np.zeros((len(times), 5)), angle))
+
+    register_operator("turning", wrapped)
+    device = {**QUIET, "position_resolution": 0.0}
+    signals = run(HapticMaster(parameters(operator=operator(kind="turning"), device=device)), 3000)
+    # The stylus goes on turning where its rotation vector jumps by a revolution: twice here.
+    readings = signals["master_measured_cp"][:, 3:]
+    assert np.count_nonzero((readings[1:] * readings[:-1]).sum(axis=1) < 0.0) >= 1
+    # Twice the vector part in place of the angle: (3e-3)**2 / 24 of it.
+    expected = REST.apply((0.0, 0.0, rate))
+    assert np.allclose(signals["master_measured_cv"][500:, 3:], expected, rtol=0, atol=1e-5)
 
 
 def test_buttons_are_pressed_at_their_times():

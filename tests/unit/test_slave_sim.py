@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
+from scipy.signal import lfilter
 
 from teleop_core.errors import ParameterError
 from teleop_core.kernels import pointer
@@ -297,6 +298,16 @@ def test_measured_speed_follows_the_motion():
         bench.tick(MIDDLE + np.array([1e-3 * k * 0.5, 0, 0, 0, 0, 0]))
     # Encoder noise of a count per tick, filtered over 6 ticks: 3 mrad/s.
     assert math.isclose(bench.row["slave_measured_js"][6], 0.5, abs_tol=5e-3)
+
+
+def test_measured_speed_is_that_of_the_encoders_through_a_low_pass_of_5_ms():
+    rows, rest = wander(Bench()), np.round(ARM.home / COUNT) * COUNT
+    rate = np.diff(rows["slave_measured_js"][:, :6], axis=0, prepend=rest[np.newaxis]) / DT
+    share = DT / (DT + 5e-3)
+    expected = lfilter([share], [1.0, share - 1.0], rate, axis=0)
+    # Speeds of a count per tick, summed over the filter's memory.
+    assert np.abs(rows["slave_measured_js"][:, 6:12] - expected).max() < 1e-12
+    assert np.abs(expected).max() > 1e-3
 
 
 # Commands.

@@ -1,0 +1,22 @@
+"""Parts of a test: gone from the registries when it is over."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from teleop_core.controllers import CONTROLLERS
+from teleop_core.fixtures import FIXTURES
+from teleop_core.operators import OPERATORS
+from teleop_core.stage import STAGES
+
+REGISTRIES = (CONTROLLERS, FIXTURES, OPERATORS, STAGES)
+
+
+@pytest.fixture
+def own_parts() -> Iterator[None]:
+    """Let a test register parts, and take them away after it."""
+    yield
+    for registry in REGISTRIES:
+        for name in registry.names():
+            if registry.is_added(name):
+                registry.remove(name)
