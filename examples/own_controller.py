@@ -44,14 +44,16 @@ def begin(memory: Array, measured: Array, effort: Array) -> None:
     memory[:, 0] = measured
 
 
+FOLLOWING = tc.Controller("following", FollowingParameters, gains, control, 3, begin)
+tc.register_controller(FOLLOWING)
+
+
 def main() -> None:
     """Print the slave's position error with each law."""
-    following = tc.Controller("following", FollowingParameters, gains, control, 3, begin)
-    for law in ("pid", "pd", following):
-        settings = {"gravity_compensation": "all"}
-        score = tc.run("coarse_box", duration=15.0, controller=law, settings=settings).score()
-        name = law if isinstance(law, str) else law.name
-        print(f"{name}: {score.value('position_error_mm.rms'):.3f} mm RMS")
+    for law in ("pid", "pd", "following"):
+        recording = tc.run("coarse_box", duration=15.0, controller=law, gravity_compensation="all")
+        score = recording.score()
+        print(f"{law}: {score.value('position_error_mm.rms'):.3f} mm RMS")
 
 
 if __name__ == "__main__":

@@ -39,14 +39,16 @@ def cylinder_outline(p: CylinderParameters) -> Array:
     return np.concatenate(ends)
 
 
+CYLINDER = tc.Fixture("cylinder", CylinderParameters, cylinder_depth, cylinder_outline)
+tc.register_fixture(CYLINDER)
+
+
 def main() -> None:
     """Print how far hand and slave went through the wall of box, sphere and cylinder."""
-    cylinder = tc.Fixture("cylinder", CylinderParameters, cylinder_depth, cylinder_outline)
-    for fixture in ("box", "sphere", cylinder):
+    for fixture in ("box", "sphere", "cylinder"):
         recording = tc.run("coarse_box", duration=20.0, fixture=fixture)
         depth = recording.score().value("fixture.penetration_max_mm")
-        name = fixture if isinstance(fixture, str) else fixture.name
-        print(f"{name}: slave at most {depth:.2f} mm through the wall")
+        print(f"{fixture}: slave at most {depth:.2f} mm through the wall")
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ DAMPING = tc.Stage(
     "hand_damping", DampingParameters, reads=(MASTER_MEASURED_CP, MASTER_MEASURED_CV),
     writes=(DAMPING_CF,), step=damp, trigger=MASTER_MEASURED_CP,
 )  # fmt: skip
+tc.register_stage(DAMPING)
 
 
 def main() -> None:

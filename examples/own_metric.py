@@ -31,11 +31,14 @@ class JerkMetric(tc.Metric):
         return self._jerk.spread()
 
 
+tc.register_metric(JerkMetric)
+
+
 def main() -> None:
     """Print the jerk with the reference filter and without it."""
     for is_on in (True, False):
         recording = tc.run("coarse_box", duration=15.0, reference_filter__is_on=is_on)
-        score = recording.score(further=[JerkMetric])
+        score = recording.score()
         print(f"filter {'on' if is_on else 'off'}: {score.value('jerk.rms'):.1f} m/s³ RMS")
 
 

@@ -24,14 +24,17 @@ TABLE = {
 }
 
 
+GANTRY = tc.register_robot(tc.robot_from_table(TABLE))
+
+
 def main() -> None:
     """Print what the robot is and how well it follows."""
-    robot = tc.robot_from_table(TABLE)
+    robot = tc.load_robot("gantry")
     tip = robot.fk(robot.home)
     answer = robot.ik(tip, seed=robot.home)
     print(robot.name, robot.joint_names, "tip at", np.round(tip[:3, 3], 3))
     print(f"joints that reach its home: {np.round(answer.q, 6)}, {answer.status.name}")
-    score = tc.run("coarse_box", duration=15.0, robot=robot).score()
+    score = tc.run("coarse_box", duration=15.0, robot="gantry").score()
     print(f"{robot.name}: {score.value('position_error_mm.rms'):.3f} mm RMS behind its reference")
 
 

@@ -48,6 +48,7 @@ VELOCITY_LIMIT = tc.Stage(
     state=(("held", "f8", (3,)), ("has_begun", "i8")), trigger=SLAVE_SERVO_CP,
     replaces=SLAVE_SERVO_CP,
 )  # fmt: skip
+tc.register_stage(VELOCITY_LIMIT)
 
 
 def main() -> None:
@@ -56,7 +57,7 @@ def main() -> None:
     for stage in (VELOCITY_LIMIT, replace(VELOCITY_LIMIT, step=limit.py_func)):
         tc.run("free_motion", duration=0.1, stages=[stage])  # what is compiled once
         begin = time.perf_counter()
-        recording = tc.run("free_motion", duration=6.0, stages=[stage])
+        recording = tc.run("free_motion", duration=3.0, stages=[stage])
         results.append(recording["slave/measured_js"].values)
         position = recording["slave/limited_cp"][["x", "y", "z"]]
         fastest = np.linalg.norm(np.diff(position, axis=0), axis=1).max() / 1e-3
