@@ -1,0 +1,152 @@
+"""Write what documents say about the code from the code: parameters, topics, scores, the diagram.
+
+python docs/generate.py            write the pages
+python docs/generate.py --check    say which of them differ, and fail if one does
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from teleop_core.evaluation import key_table
+from teleop_core.graph import Graph, Link, build_graph
+from teleop_core.session.configuration import declared_groups, parameter_rows
+from teleop_core.topics import DIAGNOSTICS, Kind, Topic
+
+ROOT = Path(__file__).resolve().parents[1]
+NOTE = "<!-- Written by docs/generate.py; change the code, not this page. -->"
+BEGIN, END = "<!-- graph: written by docs/generate.py -->", "<!-- end of graph -->"
+VALUES = {
+    Kind.POSE: "x, y, z [m], quaternion w, x, y, z",
+    Kind.TWIST: "linear x, y, z [m/s], angular x, y, z [rad/s]",
+    Kind.WRENCH: "force x, y, z [N], torque x, y, z [N·m]",
+    Kind.BUTTONS: "clutch, fixture, mode; 1 pressed",
+    Kind.JOINTS: "position of each joint [rad or m]",
+    Kind.STATE: "position, velocity, effort of all joints",
+}
+
+
+def parameters_page() -> str:
+    """All parameters, group by group."""
+    parts = [
+        "# Parameters",
+        "`teleop parameters` prints them; `--set NAME=VALUE` changes them, by the full name or by "
+        "its end, which sets every stage that has it: `--set robot=puma560`. Parts of your own add "
+        "theirs. *Fixed* ones can be set before a session alone, all others while nodes run too.",
+    ]
+    for group in declared_groups():
+        rows = [f"| `{name}` | {default} | {allowed} | {text} |"
+                for name, default, allowed, text in parameter_rows([group])]  # fmt: skip
+        head = ["| parameter | default | allowed | meaning |", "|---|---|---|---|"]
+        parts += [f"## {group}", "\n".join([*head, *rows])]
+    return page(parts)
+
+
+def topics_page(graph: Graph) -> str:
+    """All topics of an arm with their writers and readers."""
+    rows = [
+        "| topic | message | values | written by | read by | stamp |",
+        "|---|---|---|---|---|---|",
+    ]
+    for member in graph.members:
+        for topic in member.writes:
+            rows.append(topic_row(topic, member.name, graph))
+    rows.append(topic_row(DIAGNOSTICS, "every node", graph))
+    return page([
+        "# Topics",
+        "CRTK names, standard messages, SI units. Streams are best effort with a queue of one, "
+        "`teleop/state` is latched, `diagnostics` comes once a second. The recorder takes all of "
+        "them. Those of a further arm stand below its name: `left/slave/servo_cp`.",
+        "\n".join(rows),
+        "*Late*: the reader takes what was there at the end of the last tick. *In force*: the "
+        "stamp of the command that the slave follows; 0 before the first one.",
+        "[How a sample travels](how_a_sample_travels.md) shows them as a picture.",
+    ])  # fmt: skip
+
+
+def topic_row(topic: Topic, writer: str, graph: Graph) -> str:
+    """One topic as a row of the table."""
+    links = [link for link in graph.links if link.topic == topic]
+    readers = ", ".join(link.reader.name + " (late)" * link.is_late for link in links) or "–"
+    values = VALUES.get(topic.kind) or ", ".join(topic.columns) or "key-value pairs"
+    message = topic.kind.ros_type.replace("/msg/", "/")
+    return f"| `{topic.name}` | {message} | {values} | {writer} | {readers} | {topic.stamp.text} |"
+
+
+def scores_page() -> str:
+    """All keys of a score."""
+    return page([
+        "# Scores",
+        "Keys of `teleop evaluate --json` and of `Score.value(key)`. A metric of your own adds its "
+        "keys. Null stands for what does not apply, such as the penetration of a fixture that was "
+        "never on.",
+        key_table(),
+    ])  # fmt: skip
+
+
+def page(parts: list[str]) -> str:
+    """Page of some paragraphs, the heading first."""
+    return "\n\n".join([parts[0], NOTE, *parts[1:]]) + "\n"
+
+
+def diagram(graph: Graph) -> str:
+    """The graph as a Mermaid diagram; dotted: what is late by a tick."""
+    lines = ["```mermaid", "flowchart LR", "  operator([operator]) --> haptic_master"]
+    pairs: dict[tuple[str, str, bool], list[Link]] = {}
+    for link in graph.links:
+        pairs.setdefault((link.writer.name, link.reader.name, link.is_late), []).append(link)
+    for (writer, reader, is_late), links in pairs.items():
+        label = "<br/>".join(link.topic.name for link in links)
+        arrow = f'-. "{label}" .->' if is_late else f'-- "{label}" -->'
+        lines.append(f"  {writer} {arrow} {reader}")
+    for member in graph.members:
+        unread = [t for t in member.writes if all(link.topic != t for link in graph.links)]
+        if unread:
+            lines.append(
+                f'  {member.name} -- "{"<br/>".join(t.name for t in unread)}" --> recorder'
+            )
+    lines += ["  recorder[(recorder)] --> evaluate", "  recorder --> replay", "```"]
+    return "\n".join(lines)
+
+
+def with_diagram(text: str, graph: Graph) -> str:
+    """A document with the diagram between its markers."""
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise SystemExit(f"a document must hold {BEGIN} and {END}")
+    return f"{before}{BEGIN}\n{diagram(graph)}\n{END}{after}"
+
+
+def pages() -> Iterator[tuple[Path, str]]:
+    """Every generated document with what it must hold."""
+    graph, docs = build_graph(), ROOT / "docs"
+    yield docs / "parameters.md", parameters_page()
+    yield docs / "topics.md", topics_page(graph)
+    yield docs / "scores.md", scores_page()
+    for path in (ROOT / "README.md", docs / "how_a_sample_travels.md"):
+        yield path, with_diagram(path.read_text(encoding="utf-8"), graph)
+
+
+def main() -> int:
+    """Write the pages, or check them; returns the exit code."""
+    parser = argparse.ArgumentParser(description="Write the generated pages of the documents.")
+    parser.add_argument("--check", action="store_true", help="write nothing, fail if one differs")
+    is_check = parser.parse_args().check
+    stale = []
+    for path, text in pages():
+        before = path.read_text(encoding="utf-8") if path.exists() else ""
+        if before != text:
+            stale.append(path.relative_to(ROOT).as_posix())
+            if not is_check:
+                path.write_text(text, encoding="utf-8")
+    for name in stale:
+        print(
+            f"{name}: {'is not what the code says; run docs/generate.py' * is_check or 'written'}"
+        )
+    return int(is_check and bool(stale))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
