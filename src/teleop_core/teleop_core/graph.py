@@ -289,6 +289,8 @@ def build_graph(
         TeleopError: A name is unknown or used twice, or the graph cannot run.
     """
     names = (*BUILT_IN, *stages)
+    if RECORDER_NAME in names:
+        raise PartError("stage", RECORDER_NAME, "left out of the stages; it is always there")
     return Graph(
         tuple(STAGES.find(name) for name in names),
         tuple(arms) or ("",),

@@ -14,7 +14,7 @@ import numpy as np
 
 from teleop_core.graph import Graph, Link, Member
 from teleop_core.kernels import bound, is_kernel, kernel_from_source, raise_pending, records
-from teleop_core.signals import add, assign, copy, topic_fields
+from teleop_core.signals import add, copy, topic_fields
 from teleop_core.stage import Runner
 
 __all__ = ["Tick", "block_dtype", "compose"]
@@ -35,51 +35,68 @@ def block_dtype(graph: Graph, joints: Mapping[str, int]) -> Any:
     return np.dtype((np.record, np.dtype(fields)))
 
 
+Segment = list[str]
+"""Lines of source that become one kernel."""
+Call = Callable[[], None]
+
+
 @dataclass
 class _Text:
-    """Source being written, with the objects that it names."""
+    """Source being written: segments, and between them calls of plain stages."""
 
-    lines: list[str] = field(default_factory=list)
-    segments: list[list[str] | int] = field(default_factory=list)
+    parts: list[Segment | Call] = field(default_factory=lambda: [[]])
     objects: dict[str, Any] = field(default_factory=dict)
 
     def say(self, *lines: str) -> None:
-        self.lines += lines
+        """Add lines to the present segment."""
+        segment = self.parts[-1]
+        assert isinstance(segment, list)
+        segment += lines
 
-    def cut(self, number: int) -> None:
-        """End a segment: here the plain stage of this number is called."""
-        self.segments += [self.lines, number]
-        self.lines = []
+    def call(self, call: Call) -> None:
+        """End the segment with the call of a plain stage."""
+        self.parts += [call, []]
+
+
+_CLOCK = [("first_ns", "i8"), ("tick_ns", "i8"), ("count", "i8")]
 
 
 class Tick:
     """The composed tick: :meth:`run` it over rows.
 
+    Kernels are bound once to buffers of this object: looking at the types of all that a tick is
+    given would take as long as a hundred ticks.
+
+    Args:
+        text: What was said of the graph.
+        dtype: Record of :func:`block_dtype`.
+        dt: Length of a tick [s].
+        size: Ticks that are made at once, at most.
+
     Attributes:
         source: The generated source, for the curious.
     """
 
-    def __init__(
-        self, text: _Text, plain: dict[int, Callable[[], None]], dtype: Any, dt: float
-    ) -> None:
-        self._plain, self._dt = plain, dt
-        self._row = records(dtype)[0]
-        names = tuple(text.objects)
-        self._values = tuple(text.objects.values())
-        kernels = {n: v for n, v in text.objects.items() if is_kernel(v)}
-        given = [name for name in names if name not in kernels]
-        parts = [*text.segments, text.lines]
-        texts = [
-            _loop(given, lines, has_loop=not plain) for lines in parts if not isinstance(lines, int)
-        ]
-        self.source = "\n\n".join(texts)
-        made = iter(
-            [kernel_from_source(t, "tick", {**kernels, "copy": copy, "add": add}) for t in texts]
-        )
-        self._steps: list[Callable[..., Any] | int] = [
-            part if isinstance(part, int) else next(made) for part in parts
-        ]
-        self._arguments = tuple(text.objects[name] for name in given)
+    def __init__(self, text: _Text, dtype: Any, dt: float, size: int) -> None:
+        self._is_whole = len(text.parts) == 1
+        self._size = size if self._is_whole else 1
+        self._clock = records(_CLOCK)[0]
+        self._samples, self._rows = records(dtype, self._size), records(dtype, self._size)
+        kernels = {name: value for name, value in text.objects.items() if is_kernel(value)}
+        given = [name for name in text.objects if name not in kernels]
+        arguments = tuple(text.objects[name] for name in given)
+        known = {**kernels, "copy": copy, "add": add}
+        sources = [_source(given, part) for part in text.parts if isinstance(part, list)]
+        self.source = "\n\n".join(sources)
+        made = iter(sources)
+        self._calls: list[Callable[[], object]] = [
+            bound(
+                kernel_from_source(next(made), "tick", known),
+                arguments, self._clock, dt, self._samples, self._rows,
+            )
+            if isinstance(part, list) else part
+            for part in text.parts
+        ]  # fmt: skip
 
     def run(self, first_ns: int, tick_ns: int, samples: Any, block: Any) -> None:
         """Make one tick for each row of ``block``, which is filled.
@@ -87,45 +104,36 @@ class Tick:
         Args:
             first_ns: Time of the first tick [ns].
             tick_ns: From tick to tick [ns].
-            samples: Recorded rows in place of stages that are played, as long as ``block``.
+            samples: Recorded rows in place of stages that are played, as long as ``block``; None
+                where none is.
             block: Rows of :func:`block_dtype`.
-        """
-        if not self._plain:
-            self._steps[0](self._arguments, first_ns, tick_ns, self._dt, samples, block)  # type: ignore[operator]
-            raise_pending()
-            return
-        self._run_plain(first_ns, tick_ns, samples, block)
 
-    def _run_plain(self, first_ns: int, tick_ns: int, samples: Any, block: Any) -> None:
-        clock, row, sample = records([("now_ns", "i8")])[0], self._row, samples[0].copy()
-        calls = [
-            self._plain[step] if isinstance(step, int)
-            else bound(step, self._arguments, clock, self._dt, sample, row)
-            for step in self._steps
-        ]  # fmt: skip
-        for i in range(len(block)):
-            clock["now_ns"] = first_ns + i * tick_ns
-            assign(sample, samples[min(i, len(samples) - 1)])
-            for call in calls:
+        Raises:
+            Exception: What a part in plain Python raised.
+        """
+        clock = self._clock
+        clock["tick_ns"] = tick_ns
+        for begin in range(0, len(block), self._size):
+            part = block[begin : begin + self._size]
+            clock["first_ns"], clock["count"] = first_ns + begin * tick_ns, len(part)
+            if samples is not None:
+                self._samples[: len(part)] = samples[begin : begin + len(part)]
+            for call in self._calls:
                 call()
             raise_pending()
-            block[i] = row
+            part[:] = self._rows[: len(part)]
 
 
-def _loop(given: Sequence[str], lines: Sequence[str], *, has_loop: bool) -> str:
-    """Source of one segment; alone, it loops over the rows itself."""
-    unpacked = [f"    {name} = given[{i}]" for i, name in enumerate(given)]
-    if not has_loop:
-        head = ["def tick(given, clock, dt, sample, row):", *unpacked, "    now_ns = clock.now_ns"]
-        return "\n".join([*head, *(f"    {line}" for line in lines), "    row.now_ns = now_ns"])
+def _source(given: Sequence[str], lines: Sequence[str]) -> str:
+    """Source of one segment: a loop over the rows."""
     head = [
-        "def tick(given, first_ns, tick_ns, dt, samples, block):", *unpacked,
-        "    for i in range(block.shape[0]):",
-        "        now_ns = first_ns + i * tick_ns",
-        "        row = block[i]",
-        "        sample = samples[min(i, samples.shape[0] - 1)]",
+        "def tick(given, clock, dt, samples, rows):",
+        *(f"    {name} = given[{i}]" for i, name in enumerate(given)),
+        "    for i in range(clock.count):",
+        "        now_ns = clock.first_ns + i * clock.tick_ns",
+        "        row, sample = rows[i], samples[i]",
         "        row.now_ns = now_ns",
-    ]  # fmt: skip
+    ]
     return "\n".join([*head, *(f"        {line}" for line in lines)])
 
 
@@ -134,6 +142,7 @@ def compose(
     runners: Mapping[str, Runner],
     dtype: Any,
     dt: float,
+    size: int,
     played: frozenset[str] = frozenset(),
 ) -> Tick:
     """Tick of a graph.
@@ -143,9 +152,10 @@ def compose(
         runners: Stages at work, by the names of their members.
         dtype: Record of :func:`block_dtype`.
         dt: Length of a tick [s].
+        size: Ticks that are made at once, at most.
         played: Members whose topics come from recorded samples; they need no runner.
     """
-    text, plain = _Text(), {}
+    text = _Text()
     places = {member.name: i for i, member in enumerate(graph.members)}
     for number, member in enumerate(graph.members):
         if member.name in played:
@@ -160,10 +170,9 @@ def compose(
             _say_link(text, link, places, runners, played, dt)
         text.say(f"r{number}.now_ns = now_ns")
         if not is_compiled:
-            text.cut(number)
-            plain[number] = _caller(member, runner, dt)
+            text.call(_caller(member, runner, dt))
         _say_step(text, number, member, len(runner.arguments), is_compiled=is_compiled)
-    return Tick(text, plain, dtype, dt)
+    return Tick(text, dtype, dt, size)
 
 
 def _say_played(text: _Text, member: Member) -> None:

@@ -44,8 +44,10 @@ class VirtualTime:
         self.joint_names = {arm: self._joints(groups, arm) for arm in self.graph.namespaces}
         joints = {arm: len(names) for arm, names in self.joint_names.items()}
         self._dtype = block_dtype(self.graph, joints)
-        self._tick: Tick = compose(self.graph, self.stages, self._dtype, dt, self._played)
         self._ahead = min([BLOCK, *(stage.ahead for stage in self.stages.values())])
+        self._tick: Tick = compose(
+            self.graph, self.stages, self._dtype, dt, self._ahead, self._played
+        )
         self.now_ns = 0
 
     def _joints(self, groups: dict[str, Any], arm: str) -> tuple[str, ...]:
@@ -76,7 +78,7 @@ class VirtualTime:
         Raises:
             TeleopError: A part cannot go on.
         """
-        return self._run(ticks, self.rows(1))
+        return self._run(ticks, None)
 
     def replay(self, samples: Any) -> Any:
         """Ticks with recorded samples in place of the simulated masters.
@@ -97,7 +99,7 @@ class VirtualTime:
             part = block[begin : begin + self._ahead]
             for stage in self.stages.values():
                 stage.prepare(len(part))
-            taken = samples[begin : begin + self._ahead] if self._played else samples
+            taken = None if samples is None else samples[begin : begin + self._ahead]
             self._tick.run(self.now_ns + self._tick_ns, self._tick_ns, taken, part)
             self.now_ns += len(part) * self._tick_ns
         return block
