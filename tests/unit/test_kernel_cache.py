@@ -234,6 +234,23 @@ def test_kernel_without_a_source_file_works_and_leaves_nothing_on_the_disk(tmp_p
     assert not list(tmp_path.rglob("*factor*"))
 
 
+def test_kept_kernels_of_a_file_serve_it_under_one_module_name_only(tmp_path):
+    load = """
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+
+spec = spec_from_file_location("first", "inner.py")
+module = sys.modules["first"] = module_from_spec(spec)
+spec.loader.exec_module(module)
+print(module.factor(3.0))
+print(sum(module.factor.stats.cache_hits.values()))
+"""
+    folder = write_all(tmp_path, {"inner.py": CALLS["inner.py"], "outer.py": load})
+    assert [run(folder), run(folder)] == [([6.0], 0), ([6.0], 1)]
+    write(folder / "outer.py", load.replace("first", "second"))
+    assert [run(folder), run(folder)] == [([6.0], 0), ([6.0], 1)]
+
+
 def test_versions_of_numba_in_setup_are_those_that_the_kernels_are_written_for():
     from teleop_core.kernels.numba_private import SUPPORTED
 

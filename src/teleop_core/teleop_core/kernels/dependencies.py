@@ -58,7 +58,9 @@ class _Own:
 def _own(function: FunctionType) -> _Own:
     tokens = Tokens()
     code = function.__code__
-    parts = [function.__qualname__, source_digest(code.co_filename) or _code_digest(code)]
+    # What is kept names its module, and cannot be loaded where the file has another name.
+    parts = [function.__module__ or "", function.__qualname__]
+    parts.append(source_digest(code.co_filename) or _code_digest(code))
     parts.append(tokens.of(function.__defaults__))
     parts.extend(tokens.of(cell.cell_contents) for cell in function.__closure__ or ())
     names = frozenset(_names_in(code))
