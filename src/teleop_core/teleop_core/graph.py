@@ -115,6 +115,7 @@ class Graph:
                 text = "a name of letters, digits and _ that does not begin with a digit"
                 raise PartError("arm", arm, text)
         self._check_writers()
+        self._check_fields()
         self._check_delays()
         _ = self.members
 
@@ -144,6 +145,17 @@ class Graph:
                     have = ", ".join(sorted(writers)) or "nothing"
                     text = f"given {topic.name}, which no stage writes; there is {have}"
                     raise PartError("stage", stage.name, text)
+
+    def _check_fields(self) -> None:
+        """Refuse two topics or notes that would share a column of the rows of a session."""
+        owners: dict[str, str] = {}
+        for stage in self.stages:
+            fields = [name for t in stage.writes for name in (t.field, f"{t.field}_ns")]
+            for name in [*fields, *(note[0] for note in stage.notes)]:
+                if name in owners:
+                    text = f"one without the topic or note {name}, a name that {owners[name]} uses"
+                    raise PartError("stage", stage.name, text)
+                owners[name] = stage.name
 
     def _adding(self, topic: Topic) -> list[tuple[Stage, Topic]]:
         """Other topics that are added to this one, with who writes them."""

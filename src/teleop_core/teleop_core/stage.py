@@ -5,8 +5,11 @@ tuple of stages everything else follows: the order of a tick, the nodes, the lin
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
+from inspect import signature
 from typing import Any, Protocol
+
+import numpy as np
 
 from teleop_core.errors import PartError
 from teleop_core.kernels import bound, is_kernel, pointer, raise_pending, records
@@ -114,10 +117,27 @@ class Stage:
         if self.reads or self.writes:
             text = "with a step, step(parameters, state, signals, dt), or a make"
             self._insist(callable(self.step) is not callable(self.make), text)
+        self._check_parts()
         names = {spec.name for spec in specs(self.parameters)}
         has_joints = any(topic.kind in _WITH_JOINTS for topic in (*self.reads, *self.writes))
         text = "one whose parameters inherit RobotParameters, for it has topics with joints"
         self._insist("robot" in names or not has_joints, text)
+
+    def _check_parts(self) -> None:
+        """Refuse what has not the form that is asked for."""
+        self._insist(is_dataclass(self.parameters), "one whose parameters are a dataclass")
+        if self.step is not None:
+            takes = "one whose step takes four arguments, step(parameters, state, signals, dt)"
+            try:
+                signature(getattr(self.step, "py_func", self.step)).bind(*range(4))
+            except TypeError as error:
+                raise PartError("stage", self.name, f"{takes} ({error})") from error
+        for word, fields in (("state", self.state), ("notes", self.notes)):
+            try:
+                np.dtype(list(fields))
+            except (TypeError, ValueError) as error:
+                text = f"one whose {word} is a list of fields as numpy.dtype takes it ({error})"
+                raise PartError("stage", self.name, text) from error
 
     def _insist(self, is_so: bool, expected: str) -> None:
         if not is_so:

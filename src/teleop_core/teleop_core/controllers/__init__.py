@@ -6,7 +6,7 @@ source compensates, limits of the drives and encoders belong to the slave, not t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +18,7 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import pointer
 from teleop_core.registry import Registry
 from teleop_core.robots.robot import Robot
+from teleop_core.trials import fenced, is_whole
 
 __all__ = ["CONTROLLERS", "Controller", "per_joint", "register_controller"]
 
@@ -84,6 +85,8 @@ def per_joint(robot: Robot, name: str, values: tuple[float, ...], default: Array
 def _checked(name: str, part: object) -> Controller:
     if not isinstance(part, Controller):
         raise PartError("controller", name, f"a Controller, not a {type(part).__name__}")
+    if not is_dataclass(part.parameters):
+        raise PartError("controller", name, "one whose parameters are a dataclass")
     for field in ("gains", "control", "begin", "shift"):
         if not callable(getattr(part, field)):
             raise PartError("controller", name, f"one whose {field} can be called")
@@ -91,16 +94,16 @@ def _checked(name: str, part: object) -> Controller:
 
 
 def _try(part: Controller) -> None:
-    """Try it once on two joints, so that a wrong signature is told before anything runs."""
+    """Try it once on four joints, so that what cannot work is told before anything runs."""
     from teleop_core.robots import load_robot
 
     robot = load_robot("scara")
-    n = robot.n
     try:
-        gains = np.ascontiguousarray(part.gains(part.parameters(), robot, np.zeros(n)), np.float64)
-        zero, effort, memory = np.zeros(n), np.zeros(n), np.zeros((n, max(part.memory, 1)))
-        part.begin(memory, zero, zero)
-        part.control(gains, memory, zero, zero, zero, np.ones(n), 1e-3, effort)
+        gains = np.asarray(part.gains(part.parameters(), robot, np.zeros(robot.n)), np.float64)
+        _insist_on_table(part, gains, robot.n)
+        effort, is_inside = _tried_effort(part, gains, robot.home)
+    except PartError:
+        raise
     except Exception as error:
         reason = " ".join(str(error).split())
         raise PartError(
@@ -109,9 +112,32 @@ def _try(part: Controller) -> None:
             "setpoint, measured, feedforward, limit, dt, effort), and parameters that all have "
             f"defaults; it raises {type(error).__name__}: {reason}",
         ) from error  # fmt: skip
-    if gains.ndim != 2 or len(gains) != n:
-        text = f"one whose gains have a row per joint ({n}, k), not {gains.shape}"
+    if not is_inside:
+        text = f"one that writes n efforts and no more memory than it declares, {part.memory}"
         raise PartError("controller", part.name, text)
+    if not np.isfinite(effort).all():
+        text = f"one whose efforts are finite; at rest at home they are {effort.tolist()}"
+        raise PartError("controller", part.name, text)
+
+
+def _insist_on_table(part: Controller, gains: Array, n: int) -> None:
+    """Refuse gains that are no finite table (n, k)."""
+    if gains.ndim != 2 or len(gains) != n or not np.isfinite(gains).all():
+        text = f"one whose gains have a row of finite numbers per joint ({n}, k), not {gains.shape}"
+        raise PartError("controller", part.name, text)
+
+
+def _tried_effort(part: Controller, gains: Array, home: Array) -> tuple[Array, bool]:
+    """Efforts (n,) at rest at home, and whether it wrote to what is its own alone."""
+    n = len(home)
+    memory, fence = fenced(np.zeros((n, max(part.memory, 1))))
+    effort, after = fenced(np.zeros(n))
+    table, _ = fenced(gains)
+    zero, one = np.zeros(n), np.ones(n)
+    part.begin(memory, home.copy(), zero)
+    part.shift(memory, zero)
+    part.control(table, memory, home.copy(), home.copy(), zero, one, 1e-3, effort)
+    return effort, is_whole(fence) and is_whole(after)
 
 
 CONTROLLERS: Registry[Controller] = Registry(

@@ -1,13 +1,14 @@
 """Haptic master, simulated: a Phantom Omni in the hand of an operator."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, PartError
+from teleop_core.errors import ParameterError, PartError, TeleopError
 from teleop_core.geometry import (
     Array,
     quaternion_from_rotation,
@@ -166,7 +167,7 @@ class HapticMaster(RunningStage):
         self._operator = OPERATORS.find(wanted.kind.kind)
         self.ahead = min(self._operator.ahead, BLOCK)
         setting = Setting(wanted, phases, self._fixed.seed)
-        self._motion = self._operator.make(wanted.kind.parameters, setting)
+        self._motion = self._asked(self._operator.make, wanted.kind.parameters, setting)
         self._tick, self._end = 0, 0
         self._rest = np.empty(4)
         quaternion_from_rotation(rotation("x", REST_TILT), self._rest)
@@ -226,7 +227,10 @@ class HapticMaster(RunningStage):
             PartError: What he answers has another shape, or is not finite.
         """
         name = self._fixed.operator.kind.kind
-        moves = np.asarray(self._motion(times), dtype=np.float64)
+        moves = np.asarray(self._asked(self._motion, times))
+        if moves.dtype.kind not in "fiub":
+            raise PartError("operator", name, f"one who answers numbers, not {moves.dtype}")
+        moves = moves.astype(np.float64)
         if moves.shape not in {(len(times), columns) for columns in (3, 6, 9)}:
             text = f"one who answers (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
             raise PartError("operator", name, text)
@@ -234,6 +238,22 @@ class HapticMaster(RunningStage):
             bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]
             raise PartError("operator", name, f"one who answers finite numbers; at {bad:g} s not")
         return np.pad(moves, ((0, 0), (0, 9 - moves.shape[1])))
+
+    def _asked(self, question: Callable[..., Any], *arguments: Any) -> Any:
+        """Answer of the operator.
+
+        Raises:
+            PartError: He raises; an error of ours is passed on as it is.
+        """
+        try:
+            return question(*arguments)
+        except TeleopError:
+            raise
+        except Exception as error:  # whatever a foreign operator raises, one line names him
+            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            text = "one with make(parameters, setting) -> motion and motion(times) -> rows"
+            name = self._fixed.operator.kind.kind
+            raise PartError("operator", name, f"{text}; it raises {reason}") from error
 
     def _pressed(self, times: Array) -> Array:
         buttons = self._fixed.buttons

@@ -6,7 +6,7 @@ against its mass, its tremor and the device's force.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,6 +99,10 @@ def sampled_motion(name: str, times: object, rows: object) -> Motion:
 
 def _checked(name: str, part: object) -> Operator:
     if isinstance(part, Operator):
+        if not callable(part.make) or part.ahead < 1:
+            raise PartError("operator", name, "one whose make can be called, asked >= 1 tick ahead")
+        if not is_dataclass(part.parameters):
+            raise PartError("operator", name, "one whose parameters are a dataclass")
         return part
     if callable(part):  # a motion alone: the shortest way to an own operator
         motion: Motion = part
