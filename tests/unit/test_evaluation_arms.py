@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from teleop_core.bags.arms import arm_names, of_arm
+from teleop_core.bags.arms import arm_names, of_arm, topic_prefix
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
@@ -133,6 +133,34 @@ def test_recording_without_names_of_arms_has_one_without_a_name(tmp_path):
     assert arm_names(bag) == ("",)
     assert of_arm(bag) is bag
     assert [score.session.arm for score in scores(bag)] == [""]
+
+
+def test_arm_that_was_recorded_alone_is_found_by_its_topics(tmp_path):
+    bag = Bag(write(tmp_path / "alone", {"left": 3 * MM}, {"robot": "puma560", "seed": "8"}))
+    assert arm_names(bag) == ("left",)
+    (score,) = scores(bag)
+    assert np.isclose(score.position_error_mm.max, 3.0, atol=ROUNDING)
+    assert (score.session.arm, score.session.robot, score.session.seed) == ("left", "puma560", 8)
+    assert score.nodes == {"slave_sim": {"ticks": 2000}, "play": {"ticks": 3000}}
+    assert evaluate(bag).to_json() == evaluate(bag, "left").to_json() == score.to_json()
+    assert topic_prefix(bag, "") == topic_prefix(bag, "left") == "left/"
+
+
+def test_arms_without_names_are_the_plain_one_and_those_with_topics_of_their_own(tmp_path):
+    bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": 3 * MM}, {"robot": "rcrt1"}))
+    assert arm_names(bag) == ("", "left")
+    plain, left = scores(bag)
+    assert (plain.session.arm, left.session.arm) == ("", "left")
+    assert (plain.session.robot, left.session.robot) == ("rcrt1", None)
+    assert plain.nodes == {"slave_sim": {"ticks": 1000}}
+    assert [topic_prefix(bag, arm) for arm in ("", "left")] == ["", "left/"]
+
+
+def test_topics_of_an_arm_that_measures_nothing_make_no_arm(tmp_path):
+    lost = [t.of_arm("left") for t in (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP)]
+    bag = Bag(write(tmp_path / "pair", {"": 1 * MM, "left": 3 * MM}, {}, lost=lost))
+    assert arm_names(bag) == ("",)
+    assert evaluate(bag).samples.scored == COUNT
 
 
 def test_unknown_arm_is_told_with_those_there_are(bag, tmp_path):

@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 from rich.console import Console
-from scipy.spatial.transform import Rotation
 
+from recipes import JOINTS, START_NS, Recipe, pose_rows, state
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
@@ -33,66 +33,12 @@ from teleop_core.topics import (
     TELEOP_STATE,
 )
 
-JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
-START_NS = 1_700_000_000 * 1_000_000_000
 # Positions of some hundred millimetres in doubles, scaled to millimetres.
 EXACT_MM = 1e-9
 EXACT_DEG = 1e-7
 STAGES = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "total")
 BOX = {"is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_center_z": -0.18,
        "fixture_size_x": 0.03, "fixture_size_y": 0.03, "fixture_size_z": 0.03}  # fmt: skip
-
-
-def pose_rows(count, position=(0.4, 0.0, -0.18), angles=(0.0, 66.6, 0.0)):
-    """Poses (count, 7) at rest; angles are roll, pitch, yaw in degrees."""
-    x, y, z, w = Rotation.from_euler("ZYX", angles, degrees=True).as_quat()
-    return np.tile([*position, w, x, y, z], (count, 1))
-
-
-def state(stamp_ns, **values):
-    """Message of teleop/state with everything else zero, but gain 1."""
-    texts = {name: repr(float(values.get(name, name == "gain"))) for name in STATE_FIELDS}
-    return report(stamp_ns, "teleop", 0, "FOLLOWING", texts)
-
-
-class Recipe:
-    """A recording of a slave at rest; entries of ``rows`` are (stamps, values, log times)."""
-
-    def __init__(self, count=3000):
-        stamps = START_NS + np.arange(count) * TICK_NS
-        poses = pose_rows(count)
-        self.rows = {
-            topic: (stamps, poses.copy(), stamps)
-            for topic in (SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP)
-        }
-        self.stamps = stamps
-        self.singles = [(TELEOP_STATE, START_NS, state(START_NS))]
-        self.metadata = {"scenario": "at_rest", "robot": "rcrt1", "seed": "7"}
-
-    def values(self, topic):
-        return self.rows[topic][1]
-
-    def drop(self, topic, lost):
-        kept = np.setdiff1d(np.arange(len(self.rows[topic][0])), lost)
-        self.rows[topic] = tuple(column[kept] for column in self.rows[topic])
-
-    def delay(self, topic, delay_ns):
-        stamps, values, logs = self.rows[topic]
-        self.rows[topic] = (stamps, values, logs + delay_ns)
-
-    def write(self, path):
-        with BagWriter(path, ALL, JOINTS, metadata=self.metadata, start_ns=START_NS) as writer:
-            for topic, log_ns, data in self.singles:
-                writer.write(topic, log_ns, data)
-            longest = max(len(stamps) for stamps, *_ in self.rows.values())
-            for i in range(0, longest, 1000):
-                writer.write_block(
-                    {
-                        topic: tuple(column[i : i + 1000] for column in columns)
-                        for topic, columns in self.rows.items()
-                    }
-                )
-        return Bag(path)
 
 
 @pytest.fixture

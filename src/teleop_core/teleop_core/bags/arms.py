@@ -27,10 +27,14 @@ def arm_names(bag: Bag) -> tuple[str, ...]:
     Raises:
         RecordingError: Its metadata name an arm twice.
     """
-    names = tuple(bag.metadata.get(ARMS_KEY, "").split()) or _measured_arms(bag)
+    names = _named(bag) or _measured_arms(bag)
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
         raise RecordingError(bag.path, f"names the arm {twice[0]} twice: {' '.join(names)}")
     return names
+
+
+def _named(bag: Bag) -> tuple[str, ...]:
+    return tuple(bag.metadata.get(ARMS_KEY, "").split())
 
 
 def _measured_arms(bag: Bag) -> tuple[str, ...]:
@@ -53,17 +57,33 @@ def of_arm(bag: Bag, arm: str = "") -> Bag:
         UnknownNameError: The recording has no such arm.
         RecordingError: Its metadata name an arm twice.
     """
-    arms = arm_names(bag)
-    if arm and arm not in arms:
-        known = list(filter(None, arms)) or ["'' (the recording names no arms)"]
-        raise UnknownNameError(f"arm of {bag.path}", arm, known)
-    wanted = arm or arms[0]
-    has_default = ARMS_KEY in bag.metadata or not arms[0]
-    prefixes = {name: f"{name}/" for name in arms} | ({arms[0]: ""} if has_default else {})
-    if prefixes == {wanted: ""}:
+    prefixes = _prefixes(bag)
+    prefix = _prefix(bag, arm, prefixes)
+    if set(prefixes.values()) == {""}:
         return bag
-    others = tuple(prefix for prefix in prefixes.values() if prefix)
-    return _ArmBag(bag, prefixes[wanted], others, has_default=has_default)
+    others = tuple(filter(None, prefixes.values()))
+    return _ArmBag(bag, prefix, others, has_default="" in prefixes.values())
+
+
+def topic_prefix(bag: Bag, arm: str = "") -> str:
+    """What stands before the names of an arm's topics in a recording; raises as :func:`of_arm`."""
+    return _prefix(bag, arm, _prefixes(bag))
+
+
+def _prefix(bag: Bag, arm: str, prefixes: dict[str, str]) -> str:
+    if arm and arm not in prefixes:
+        known = list(filter(None, prefixes)) or ["'' (the recording names no arms)"]
+        raise UnknownNameError(f"arm of {bag.path}", arm, known)
+    return prefixes[arm or next(iter(prefixes))]
+
+
+def _prefixes(bag: Bag) -> dict[str, str]:
+    """What stands before the names of each arm's topics; the default arm is the first."""
+    arms = arm_names(bag)
+    prefixes = {arm: f"{arm}/" for arm in arms}
+    if _named(bag) or not arms[0]:
+        prefixes[arms[0]] = ""
+    return prefixes
 
 
 class _ArmBag(Bag):

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from teleop_core.bags.arms import topic_prefix
 from teleop_core.errors import TeleopError
 from teleop_core.evaluation.figure import MEASURED, REFERENCE
 from teleop_core.geometry import Array
@@ -19,8 +20,8 @@ _PANELS = (("x", "y"), ("x", "z"), ("y", "z"))
 def sketch(recording: "Recording") -> str:
     """The path of each arm's tip along each axis, as inline SVG with a line of facts."""
     parts = [f"<p><b>{escape(repr(recording))}</b></p>"]
-    for number, arm in enumerate(recording.arms):
-        prefix = f"{arm}/" if number else ""
+    for arm in recording.arms:
+        prefix = topic_prefix(recording.bag, arm)
         try:
             wanted = recording[f"{prefix}slave/setpoint_cp"]
             reached = recording[f"{prefix}slave/measured_cp"]

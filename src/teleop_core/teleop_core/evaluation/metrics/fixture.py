@@ -8,6 +8,7 @@ import numpy as np
 from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.fixture_depth import fixture_depth
+from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.evaluation.published import BOX_OVERSHOOT_MM
 from teleop_core.evaluation.reported_fixture import ReportedFixture
@@ -67,6 +68,7 @@ class FixtureMetric(Metric):
     def __init__(self, context: Context) -> None:
         self._slave, self._hand, self._outside = Moments(), Moments(), 0
         self._axes, self._stamps = context.origin.axes, context.shared(StampTallies)
+        self._gains = context.shared(Gains)
         self._on: Counter[ReportedFixture] = Counter()
 
     def add(self, window: Window) -> None:
@@ -109,7 +111,8 @@ class FixtureMetric(Metric):
         score = self.values()
         share = None if score.outside_share is None else 100.0 * score.outside_share
         kind = score.kind or BOX.name
-        published = BOX_OVERSHOOT_MM if kind == BOX.name else None
+        is_comparable = kind == BOX.name and self._gains.published is not None
+        published = BOX_OVERSHOOT_MM if is_comparable else None
         rows = [
             Row(GROUP, f"{kind} on for", "s", f"{score.on_s:.1f}"),
             row(GROUP, "slave outside, max", "mm", score.penetration_max_mm, published),

@@ -1,0 +1,151 @@
+"""Evaluation follows the graph that a recording was made with: its chain, topics and stamps."""
+
+import io
+
+import numpy as np
+import pytest
+import yaml
+from rich.console import Console
+
+from recipes import Recipe, pose_rows
+from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.evaluation.origin import read_origin
+from teleop_core.evaluation.scoring import evaluate
+from teleop_core.graph import build_graph
+from teleop_core.parameters import NoParameters
+from teleop_core.signals import TICK_NS
+from teleop_core.stage import Stage, register_stage
+from teleop_core.topics import (
+    MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+    SLAVE_SERVO_JP,
+    SLAVE_SETPOINT_JS,
+    Kind,
+    Topic,
+    passed_on,
+)
+
+BUILT_IN = ["haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim"]
+SMOOTH_CP = Topic("slave/smooth_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
+NOISE_CV = Topic("slave/noise_cv", Kind.TWIST)
+SMOOTHER = Stage(
+    "smoother", NoParameters, reads=(SLAVE_SERVO_CP,), writes=(SMOOTH_CP, NOISE_CV),
+    step=lambda parameters, state, signals, dt: None, replaces=SLAVE_SERVO_CP,
+    trigger=SLAVE_SERVO_CP,
+)  # fmt: skip
+
+
+def configuration(**session):
+    return yaml.safe_dump({"teleop": {"ros__parameters": session}})
+
+
+@pytest.fixture
+def recipe():
+    """A recording of a session with a stage of a user; each answer 0.1 ms after its question."""
+    made = Recipe(2000)
+    made.topics += [SMOOTH_CP, NOISE_CV]
+    made.metadata["configuration"] = configuration(stages=["smoother"])
+    poses, joints = pose_rows(2000), np.zeros((2000, 6))
+    way = {MASTER_MEASURED_CP: poses, SLAVE_SERVO_CP: poses, SMOOTH_CP: poses,
+           SLAVE_SERVO_JP: joints, SLAVE_SETPOINT_JS: joints}  # fmt: skip
+    for place, (topic, rows) in enumerate(way.items(), start=1):
+        made.rows[topic] = (made.stamps, rows, made.stamps + place * 100_000)
+    return made
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "bag"
+
+
+@pytest.fixture
+def _smoother(own_parts):
+    register_stage(SMOOTHER)
+
+
+@pytest.mark.usefixtures("_smoother")
+def test_stage_of_a_user_has_its_own_latency(recipe, path):
+    latency = evaluate(recipe.write(path)).latency_ms
+    assert list(latency) == [*BUILT_IN[:2], "smoother", *BUILT_IN[2:], "total"]
+    medians = [delay.median for delay in latency.values()]
+    assert np.allclose(medians, [0.1, 0.1, 0.1, 0.1, 0.1, 0.5])
+
+
+@pytest.mark.usefixtures("_smoother")
+def test_table_and_page_show_the_stage_of_a_user(recipe, path, tmp_path):
+    recipe.write(path)
+    shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
+    evaluate_bags([path], None, tmp_path / "page.html", shown)
+    lines = [text.split() for text in shown.export_text().splitlines()]
+    assert ["smoother", "ms", "0.10/0.10/0.10"] in lines
+    assert '"name": "smoother"' in (tmp_path / "page.html").read_text()
+
+
+@pytest.mark.usefixtures("_smoother")
+def test_gaps_of_a_topic_of_a_user_are_counted(recipe, path):
+    recipe.drop(SMOOTH_CP, [100, 101, 500])
+    score = evaluate(recipe.write(path))
+    assert (score.topics["slave/smooth_cp"].count, score.topics["slave/smooth_cp"].gaps) == (
+        1997,
+        3,
+    )
+    assert score.topics["slave/servo_cp"].gaps == 0
+
+
+@pytest.mark.usefixtures("_smoother")
+def test_only_a_stamp_that_is_passed_on_may_come_again_for_one_that_was_lost(recipe, path):
+    stamps = recipe.stamps.copy()
+    stamps[700] = stamps[699]
+    recipe.rows[SMOOTH_CP] = (stamps, pose_rows(2000), recipe.stamps)
+    recipe.rows[NOISE_CV] = (stamps, np.zeros((2000, 6)), recipe.stamps)
+    topics = evaluate(recipe.write(path)).topics
+    assert topics["slave/smooth_cp"].gaps == 0
+    assert topics["slave/noise_cv"].gaps == 1
+
+
+def test_stage_that_is_not_installed_leaves_the_built_in_ones(recipe, path):
+    score = evaluate(recipe.write(path))
+    assert list(score.latency_ms) == [*BUILT_IN, "total"]
+    assert np.isclose(score.latency_ms["inverse_kinematics"].median, 0.2)
+    assert score.topics["slave/smooth_cp"].count == 2000
+    assert score.topics["slave/smooth_cp"].gaps is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "- 1",
+        "teleop: 3",
+        "slave_sim: {ros__parameters: {}}\nunknown: {ros__parameters: {}}",
+        configuration(stages=["smoother"]),
+        configuration(delays=["slave/smooth_cp=0.1"]),
+        configuration(arms=["a", "a"]),
+        configuration(arms=3),
+    ],
+)
+def test_graph_that_cannot_be_built_is_that_of_the_built_in_stages(recipe, path, text):
+    recipe.metadata["configuration"] = text
+    assert read_origin(recipe.write(path)).graph == build_graph()
+
+
+def test_settings_of_the_graph_are_those_of_the_recording(recipe, path):
+    recipe.metadata["configuration"] = configuration(
+        arms=["right", "left"], delays=["slave/servo_jp=0.02"], former_parameter=1
+    )
+    origin = read_origin(recipe.write(path))
+    assert origin.graph == build_graph(["right", "left"], (), ["slave/servo_jp=0.02"])
+    assert not [topic for topic in origin.streams if topic.arm]
+    assert [stage for stage, _ in origin.chain] == BUILT_IN
+    assert origin.writer(SLAVE_MEASURED_CP) == "slave_sim"
+    assert origin.writer(SMOOTH_CP) == ""
+
+
+def test_command_that_nobody_sent_does_not_count_in_the_total(recipe, path):
+    stamps, rows, logs = recipe.rows[SLAVE_SETPOINT_JS]
+    stamps = stamps.copy()
+    stamps[:50] = np.arange(1, 51) * TICK_NS  # of a session before
+    recipe.rows[SLAVE_SETPOINT_JS] = (stamps, rows, logs)
+    assert np.isclose(evaluate(recipe.write(path)).latency_ms["total"].max, 0.5)
