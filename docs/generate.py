@@ -96,7 +96,7 @@ def diagram(graph: Graph) -> str:
     pairs: dict[tuple[str, str, bool], list[Link]] = {}
     for link in graph.links:
         pairs.setdefault((link.writer.name, link.reader.name, link.is_late), []).append(link)
-    for (writer, reader, is_late), links in pairs.items():
+    for (writer, reader, is_late), links in sorted(pairs.items(), key=lambda item: item[0][2]):
         label = "<br/>".join(link.topic.name for link in links)
         arrow = f'-. "{label}" .->' if is_late else f'-- "{label}" -->'
         lines.append(f"  {writer} {arrow} {reader}")

@@ -1,0 +1,181 @@
+"""Every example runs as a user runs it, says what it claims, and needs the public API alone."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
+NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
+PUBLIC = {
+    "teleop_core", "teleop_core.evaluation", "teleop_core.operators", "teleop_core.fixtures",
+    "teleop_core.controllers", "teleop_core.robots", "teleop_core.topics", "numpy",
+    "numpy.typing", "pandas", "plotly.graph_objects",
+}  # fmt: skip
+ROS = {"rclpy", "rclpy.node", "rclpy.qos", "geometry_msgs.msg", "sensor_msgs.msg"}
+PARTS = [name for name in NAMES if name.startswith("own_")]
+
+pytestmark = pytest.mark.slow
+
+
+def run(name: str, folder: Path, **env: str) -> str:
+    """What an example prints; run in a folder of its own, in which it must leave nothing."""
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / f"{name}.py")], cwd=folder, capture_output=True, text=True,
+        timeout=300, check=False, env=os.environ | env,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert not list(folder.iterdir())
+    return done.stdout
+
+
+def numbers(pattern: str, text: str) -> list[float]:
+    """Every number that a pattern finds."""
+    return [float(found) for found in re.findall(pattern, text)]
+
+
+def test_hand_and_slave_draw_the_circle_of_the_table(tmp_path):
+    widths = numbers(r"([\d.]+) mm wide", run("operator_from_csv", tmp_path))
+    assert len(widths) == 2
+    assert all(19.0 < width < 20.5 for width in widths)
+
+
+def test_own_fixture_holds_the_hand_as_the_built_in_ones_do(tmp_path):
+    text = run("own_fixture", tmp_path)
+    assert re.findall(r"(\w+): slave", text) == ["box", "sphere", "cylinder"]
+    depths = numbers(r"at most ([\d.]+) mm", text)
+    assert len(depths) == 3
+    assert all(0.1 < depth < 4.0 for depth in depths)
+
+
+def test_own_controller_follows_better_than_pd(tmp_path):
+    pid, pd, own = numbers(r"([\d.]+) mm RMS", run("own_controller", tmp_path))
+    assert pid < 0.1
+    assert own < 0.2 * pd
+
+
+def test_own_stage_holds_its_limit_with_the_same_bits_compiled_or_not(tmp_path):
+    text = run("own_stage", tmp_path)
+    assert numbers(r"command ([\d.]+) mm/s", text) == [20.0, 20.0]
+    assert "same bits: True" in text
+
+
+def test_own_metric_tells_that_the_filter_smooths(tmp_path):
+    filtered, unfiltered = numbers(r"([\d.]+) m/s³", run("own_metric", tmp_path))
+    assert 1e3 < filtered < 0.2 * unfiltered
+
+
+def test_own_robot_follows_the_hand(tmp_path):
+    text = run("own_robot", tmp_path)
+    assert "tip at [0.35 0.   0.3 ]" in text
+    assert "FOLLOWED" in text
+    assert numbers(r"([\d.]+) mm RMS", text)[0] < 0.1
+
+
+def test_own_force_slows_the_hand(tmp_path):
+    text = run("own_force", tmp_path)
+    alone, damped = numbers(r"([\d.]+) mm/s", text)
+    assert damped < alone
+    assert numbers(r"([\d.]+) N", text)[0] == 0.0
+    assert 0.5 < numbers(r"([\d.]+) N", text)[1] < 3.3
+
+
+def test_two_arms_are_scored_one_by_one(tmp_path):
+    text = run("two_arms", tmp_path)
+    assert "left: rcrt1, seed 1" in text
+    assert "right: puma560, seed 2" in text
+    assert all(error < 0.1 for error in numbers(r"([\d.]+) mm RMS", text))
+
+
+def test_delay_of_twenty_milliseconds_makes_references_twenty_milliseconds_old(tmp_path):
+    text = run("delay", tmp_path)
+    assert "the reference in force is 20 ms old" in text
+    direct, delayed = numbers(r"slave ([\d.]+) mm", text)
+    assert delayed > direct
+
+
+def test_sweep_tells_that_a_stiffer_wall_holds_better(tmp_path):
+    depths = numbers(r"N/m .* ([\d.]+)\n", run("sweep", tmp_path))
+    assert len(depths) == 4
+    assert depths == sorted(depths, reverse=True)
+
+
+def test_recording_becomes_a_data_frame_and_a_page(tmp_path):
+    text = run("bag_to_pandas", tmp_path)
+    assert "10000 rows" in text
+    assert numbers(r"height.html: (\d+) MB", text)[0] >= 4
+
+
+@pytest.mark.ros
+def test_plain_ros_node_leads_the_slave_in_place_of_the_simulated_master(tmp_path):
+    from teleop_core.nodes.children import environment, free_domain
+
+    env = environment() | {"ROS_DOMAIN_ID": free_domain()}
+    nodes = [
+        subprocess.Popen([sys.executable, "-m", "teleop_core.nodes", name], env=env)
+        for name in ("motion_scaling", "inverse_kinematics", "slave_sim")
+    ]
+    try:
+        text = run("ros_device", tmp_path, **env)
+    finally:
+        for node in nodes:
+            node.terminate()
+        codes = [node.wait(60) for node in nodes]
+    assert codes == [0, 0, 0]
+    assert 18.0 < numbers(r"slave: ([\d.]+) mm", text)[0] < 20.5
+    forces, samples = (numbers(pattern, text)[0] for pattern in (r"(\d+) forces", r"(\d+) samples"))
+    assert samples == 2000
+    assert forces > 0.5 * samples
+
+
+def test_commands_take_the_parts_of_the_examples(tmp_path):
+    files = [text for name in PARTS for text in ("--parts", str(EXAMPLES / f"{name}.py"))]
+    settings = ["fixture=cylinder", "controller=following", "robot=gantry",
+                "stages=[velocity_limit, hand_damping]"]  # fmt: skip
+    teleop = [sys.executable, "-m", "teleop_core.cli", *files]
+    out = str(tmp_path / "bag")
+    sim = ["sim", "--scenario", "coarse_box", "--duration", "5", "--out", out, "--set", *settings]
+    for arguments in (sim, ["evaluate", out]):
+        done = subprocess.run(
+            [*teleop, *arguments], capture_output=True, text=True, timeout=300, check=False
+        )
+        assert done.returncode == 0, done.stderr
+    assert "cylinder on for" in done.stdout
+    assert "velocity limit" in done.stdout
+    assert "jerk" in done.stdout
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_example_needs_the_public_api_alone(name):
+    tree = ast.parse((EXAMPLES / f"{name}.py").read_text(encoding="utf-8"))
+    imported = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imported.add(node.module)
+    allowed = PUBLIC | set(sys.stdlib_module_names) | (ROS if name == "ros_device" else set())
+    assert imported <= allowed
+
+
+def test_every_example_is_run_here():
+    own = Path(__file__).read_text(encoding="utf-8")
+    assert all(f'run("{name}", tmp_path' in own for name in NAMES)
+
+
+def test_examples_pass_a_strict_type_check_of_a_user():
+    with tempfile.TemporaryDirectory() as folder:
+        options = ["--strict", "--config-file=", "--follow-imports=silent", "--no-error-summary",
+                   "--disable-error-code=import-untyped"]  # fmt: skip
+        files = [str(EXAMPLES / f"{name}.py") for name in NAMES]
+        done = subprocess.run(
+            [sys.executable, "-m", "mypy", *options, *files], cwd=folder, capture_output=True,
+            text=True, check=False, env=os.environ | {"MYPYPATH": str(ROOT / "src/teleop_core")},
+        )  # fmt: skip
+    assert done.returncode == 0, done.stdout
