@@ -13,7 +13,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.scoring import study
+from teleop_core.evaluation.scoring import studies, study
 from teleop_core.signals import STATE_FIELDS, TICK_NS
 from teleop_core.topics import (
     ALL,
@@ -41,8 +41,9 @@ ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback")
 LARGEST_PAGE = 8_000_000
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 1_000_000_000
-BOX = {"gain": 1.0, "is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_size_x": 0.03,
-       "fixture_size_y": 0.03, "fixture_size_z": 0.03}  # fmt: skip
+# A fixture of 30 mm around the middle of the path.
+FIXTURE = {"gain": 1.0, "is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_size_x": 0.03,
+           "fixture_size_y": 0.03, "fixture_size_z": 0.03}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -54,8 +55,11 @@ def browser():
     return found
 
 
-def record(path, seed, count=6000):
-    """A live-looking recording: a tip on a curve through a box, with delays and a noisy hand."""
+def record(path, seed, fixture=None, count=6000):
+    """A live-looking recording: a tip on a curve through a fixture, with delays and a noisy hand.
+
+    ``fixture`` are names and texts that describe it; None for a box, as older recordings have it.
+    """
     rng = np.random.default_rng(seed)
     stamps = START_NS + np.arange(count) * TICK_NS
     t = np.arange(count) * 1e-3
@@ -71,7 +75,7 @@ def record(path, seed, count=6000):
         SLAVE_SETPOINT_JS: np.zeros((count, 6)), SLAVE_SETPOINT_CP: poses,
         SLAVE_MEASURED_CP: measured, MASTER_MEASURED_CF: force,
     }  # fmt: skip
-    texts = {name: repr(BOX.get(name, 0.0)) for name in STATE_FIELDS}
+    texts = {name: repr(FIXTURE.get(name, 0.0)) for name in STATE_FIELDS} | (fixture or {})
     metadata = {"scenario": '<curve> & "box" \'</script>', "robot": "rcrt1", "seed": str(seed)}
     with BagWriter(path, ALL, JOINTS, metadata=metadata, start_ns=START_NS) as writer:
         at = START_NS + 500 * TICK_NS
@@ -120,7 +124,11 @@ def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path):
 @pytest.mark.browser
 @pytest.mark.slow
 def test_page_of_three_recordings_draws_everything_without_asking_the_network(browser, tmp_path):
-    bags = [record(tmp_path / f"live_{seed}", seed) for seed in (1, 2, 3)]
+    bags = [
+        record(tmp_path / "box", 1),
+        record(tmp_path / "sphere", 2, {"fixture": "sphere", "fixture.diameter": "0.03"}),
+        record(tmp_path / "cone", 3, {"fixture": "cone"}),  # which is not installed
+    ]
     expected = sum(len(study(Bag(path)).figures()) for path in bags)
     assert expected == 21
     page = tmp_path / "report.html"
@@ -132,6 +140,24 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(br
     assert int(attributes["drawn"]) == expected
     assert not [line for line in said if not any(advice in line for advice in ADVICE)]
     assert not urls
+
+
+@pytest.mark.browser
+@pytest.mark.slow
+def test_page_of_a_session_shows_both_arms_with_their_fixtures(browser, teleop, tmp_path):
+    bag, page = tmp_path / "two", tmp_path / "report.html"
+    arms = ("arms=[right,left]", "left/robot=puma560", "left/seed=2", "left/fixture=sphere")
+    teleop("sim", "--scenario", "coarse_box", "--duration", 6, "--out", bag, "--set", *arms)
+    teleop("evaluate", bag, "--html", page)
+    attributes, _, _ = opened(browser, page, tmp_path)
+    assert attributes.get("errors", "") == ""
+    assert int(attributes["drawn"]) == sum(
+        bool(figure.traces) for found in studies(Bag(bag)) for figure in found.figures()
+    )
+    text = page.read_text()
+    for shown in ("two · right", "two · left", "box on for", "sphere on for", "arm right",
+                  "arm left", "robot puma560"):  # fmt: skip
+        assert shown in text, shown
 
 
 @pytest.mark.browser
