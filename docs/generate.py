@@ -11,7 +11,8 @@ from pathlib import Path
 
 from teleop_core.evaluation import key_table
 from teleop_core.graph import Graph, Link, build_graph
-from teleop_core.session.configuration import declared_groups, parameter_rows
+from teleop_core.session.configuration import parameter_rows
+from teleop_core.session.layers import declared_groups
 from teleop_core.topics import DIAGNOSTICS, Kind, Topic
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -18,7 +18,8 @@ from teleop_core.bags.reader import Bag
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.live import live
 from teleop_core.nodes.real_time import apply_options
-from teleop_core.session.configuration import RealTimeParameters, configure
+from teleop_core.session.configuration import configure
+from teleop_core.session.layers import RealTimeParameters
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.stage import STAGES
 from teleop_core.topics import STREAMS

@@ -7,11 +7,10 @@ import yaml
 
 from teleop_core.errors import ParameterError, TeleopError, UnknownNameError
 from teleop_core.graph import BUILT_IN, RECORDER_NAME
-from teleop_core.session.configuration import (
+from teleop_core.session.configuration import Configuration, configure
+from teleop_core.session.layers import (
     SESSION,
-    Configuration,
     config_folder,
-    configure,
     list_scenarios,
     load_file,
     parse_layer,

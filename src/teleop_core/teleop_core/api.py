@@ -25,9 +25,9 @@ from teleop_core.operators import OPERATORS, Motion, Operator, following
 from teleop_core.recording import Recording, open_recording
 from teleop_core.robots import ROBOTS, Robot
 from teleop_core.robots.dh import DhTable
-from teleop_core.session.configuration import (
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.layers import (
     SESSION,
-    Configuration,
     Layer,
     config_folder,
     load_file,

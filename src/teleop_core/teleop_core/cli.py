@@ -284,7 +284,7 @@ def _recover(arguments: argparse.Namespace) -> int:
 
 
 def _scenarios(_: argparse.Namespace) -> int:
-    from teleop_core.session.configuration import list_scenarios
+    from teleop_core.session.layers import list_scenarios
 
     for name, description in list_scenarios().items():
         print(f"{name:16} {description}")
@@ -306,7 +306,8 @@ def _parts(_: argparse.Namespace) -> int:
 
 def _parameters(arguments: argparse.Namespace) -> int:
     from teleop_core.errors import UnknownNameError
-    from teleop_core.session.configuration import declared_groups, parameter_rows
+    from teleop_core.session.configuration import parameter_rows
+    from teleop_core.session.layers import declared_groups
 
     groups = declared_groups()
     if arguments.stage is not None and arguments.stage not in groups:

@@ -12,7 +12,7 @@ from teleop_core.geometry import Array
 from teleop_core.graph import Graph, build_graph
 from teleop_core.mapping.motion_scaling import MOTION_SCALING, MotionScalingParameters, axis_map
 from teleop_core.parameters import build
-from teleop_core.session.configuration import SESSION, Layer, SessionParameters, parse_layer
+from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer
 from teleop_core.stage import STAGES
 from teleop_core.topics import Topic
 

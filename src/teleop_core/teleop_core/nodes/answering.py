@@ -24,19 +24,20 @@ class AnsweringNode(CoreNode):
         self._trigger: Topic = self.description.trigger
         self._question = self.input(self._trigger)
         self._needed = [self.input(topic) for topic in self.description.needs]
+        self._stamp_fields = (f"{self._trigger.field}_ns", "now_ns")
         self._waiter: Waiter | None = None
         self._report = next((t for t in self.description.writes if t.kind is Kind.REPORT), None)
         if self._report is not None:
             self._reporter_of_state = self.open_publisher(self._report)
-            row = self.stage.signals[self._report.field]
-            read_reports(state_report(0, row))  # loads the message types, 60 ms
+            self._state = self.row[self._report.field]
+            read_reports(state_report(0, self._state))  # loads the message types, 60 ms
 
     def start(self) -> None:
         """Start from where the slave is, whatever was before."""
         self.stage.reset()
         for port in self.description.reads:
-            self.stage.signals[f"{port.field}_ns"] = 0
-        self._reported = ""
+            self.row[f"{port.field}_ns"] = 0
+        self._reported: tuple[bytes, Any] = (b"", None)
 
     def turn(self) -> None:
         """Answer the next message."""
@@ -53,32 +54,36 @@ class AnsweringNode(CoreNode):
 
     def work(self) -> None:
         """Answer the messages that have come, one by one."""
-        self.read_ports(self._trigger)
+        has_come = False
         while self._question.take():
+            has_come = True
+            self.read_ports(self._trigger)
             stamp_ns = self._question.stamp_ns
             if stamp_ns is not None and all(n.stamp_ns is not None for n in self._needed):
                 self.answer(stamp_ns)
+        if not has_come:
+            self.read_ports(self._trigger)
 
     def answer(self, stamp_ns: int) -> None:
         """Make one step of the stage, send what came of it, and report the state if it changed."""
-        self.read_ports(self._trigger)
-        signals = self.stage.signals
-        signals[f"{self._trigger.field}_ns"] = signals["now_ns"] = stamp_ns
+        for name in self._stamp_fields:
+            self.row[name] = stamp_ns
         with self.lock:
             self.stage.step()
         self.send_all(stamp_ns)
         self.counts.ticks += 1
         self.delay.put(time.time_ns() - stamp_ns)
         if self._report is not None:
-            self._send_report(self._report, stamp_ns)
+            self._send_report(stamp_ns)
 
-    def _send_report(self, topic: Topic, stamp_ns: int) -> None:
-        row = self.stage.signals[topic.field]
+    def _send_report(self, stamp_ns: int) -> None:
+        """Report the state if it, or a parameter that may be told beside it, has changed."""
+        bits, parameters = self._state.tobytes(), self.parameters
+        if bits == self._reported[0] and parameters is self._reported[1]:
+            return
+        self._reported = bits, parameters
         described: dict[str, str] = getattr(self.stage, "described", dict)()
-        seen = f"{row.tobytes()!r}{described}"
-        if seen != self._reported:
-            self._reported = seen
-            self._reporter_of_state.publish(state_report(stamp_ns, row, described))
+        self._reporter_of_state.publish(state_report(stamp_ns, self._state, described))
 
     def concerns(self) -> list[str]:
         """Topics that are missing or silent."""

@@ -16,6 +16,7 @@ from rclpy.task import Future
 from teleop_core.bags.layouts import layout
 from teleop_core.errors import ParameterError, TeleopError
 from teleop_core.geometry import Array
+from teleop_core.kernels import bare
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.loop import Loop
@@ -23,7 +24,7 @@ from teleop_core.nodes.rate import Recent, Schedule, TickCounts
 from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.streams import Input, Output, message_type, profile
 from teleop_core.parameters import build, parameter, specs, values_of
-from teleop_core.session.configuration import RealTimeParameters
+from teleop_core.session.layers import RealTimeParameters
 from teleop_core.signals import TICK_NS
 from teleop_core.stage import Stage, joints_of
 from teleop_core.topics import Kind, Topic
@@ -97,6 +98,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self.add_pre_set_parameters_callback(self._type_empty_lists)
         self.add_on_set_parameters_callback(self._accept)
         self.stage: Any = None
+        self.row: Any = None
+        """The stage's signals, to be read and written by names of fields only."""
         self.lock = threading.Lock()  # held while the stage works or takes parameters
         self.gate = threading.Lock()  # held by a session while the node works in its thread
         self.ended, self.exit_code = Future(), 0
@@ -108,7 +111,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self.outputs: dict[Topic, Output] = {}
         self._own_publishers: list[Any] = []
         self._summed: dict[str, list[Array]] = {}
-        self._stamps: list[tuple[Output, str]] | None = None
+        self._stamps: list[tuple[Output, str]] = []
+        self._ports: list[tuple[str, str, list[Input]]] = []
         self._fresh_counts()
         self._word = "unconfigured"
         self._reporter = Reporter(self)
@@ -167,6 +171,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
     def open_streams(self, joint_names: tuple[str, ...] = ()) -> None:
         """Open the streams that the stage reads and writes, on the fields of its signals."""
         signals = self.stage.signals
+        self.row = bare(signals)
         for port in self.description.reads:
             feeds = self.options.feeds(port.name)
             for name, delay in feeds:
@@ -176,12 +181,14 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
                 self.inputs.setdefault(port.name, []).append(entry)
                 if len(feeds) > 1:
                     self._summed.setdefault(port.field, []).append(target)
+            self._ports.append((port.name, f"{port.field}_ns", self.inputs[port.name]))
         for written in self.description.writes:
             if written.kind is not Kind.REPORT:
                 topic = written.of_arm(self.arm)
                 publisher = self.open_publisher(written)
                 form = layout(topic, joint_names)
                 self.outputs[topic] = Output(publisher, form, signals[written.field])
+                self._stamps.append((self.outputs[topic], self._stamp_field(written)))
 
     def open_publisher(self, topic: Topic) -> Any:
         """Publisher that is silent unless the node is active, and closed at cleanup."""
@@ -204,41 +211,29 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def read_ports(self, trigger: Topic | None = None) -> None:
         """Bring the signals up to date, all ports but that of the trigger."""
-        for port in self.description.reads:
-            if trigger is None or port.name != trigger.name:
-                for entry in self.inputs[port.name]:
+        own = trigger.name if trigger is not None else ""
+        for name, stamp_field, entries in self._ports:
+            if name != own:
+                for entry in entries:
                     entry.newest()
-                self._note(port)
+                stamp_ns = entries[0].stamp_ns
+                if stamp_ns is not None:
+                    self.row[stamp_field] = stamp_ns
         for name, parts in self._summed.items():
-            self.stage.signals[name] = np.sum(parts, axis=0)
-
-    def _note(self, port: Topic) -> None:
-        """Write the stamp of a port into the signals."""
-        stamp_ns = self.inputs[port.name][0].stamp_ns
-        if stamp_ns is not None:
-            self.stage.signals[f"{port.field}_ns"] = stamp_ns
+            self.row[name] = np.sum(parts, axis=0)
 
     def send_all(self, now_ns: int) -> None:
         """Send what the stage wrote, each under the stamp that its topic says."""
-        signals = self.stage.signals
-        for output, field_name in self._stamped():
-            output.send(int(signals[field_name]) if field_name else now_ns)
+        row = self.row
+        for output, stamp_field in self._stamps:
+            output.send(int(row[stamp_field]) if stamp_field else now_ns)
 
-    def _stamped(self) -> list[tuple[Output, str]]:
-        """Outputs, each with the field of its stamp; empty for the time of sampling."""
-        if self._stamps is None:
-            self._stamps = []
-            ports = {port.name: port for port in self.description.reads}
-            for written in self.description.writes:
-                if written.kind is not Kind.REPORT:
-                    of = ports.get(written.stamp.of)
-                    field_name = (
-                        f"{written.field}_ns"
-                        if written.stamp.is_in_force
-                        else (f"{of.field}_ns" if of else "")
-                    )
-                    self._stamps.append((self.output(written), field_name))
-        return self._stamps
+    def _stamp_field(self, written: Topic) -> str:
+        """Field of the stamp that an output passes on; empty for the time of sampling."""
+        if written.stamp.is_in_force:
+            return f"{written.field}_ns"
+        ports = [port for port in self.description.reads if port.name == written.stamp.of]
+        return f"{ports[0].field}_ns" if ports else ""
 
     def _close(self) -> None:
         for entry in self.all_inputs():
@@ -246,8 +241,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         for publisher in self._own_publishers:
             self.destroy_lifecycle_publisher(publisher)
         self.inputs, self.outputs, self._own_publishers = {}, {}, []
-        self._summed, self._stamps = {}, None
-        self.stage = None
+        self._summed, self._stamps, self._ports = {}, [], []
+        self.stage = self.row = None
 
     # -- lifecycle -------------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ import yaml
 from teleop_core.errors import TeleopError
 from teleop_core.graph import Graph, build_graph
 from teleop_core.parameters import build
-from teleop_core.session.configuration import SESSION, SessionParameters
+from teleop_core.session.layers import SESSION, SessionParameters
 
 _FLAG = "--params-file"
 

@@ -18,7 +18,8 @@ from teleop_core.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.observer import WARNING, Observer, Status
 from teleop_core.nodes.start import SESSION as SESSION_NODE
-from teleop_core.session.configuration import SESSION, Configuration
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.layers import SESSION
 from teleop_core.session.links import link_texts
 
 START_TIMEOUT = 180.0

@@ -4,7 +4,7 @@ import ctypes
 import gc
 import os
 
-from teleop_core.session.configuration import RealTimeParameters
+from teleop_core.session.layers import RealTimeParameters
 
 _EVERYTHING = 3  # MCL_CURRENT | MCL_FUTURE of mlockall(2)
 

@@ -17,7 +17,8 @@ from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.streams import Subscription
 from teleop_core.parameters import parameter
-from teleop_core.session.configuration import Configuration, parse_layer
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.layers import parse_layer
 from teleop_core.session.runner import describe
 from teleop_core.stage import Stage
 from teleop_core.topics import DIAGNOSTICS, Quality, Topic

@@ -13,15 +13,15 @@ class SlaveSimNode(TickingNode):
 
     def work(self, ticks: Iterable[int]) -> None:
         """Take the newest command and the steps of some ticks [ns, monotonic]."""
-        before_ns = int(self.stage.signals["slave_setpoint_js_ns"])
+        before_ns = int(self.row["slave_setpoint_js_ns"])
         super().work(ticks)
-        stamp_ns = int(self.stage.signals["slave_setpoint_js_ns"])
+        stamp_ns = int(self.row["slave_setpoint_js_ns"])
         if stamp_ns != before_ns:
             self.delay.put(time.time_ns() - stamp_ns)
 
     def concerns(self) -> list[str]:
         """A slave that holds still because nothing sound tells it where to go."""
-        status = CommandStatus(int(self.stage.signals["command_status"]))
+        status = CommandStatus(int(self.row["command_status"]))
         servo_jp = self.input(SLAVE_SERVO_JP)
         if servo_jp.stamp_ns is None:
             return ["waits for slave/servo_jp and holds"]

@@ -26,7 +26,7 @@ class TickingNode(CoreNode):
         self.read_ports()
         for tick_ns in ticks:
             now_ns = tick_ns + self.epoch_ns
-            self.stage.signals["now_ns"] = now_ns
+            self.row["now_ns"] = now_ns
             self.advance(now_ns)
             self.send_all(now_ns)
 

@@ -14,7 +14,8 @@ from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 from teleop_core.geometry import Array
 from teleop_core.graph import RECORDER_NAME, Member
-from teleop_core.session.configuration import SESSION, Configuration, Layer, parse_layer
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.layers import SESSION, Layer, parse_layer
 from teleop_core.session.virtual import BLOCK, VirtualTime, stamps_of
 from teleop_core.signals import STATE_FIELDS, TICK_NS
 from teleop_core.topics import Kind, Topic
