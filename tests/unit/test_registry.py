@@ -1,47 +1,144 @@
-"""Registry: what a program adds by name can be found, replaced and taken away again."""
+"""Registry: parts by name, each name once, nothing imported before it is asked for."""
+
+import sys
 
 import pytest
 
+from teleop_core.controllers import CONTROLLERS
 from teleop_core.errors import PartError, UnknownNameError
+from teleop_core.fixtures import FIXTURES
+from teleop_core.operators import OPERATORS
 from teleop_core.registry import Registry
+from teleop_core.stage import STAGES
+
+BUILT_IN = {"here": "teleop_core.topics:ALL", "json": "json:loads"}
 
 
-@pytest.fixture
-def shapes():
-    """A registry of texts with one built-in part."""
-    return Registry("shape", "shapes", {"tau": "math:tau"}, lambda name, part: part)
+def registry(trial=None, **builtin):
+    return Registry("part", "parts_of_nobody", {**BUILT_IN, **builtin}, check, trial)
 
 
-def test_part_that_was_removed_is_unknown_and_its_name_free(shapes):
-    shapes.add("cone", "a cone")
-    shapes.remove("cone")
-    assert shapes.names() == ("tau",)
-    with pytest.raises(UnknownNameError, match="shape is 'cone', must be one of: tau"):
-        shapes.find("cone")
-    assert shapes.add("cone", "another cone") == shapes.find("cone") == "another cone"
+def check(name, part):
+    if part is None:
+        raise PartError("part", name, "something")
+    return part
 
 
-def test_part_that_replaced_another_is_removed_whole(shapes):
-    shapes.add("cone", "a cone")
-    shapes.add("cone", "another cone", replace=True)
-    shapes.remove("cone")
-    assert not shapes.is_added("cone")
+def installed(folder, monkeypatch, *entries):
+    """Let a distribution with entry points be found, as if it were installed."""
+    made = folder / "own_parts-1.0.dist-info"
+    made.mkdir()
+    (made / "METADATA").write_text("Metadata-Version: 2.1\nName: own-parts\nVersion: 1.0\n")
+    lines = "\n".join(entries)
+    (made / "entry_points.txt").write_text(f"[teleop_core.parts_of_nobody]\n{lines}\n")
+    (folder / "own_module.py").write_text("CONE = 'cone'\n")
+    (folder / "broken_module.py").write_text("raise RuntimeError('no\\nway')\n")
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.delitem(sys.modules, "own_module", raising=False)
 
 
-@pytest.mark.parametrize("name", ["tau", "cube"])
-def test_only_what_the_program_added_can_be_removed(shapes, name):
-    shapes.find("tau")
-    with pytest.raises(UnknownNameError, match=f"added shape is '{name}', must be one of: none"):
-        shapes.remove(name)
-    shapes.add("cone", "a cone")
-    with pytest.raises(UnknownNameError, match="one of: cone"):
-        shapes.remove(name)
-    assert shapes.find("tau") > 6.0
+def test_part_is_found_by_the_name_it_was_added_under():
+    parts, part = registry(), object()
+    assert parts.add("mine", part) is part
+    assert parts.find("mine") is part
+    assert parts.names() == ("here", "json", "mine")
 
 
-def test_taken_name_is_refused_and_the_same_object_is_not(shapes):
-    cone = shapes.add("cone", "a cone")
-    assert shapes.add("cone", cone) is cone
-    for name in ("cone", "tau"):
-        with pytest.raises(PartError, match="a name that is free"):
-            shapes.add(name, "another cone")
+def test_unknown_name_is_refused_with_the_known_ones():
+    with pytest.raises(UnknownNameError) as error:
+        registry().find("there")
+    assert error.value.alternatives == ("here", "json")
+
+
+@pytest.mark.parametrize("name", ["here", "mine"])
+def test_name_that_is_used_already_is_refused(name):
+    parts = registry()
+    parts.add("mine", object())
+    with pytest.raises(PartError) as error:
+        parts.add(name, object())
+    assert (error.value.kind, error.value.name) == ("part", name)
+
+
+def test_same_part_may_be_added_again():
+    parts, part = registry(), object()
+    parts.add("mine", part)
+    assert parts.add("mine", part) is part
+
+
+def test_added_part_may_be_replaced_and_a_built_in_one_may_not():
+    parts = registry()
+    parts.add("mine", object())
+    second = object()
+    assert parts.add("mine", second, replace=True) is second
+    assert parts.find("mine") is second
+    with pytest.raises(PartError):
+        parts.add("here", second, replace=True)
+
+
+def test_added_part_can_be_removed_and_a_built_in_one_cannot():
+    parts = registry()
+    parts.add("mine", object())
+    parts.remove("mine")
+    assert "mine" not in parts.names()
+    for name in ("mine", "here"):
+        with pytest.raises(UnknownNameError):
+            parts.remove(name)
+
+
+def test_part_that_fails_its_trial_is_not_added():
+    def trial(part):
+        raise PartError("part", "mine", "better")
+
+    parts = registry(trial)
+    with pytest.raises(PartError, match="better"):
+        parts.add("mine", object())
+    assert "mine" not in parts.names()
+
+
+def test_nothing_is_imported_before_it_is_asked_for(tmp_path, monkeypatch):
+    installed(tmp_path, monkeypatch, "cone = own_module:CONE")
+    parts = registry()
+    assert parts.names() == ("here", "json", "cone")
+    assert "own_module" not in sys.modules
+    assert parts.find("cone") == "cone"
+
+
+def test_installed_part_that_cannot_be_loaded_is_refused_in_one_line(tmp_path, monkeypatch):
+    installed(tmp_path, monkeypatch, "broken = broken_module:CONE", "gone = own_module:SPHERE")
+    parts = registry()
+    for name, reason in (("broken", "RuntimeError"), ("gone", "AttributeError")):
+        with pytest.raises(PartError, match=reason) as error:
+            parts.find(name)
+        assert error.value.name == name
+        assert "\n" not in str(error.value)
+
+
+def test_installed_part_that_takes_a_built_in_name_is_refused(tmp_path, monkeypatch):
+    installed(tmp_path, monkeypatch, "here = own_module:CONE")
+    with pytest.raises(PartError, match="named once") as error:
+        registry().names()
+    assert error.value.name == "here"
+
+
+@pytest.mark.parametrize(
+    ("parts", "name"),
+    [(FIXTURES, "box"), (CONTROLLERS, "pid"), (OPERATORS, "line"), (STAGES, "slave_sim")],
+)
+def test_name_of_a_built_in_part_is_taken_on_every_seam(parts, name):
+    other = next(parts.find(found) for found in parts if found != name)
+    with pytest.raises(PartError) as error:
+        parts.add(name, other)
+    assert (error.value.kind, error.value.name) == (parts.kind, name)
+
+
+@pytest.mark.parametrize("parts", [FIXTURES, CONTROLLERS, OPERATORS, STAGES])
+def test_object_that_is_no_such_part_is_refused_on_every_seam(parts):
+    with pytest.raises(PartError, match="int") as error:
+        parts.add("mine", 5)
+    assert (error.value.kind, error.value.name) == (parts.kind, "mine")
+
+
+@pytest.mark.parametrize("parts", [FIXTURES, CONTROLLERS, OPERATORS, STAGES])
+def test_every_built_in_part_is_one(parts):
+    for name in parts:
+        assert parts.find(name) is parts.find(name)

@@ -127,5 +127,6 @@ class Registry(Generic[Part]):
         try:
             return entry.load()
         except Exception as error:  # whatever a foreign module raises, one line names it
-            reason = f"loadable from {entry.value} ({type(error).__name__}: {error})"
-            raise PartError(self.kind, name, reason) from error
+            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            expected = f"loadable from {entry.value} ({reason})"
+            raise PartError(self.kind, name, expected) from error

@@ -1,0 +1,259 @@
+"""Graph: what follows from the stages, and what is refused before anything runs."""
+
+from itertools import permutations
+
+import pytest
+
+from teleop_core import topics
+from teleop_core.errors import ParameterError, PartError, TeleopError, UnknownNameError
+from teleop_core.graph import BUILT_IN, Delay, Graph, build_graph
+from teleop_core.parameters import NoParameters
+from teleop_core.session.configuration import configure
+from teleop_core.stage import STAGES, Stage, register_stage
+from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, in_force, passed_on
+
+BASE = tuple(STAGES.find(name) for name in BUILT_IN)
+ECHO = Topic("test/echo", Kind.POSE, passed_on("slave/measured_cp"))
+LIMITED = Topic("test/limited_cp", Kind.POSE, passed_on("slave/servo_cp"))
+PUSH = Topic("test/push", Kind.WRENCH, passed_on("slave/measured_cp"), adds_to="master/servo_cf")
+
+
+def rest(parameters, state, signals, dt):
+    """Step of a stage that does nothing."""
+
+
+def stage(name="echo", reads=(SLAVE_MEASURED_CP,), writes=(ECHO,), **more):
+    return Stage(name, NoParameters, reads, writes, **{"step": rest, **more})
+
+
+def limit(name="limit", topic=LIMITED):
+    return stage(name, (SLAVE_SERVO_CP,), (topic,), replaces=SLAVE_SERVO_CP)
+
+
+def names(graph):
+    return [member.name for member in graph.members]
+
+
+def feeds(graph, reader, port):
+    """Names of what arrives at a port of a stage of the default arm."""
+    return [
+        link.topic.name
+        for link in graph.links
+        if link.reader.name == reader and link.port.name == port
+    ]
+
+
+# What follows.
+
+
+@pytest.mark.parametrize("order", list(permutations(range(4))))
+def test_order_of_a_tick_is_that_of_the_data_however_stages_are_listed(order):
+    assert names(Graph(tuple(BASE[i] for i in order))) == list(BUILT_IN)
+
+
+def test_order_of_stages_decides_where_the_data_does_not():
+    others = [stage(name, writes=(topic,)) for name, topic in (
+        ("b", ECHO), ("a", Topic("test/other", Kind.POSE, passed_on("slave/measured_cp"))),
+    )]  # fmt: skip
+    assert names(Graph((*BASE, *others))) == [*BUILT_IN, "b", "a"]
+    assert names(Graph((*BASE, *others[::-1]))) == [*BUILT_IN, "a", "b"]
+
+
+def test_arms_follow_each_other_in_the_order_of_their_names():
+    graph = Graph(BASE, ("right", "left"))
+    assert names(graph) == [*BUILT_IN, *(f"left/{name}" for name in BUILT_IN)]
+    assert graph.topics[0] == topics.MASTER_MEASURED_CP
+    assert "left/slave/servo_cp" in {topic.name for topic in graph.topics}
+
+
+def test_arms_share_no_link():
+    for link in Graph(BASE, ("right", "left")).links:
+        assert link.writer.arm == link.reader.arm == link.topic.arm
+
+
+def test_replacing_stage_comes_between_writer_and_readers():
+    graph = Graph((*BASE, limit()))
+    assert names(graph) == ["haptic_master", "motion_scaling", "limit", *BUILT_IN[2:]]
+    assert feeds(graph, "inverse_kinematics", "slave/servo_cp") == ["test/limited_cp"]
+    assert feeds(graph, "limit", "slave/servo_cp") == ["slave/servo_cp"]
+
+
+def test_two_replacing_stages_follow_each_other():
+    second = Topic("test/second_cp", Kind.POSE, passed_on("slave/servo_cp"))
+    graph = Graph((*BASE, limit(), limit("second", second)))
+    assert feeds(graph, "second", "slave/servo_cp") == ["test/limited_cp"]
+    assert feeds(graph, "inverse_kinematics", "slave/servo_cp") == ["test/second_cp"]
+
+
+def test_topic_that_adds_to_another_arrives_beside_it():
+    graph = Graph((*BASE, stage("push", writes=(PUSH,))))
+    assert feeds(graph, "haptic_master", "master/servo_cf") == ["master/servo_cf", "test/push"]
+    added = [link.adds for link in graph.links if link.port.name == "master/servo_cf"]
+    assert added == [False, True]
+
+
+def test_chain_leads_from_the_hand_to_the_slave():
+    assert [topic.name for _, topic in Graph(BASE).chain()] == [
+        "master/measured_cp", "slave/servo_cp", "slave/servo_jp", "slave/setpoint_js",
+    ]  # fmt: skip
+
+
+def test_chain_passes_through_a_replacing_stage():
+    assert "limit" in [name for name, _ in Graph((*BASE, limit())).chain()]
+
+
+# Delays.
+
+
+def test_delay_is_on_all_links_of_its_topic_or_on_those_to_one_reader():
+    everywhere = Graph(BASE, delays=(Delay("slave/servo_cp", 0.02),))
+    delayed = {link.reader.name for link in everywhere.links if link.delay}
+    assert delayed == {"inverse_kinematics"}
+    both = stage("watch", (SLAVE_SERVO_CP,), (LIMITED,))
+    one = Graph((*BASE, both), delays=(Delay("slave/servo_cp", 0.02, "watch"),))
+    assert [(link.reader.name, link.delay) for link in one.links if link.delay] == [("watch", 0.02)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["slave/servo_jp", "=0.1", "slave/servo_jp=", "slave/servo_jp=soon", "slave/servo_jp=-0.1",
+     "slave/servo_jp=nan", "slave/servo_jp=61"],
+)  # fmt: skip
+def test_delay_of_another_form_is_refused_with_an_example(text):
+    with pytest.raises(ParameterError, match=r"slave/servo_jp=0\.02") as error:
+        Delay.parse(text)
+    assert (error.value.name, error.value.value) == ("teleop.delays", text)
+
+
+def test_delay_of_an_unknown_topic_is_refused_with_the_known_ones():
+    with pytest.raises(UnknownNameError) as error:
+        configure(settings=["teleop.delays=[slave/servo_jq=0.02]"])
+    assert error.value.value == "slave/servo_jq"
+    assert "slave/servo_jp" in error.value.alternatives
+
+
+def test_delay_to_an_unknown_reader_is_refused_with_the_known_ones():
+    with pytest.raises(UnknownNameError) as error:
+        configure(settings=["teleop.delays=[slave/servo_jp@slave=0.02]"])
+    assert "slave_sim" in error.value.alternatives
+
+
+def test_delay_to_a_stage_that_does_not_read_the_topic_is_refused():
+    with pytest.raises(PartError, match="reads slave/servo_jp"):
+        Graph(BASE, delays=(Delay("slave/servo_jp", 0.02, "motion_scaling"),))
+
+
+# What is refused.
+
+UNWRITTEN = Topic("test/unwritten", Kind.POSE)
+FORTH = Topic("test/forth", Kind.POSE, passed_on("test/back"))
+BACK = Topic("test/back", Kind.POSE, passed_on("test/forth"))
+CIRCLE = (stage("forth", (BACK,), (FORTH,)), stage("back", (FORTH,), (BACK,)))
+UNFED = stage(reads=(SLAVE_MEASURED_CP, UNWRITTEN))
+NOTED = stage(writes=(), notes=(("ik_status", "i8"),))
+BAD_GRAPHS = {
+    "reader nobody writes for": ((*BASE, UNFED), "echo", "test/unwritten, which no stage writes"),
+    "two stages of one name": ((*BASE, BASE[3]), "slave_sim", "two have this name"),
+    "two writers of a topic": (
+        (*BASE, stage("a"), stage("b")), "b", "the only one that writes test/echo; a does",
+    ),
+    "two stages for one column": ((*BASE, NOTED), "echo", "inverse_kinematics uses"),
+    "stages that wait for each other": ((*BASE, *CIRCLE), "forth", "forth, back wait"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arms", "name", "expected"),
+    [(("left", "left"), "left", "two have this name"), (("", "left arm"), "left arm", "letters"),
+     (("right", ""), "", "letters"), (("right", "2nd"), "2nd", "letters")],
+)  # fmt: skip
+def test_arms_that_cannot_be_told_apart_or_named_are_refused(arms, name, expected):
+    with pytest.raises(PartError) as error:
+        Graph(BASE, arms)
+    assert (error.value.kind, error.value.name) == ("arm", name)
+    assert expected in error.value.expected
+
+
+@pytest.mark.parametrize("case", BAD_GRAPHS)
+def test_graph_that_cannot_run_is_refused_with_the_part_and_what_it_must_be(case):
+    stages, name, expected = BAD_GRAPHS[case]
+    with pytest.raises(PartError) as error:
+        Graph(stages)
+    assert error.value.name == name
+    assert expected in error.value.expected
+    assert "\n" not in str(error.value)
+
+
+def test_circle_runs_with_a_late_input_or_a_delay():
+    late = stage("forth", (BACK,), (FORTH,), late=(BACK,))
+    assert names(Graph((*BASE, late, CIRCLE[1])))[-2:] == ["forth", "back"]
+    delayed = Graph((*BASE, *CIRCLE), delays=(Delay("test/forth", 0.001),))
+    assert names(delayed)[-2:] == ["back", "forth"]
+
+
+BAD_STAGES = {
+    "replaces what it does not read": ({"replaces": SLAVE_SERVO_CP}, "reads slave/servo_cp"),
+    "replaces what is of another kind": (
+        {"reads": (topics.MASTER_SERVO_CF,), "writes": (Topic("test/x", Kind.POSE),),
+         "replaces": topics.MASTER_SERVO_CF},
+        "writes its like first",
+    ),
+    "is late in what it does not read": ({"late": (SLAVE_SERVO_CP,)}, "slave/servo_cp (late)"),
+    "needs what it does not read": ({"needs": (SLAVE_SERVO_CP,)}, "slave/servo_cp (needs)"),
+    "is triggered by what it does not read": ({"trigger": SLAVE_SERVO_CP}, "slave/servo_cp"),
+    "passes on a stamp it does not get": (
+        {"writes": (Topic("test/x", Kind.POSE, passed_on("slave/servo_cp")),)}, "slave/servo_cp",
+    ),
+    "has no step": ({"step": None}, "with a step"),
+    "has a step of three arguments": ({"step": lambda p, s, row: None}, "four arguments"),
+    "has a step and a maker": ({"make": lambda p, dt: None}, "with a step"),
+    "has joints and no robot": ({"reads": (topics.SLAVE_MEASURED_JS,), "writes": ()}, "Robot"),
+    "has no fields for a state": ({"state": (("a", "nothing"),)}, "state"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD_STAGES)
+def test_stage_that_contradicts_itself_is_refused(case):
+    values, expected = BAD_STAGES[case]
+    with pytest.raises(PartError) as error:
+        stage(**values)
+    assert (error.value.kind, error.value.name) == ("stage", "echo")
+    assert expected in error.value.expected
+
+
+def test_stage_whose_stamp_is_of_a_command_in_force_gives_it_itself():
+    assert stage(writes=(Topic("test/x", Kind.POSE, in_force("slave/servo_jp")),)).writes
+
+
+def test_stage_whose_parameters_are_no_dataclass_is_refused():
+    with pytest.raises(PartError, match="dataclass"):
+        Stage("echo", dict, (SLAVE_MEASURED_CP,), (ECHO,), step=rest)
+
+
+def test_unknown_stage_is_refused_with_the_known_ones():
+    with pytest.raises(UnknownNameError) as error:
+        build_graph(stages=["limiter"])
+    assert set(BUILT_IN) <= set(error.value.alternatives)
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ["teleop.stages=[reader]", "teleop.stages=[slave_sim]", "teleop.stages=[recorder]",
+     "teleop.arms=[left, left]", "teleop.delays=[nothing=0.1]"],
+)  # fmt: skip
+def test_wrong_graph_is_refused_by_the_configuration_in_one_line(own_parts, setting):
+    register_stage(stage("reader", (UNWRITTEN,), ()))
+    with pytest.raises(TeleopError) as error:
+        configure(settings=[setting])
+    assert "\n" not in str(error.value)
+
+
+# Axis maps are checked with the parameters.
+
+
+@pytest.mark.parametrize("name", ["axes", "tool_axes"])
+@pytest.mark.parametrize("axes", ["[+x, +y, -z]", "[+z, -x, +y, +x]", "[+x, +x, +z]", "[x, y, z]"])
+def test_axis_map_that_mirrors_or_is_none_is_refused(name, axes):
+    with pytest.raises(ParameterError) as error:
+        configure(settings=[f"{name}={axes}"])
+    assert error.value.name.endswith(name)
