@@ -1,17 +1,19 @@
 """Operators: rest at the start, region kept, stops reached, samples followed, own ones at work."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.errors import ParameterError
-from teleop_core.operators import OPERATORS, Setting, following
+from teleop_core.errors import ParameterError, PartError
+from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.operators import OPERATORS, Operator, Setting, following, register_operator
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.shapes import PHASES, minimum_jerk
-from teleop_core.parameters import NoParameters, build
+from teleop_core.parameters import NoParameters, build, parameter
 
 # Products of numbers below one.
 ROUNDING = 1e-15
@@ -176,3 +178,161 @@ def test_recorded_path_without_a_recording_is_refused():
     with pytest.raises(ParameterError) as error:
         build(OperatorParameters, {"kind": "bag"})
     assert error.value.name == "operator.bag"
+
+
+# Own operators.
+
+
+def samples(count=5, columns=9):
+    rng = np.random.default_rng(3)
+    rows = rng.uniform(-0.02, 0.02, (count, columns))
+    rows[:, 6:] = rng.integers(0, 2, rows[:, 6:].shape)
+    return 0.5 * np.arange(count), rows
+
+
+@pytest.mark.parametrize("columns", [3, 6, 9])
+def test_given_samples_are_followed_linearly_and_their_buttons_held(columns):
+    times, rows = samples(columns=columns)
+    motion = following("mine", times, rows).make(NoParameters(), None)
+    assert np.allclose(motion(times), rows, rtol=0, atol=ROUNDING)
+    between = motion(times[:-1] + 0.25)
+    middle = 0.5 * (rows[:-1] + rows[1:])
+    assert np.allclose(between[:, :6], middle[:, :6], rtol=0, atol=ROUNDING)
+    assert np.array_equal(between[:, 6:], rows[:-1, 6:])
+    rest = motion(np.array([-1.0, 99.0]))
+    assert np.array_equal(rest, rows[[0, -1]])
+
+
+def test_given_samples_are_kept_whatever_their_owner_does_with_the_arrays():
+    times, rows = samples()
+    motion = following("mine", times, rows).make(NoParameters(), None)
+    before = motion(np.array([1.0]))
+    rows[:] = 0.0
+    assert np.array_equal(motion(np.array([1.0])), before)
+
+
+BAD_SAMPLES = {
+    "no samples": (np.zeros(0), np.zeros((0, 3)), "not (0,), (0, 3)"),
+    "rows of another number": (np.arange(3), np.zeros((2, 3)), "not (3,), (2, 3)"),
+    "a single row": (np.arange(3), np.zeros(3), "not (3,), (3,)"),
+    "four columns": (np.arange(3), np.zeros((3, 4)), "not 4"),
+    "a number that is none": (np.arange(2), np.array([[0, 0, 0], [0, np.nan, 0]]), "row 1"),
+    "a time that is none": (np.array([0.0, np.nan]), np.zeros((2, 3)), "row 1"),
+    "times that stand still": (np.array([0.0, 1.0, 1.0]), np.zeros((3, 3)), "row 2"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_SAMPLES)
+def test_samples_that_are_no_motion_are_refused(case):
+    times, rows, expected = BAD_SAMPLES[case]
+    with pytest.raises(PartError) as error:
+        following("mine", times, rows)
+    assert (error.value.kind, error.value.name) == ("operator", "mine")
+    assert expected in error.value.expected
+
+
+def master_of(name, **values):
+    wanted = build(OperatorParameters, {"kind": name, **values})
+    return HapticMaster(HapticMasterParameters(operator=wanted))
+
+
+def poses(master, ticks):
+    out = np.empty((ticks, 10))
+    for i in range(ticks):
+        master.step()
+        out[i] = *master.signals["master_measured_cp"], *master.signals["master_buttons"]
+    return out
+
+
+def test_own_motion_moves_the_hand_as_the_built_in_one_of_the_same_formula(own_parts):
+    setting = {"approach_time": 0.1, "rotation": 0.0, "period": 2.0}
+    register_operator("mine", motion_of("line", 1, **setting, center=(0.0,) * 3, tilt=(0.0,) * 3))
+    built_in = master_of("line", **setting, size=SIZE)
+    assert np.array_equal(poses(master_of("mine"), 600), poses(built_in, 600))
+
+
+def test_operator_who_is_asked_tick_by_tick_moves_the_hand_to_the_same_bits(own_parts):
+    asked = []
+
+    def make(parameters, setting):
+        motion = motion_of("circle", 1)
+
+        def noted(times):
+            asked.append(len(times))
+            return motion(times)
+
+        return noted
+
+    register_operator("ahead", Operator("ahead", make))
+    register_operator("now", Operator("now", make, ahead=1))
+    first = poses(master_of("ahead"), 50)
+    assert asked == [1000]
+    assert np.array_equal(poses(master_of("now"), 50), first)
+    assert asked[1:] == [1] * 50
+
+
+def test_own_operator_presses_buttons_beside_those_of_the_parameters(own_parts):
+    def pressing(times):
+        rows = np.zeros((len(times), 9))
+        rows[:, 6] = times > 0.0305
+        return rows
+
+    register_operator("pressing", pressing)
+    master = master_of("pressing")
+    assert np.array_equal(np.flatnonzero(poses(master, 60)[:, 7]), np.arange(30, 60))
+
+
+def test_own_operator_is_made_with_its_parameters_the_seed_and_its_phases(own_parts):
+    @dataclass(frozen=True, kw_only=True)
+    class Wanted:
+        height: float = parameter(0.01, unit="m", doc="how high")
+
+    made = []
+
+    def make(parameters, setting):
+        made.append((parameters.height, setting.seed, setting.phases.shape))
+        return lambda times: np.zeros((len(times), 3))
+
+    register_operator("mine", Operator("mine", make, Wanted))
+    master_of("mine", **{"mine.height": 0.02})
+    assert made == [(0.02, 1, PHASES)]
+
+
+BAD_MOTIONS = {
+    "takes no times": (lambda: np.zeros((1, 3)), "TypeError"),
+    "has four columns": (lambda times: np.zeros((len(times), 4)), "not (1000, 4)"),
+    "answers one row": (lambda times: np.zeros(3), "not (3,)"),
+    "answers no number": (lambda times: np.full((len(times), 3), np.nan), "at 0.001 s"),
+    "answers words": (lambda times: "up", "numbers"),
+    "raises": (lambda times: {}["up"], "KeyError"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_MOTIONS)
+def test_operator_who_answers_wrongly_is_refused_before_the_first_tick(own_parts, case):
+    motion, expected = BAD_MOTIONS[case]
+    register_operator("mine", motion)
+    master = master_of("mine")
+    with pytest.raises(PartError) as error:
+        master.step()
+    assert (error.value.kind, error.value.name) == ("operator", "mine")
+    assert expected in error.value.expected
+    assert master.signals["master_measured_cv"].any() is np.False_
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [({"make": 5}, "make can be called"), ({"ahead": 0}, ">= 1 tick"),
+     ({"parameters": dict}, "dataclass")],
+)  # fmt: skip
+def test_operator_that_is_put_together_wrongly_is_refused(own_parts, values, expected):
+    parts = {"make": lambda parameters, setting: motion_of("hold", 1)}
+    with pytest.raises(PartError) as error:
+        register_operator("mine", Operator("mine", **{**parts, **values}))
+    assert expected in error.value.expected
+
+
+def test_maker_of_another_signature_is_refused_with_the_one_expected(own_parts):
+    register_operator("mine", Operator("mine", lambda parameters: None))
+    with pytest.raises(PartError, match=r"make\(parameters, setting\)"):
+        master_of("mine")
