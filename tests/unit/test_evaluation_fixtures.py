@@ -127,6 +127,15 @@ def test_each_arm_has_its_own_map_of_axes(recipe, path):
     assert np.array_equal(read_origin(bag).axes, AXES)
 
 
+@pytest.mark.parametrize(
+    "axes", ["-z", ["+x", "+y"], ["+x", "+x", "+y"], ["+x", "+y", "-z"], ["a", "b", "c"]]
+)
+def test_map_of_axes_that_is_none_is_the_published_one(recipe, path, axes):
+    said = {"motion_scaling": {"ros__parameters": {"axes": axes}}}
+    recipe.metadata["configuration"] = yaml.safe_dump(said)
+    assert np.array_equal(read_origin(recipe.write(path)).axes, AXES)
+
+
 def test_kind_and_size_may_change_while_the_fixture_is_on(recipe, path):
     recipe.singles = [
         fixture_on(SPHERE),

@@ -7,10 +7,15 @@ from functools import cached_property
 import yaml
 
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import TeleopError
+from teleop_core.errors import ParameterError, TeleopError
 from teleop_core.geometry import Array
 from teleop_core.graph import Graph, build_graph
-from teleop_core.mapping.motion_scaling import MOTION_SCALING, MotionScalingParameters, axis_map
+from teleop_core.mapping.motion_scaling import (
+    AXES,
+    MOTION_SCALING,
+    MotionScalingParameters,
+    axis_map,
+)
 from teleop_core.parameters import build
 from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer
 from teleop_core.stage import STAGES
@@ -86,10 +91,11 @@ def _graph(layer: Layer) -> Graph:
 
 def _axes(layer: Layer, arm: str) -> Array:
     """Map of the arm, of all arms, or the published one."""
-    name = MOTION_SCALING.name
-    said = layer.get(name, {}) | layer.get(f"{arm}/{name}", {})
-    values = {"axes": said["axes"]} if "axes" in said else {}
+    name, published = MOTION_SCALING.name, axis_map("axes", MotionScalingParameters.axes)
+    said = (layer.get(name, {}) | layer.get(f"{arm}/{name}", {})).get("axes")
+    if not isinstance(said, list | tuple) or len(said) != 3 or not set(said) <= set(AXES):
+        return published
     try:
-        return axis_map("axes", build(MotionScalingParameters, values).axes)
-    except TeleopError:
-        return axis_map("axes", MotionScalingParameters().axes)
+        return axis_map("axes", tuple(said))
+    except ParameterError:
+        return published
