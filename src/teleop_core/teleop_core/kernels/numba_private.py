@@ -124,6 +124,14 @@ def generated_dispatcher(function: FunctionType) -> Any:
     return dispatcher(function)
 
 
+class Pointer(CFunc):
+    """Function of a fixed signature; numba need not compare that in every call it is handed to."""
+
+    def __wrapper_address__(self) -> int:
+        """Address of the compiled function."""
+        return self.address or 0
+
+
 def c_function(function: Any, signature: Any) -> Any:
     """Function of a fixed signature, kernel or not, as a value that kernels call.
 
@@ -133,7 +141,7 @@ def c_function(function: Any, signature: Any) -> Any:
     arguments, result = normalize_signature(signature)
     is_compiled = isinstance(function, CPUDispatcher)
     target = function.py_func if is_compiled else entry_of(function, arguments, result)
-    callback: Any = CFunc(target, (arguments, result), locals={}, options=_ERRORS)
+    callback: Any = Pointer(target, (arguments, result), locals={}, options=_ERRORS)
     if is_compiled:
         callback._cache = _cache(target)
     try:
