@@ -1,1 +1,1 @@
-"""."""
+"""Master: the simulated haptic device and the hand that holds it."""

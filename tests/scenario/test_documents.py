@@ -1,0 +1,110 @@
+"""Documents keep their word: links lead somewhere, commands parse, snippets run, pages are new."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+import teleop_core
+from teleop_core.cli import _parser
+from teleop_core.session.configuration import parse_setting
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("bags/*.md")]
+NAMES = [path.relative_to(ROOT).as_posix() for path in sorted(PAGES)]
+PACKAGE_HEADING = "## As an installed package"
+
+
+def text_of(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def snippets(text: str, language: str) -> list[str]:
+    """Fenced blocks of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+def commands(text: str) -> list[str]:
+    """Lines of code that call ``teleop``, without their comments."""
+    return re.findall(r"^ {4}(?:\S*/)?teleop (.+)$", text, re.MULTILINE)
+
+
+def anchors(text: str) -> set[str]:
+    """Anchors of the headings, as they are made from their texts."""
+    heads = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head).strip().lower().replace(" ", "-") for head in heads}
+
+
+def run(code: list[str], folder: Path, **env: str) -> "subprocess.CompletedProcess[str]":
+    done = subprocess.run(
+        [sys.executable, *code], cwd=folder, capture_output=True, text=True, timeout=300,
+        check=False, env=os.environ | env,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_relative_link_leads_somewhere(name):
+    for target in re.findall(r"\]\(([^)\s]+)\)", text_of(name)):
+        if "://" in target:
+            continue
+        path, _, anchor = target.partition("#")
+        place = ((ROOT / name).parent / path).resolve() if path else ROOT / name
+        assert place.exists(), target
+        if anchor:
+            assert anchor in anchors(place.read_text(encoding="utf-8")), target
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_teleop_command_parses_with_its_settings(name):
+    for line in commands(text_of(name)):
+        words = shlex.split(line, comments=True)
+        arguments = _parser().parse_args([word for word in words if word != "..."])
+        for setting in getattr(arguments, "settings", []):
+            if not arguments.parts:
+                assert parse_setting(setting)
+
+
+def test_commands_are_found_in_the_readme():
+    assert len(commands(text_of("README.md"))) > 8
+
+
+def test_generated_pages_are_what_the_code_says():
+    run([str(ROOT / "docs" / "generate.py"), "--check"], ROOT)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if snippets(text_of(name).split(PACKAGE_HEADING)[0], "python")]
+)
+def test_python_of_a_document_runs_from_top_to_bottom(name, tmp_path):
+    code = "\n".join(snippets(text_of(name).split(PACKAGE_HEADING)[0], "python"))
+    (tmp_path / "document.py").write_text(code, encoding="utf-8")
+    run(["document.py"], tmp_path)
+
+
+@pytest.mark.slow
+def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(tmp_path):
+    section = text_of("docs/parts.md").split(PACKAGE_HEADING)[1]
+    (tmp_path / "pyproject.toml").write_text(snippets(section, "toml")[0])
+    (tmp_path / "my_teleop_parts.py").write_text(snippets(section, "python")[0])
+    # What an editable installation does, without pip, which would ask an index for build tools.
+    run(["-c", "import setuptools; setuptools.setup()", "-q", "egg_info"], tmp_path)
+    sim = ["sim", "--duration", "1", "--out", "bag", "--set", "fixture=half_space", "room=0.02",
+           "operator=still"]  # fmt: skip
+    run(["-m", "teleop_core.cli", *sim], tmp_path, PYTHONPATH=str(tmp_path))
+
+
+def test_version_is_the_same_wherever_it_stands():
+    tree = ET.parse(ROOT / "src/teleop_core/package.xml")
+    setup = text_of("src/teleop_core/setup.py")
+    version = teleop_core.__version__
+    assert tree.findtext("version") == version
+    assert f'version="{version}"' in setup
+    assert f"## {version}" in text_of("CHANGELOG.md")
