@@ -18,9 +18,8 @@ def fixture_depth(positions: Array, states: States, axes: Array) -> Array:
     """
     offsets, gain = positions - states.center, states.column("gain")
     depth = np.full(len(positions), np.nan)
-    for index in np.unique(states.fixture).tolist():
-        fixture = states.fixtures[index]
+    for fixture, count in states.fixture_counts().items():
         if not fixture.fault:
-            here = states.fixture == index
+            here = states.is_told(fixture) if count < len(positions) else slice(None)
             depth[here] = fixture.depths(offsets[here], gain[here], axes)
     return depth

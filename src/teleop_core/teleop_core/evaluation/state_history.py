@@ -62,7 +62,18 @@ class States:
 
     def only(self, is_kept: NDArray[np.bool_]) -> "States":
         """States of some of the times; ``is_kept`` has the shape (N,)."""
+        if is_kept.all():
+            return self
         return States(self.rows[is_kept], self.fixture[is_kept], self.fixtures)
+
+    def fixture_counts(self) -> dict[ReportedFixture, int]:
+        """Fixtures that are told, on or off, and at how many of the times."""
+        counts = np.bincount(self.fixture).tolist()
+        return {self.fixtures[index]: count for index, count in enumerate(counts) if count}
+
+    def is_told(self, fixture: ReportedFixture) -> NDArray[np.bool_]:
+        """Whether this fixture is told, on or off, shape (N,)."""
+        return self.fixture == self.fixtures.index(fixture)
 
     @property
     def center(self) -> Array:

@@ -76,18 +76,19 @@ class FixtureMetric(Metric):
         depth, held = self._depth(window, SLAVE_MEASURED_CP)
         self._outside += int((depth > 0.0).sum())
         self._slave.add(depth * 1e3)
-        for index, count in zip(*np.unique(held.fixture, return_counts=True), strict=True):
-            self._on[held.fixtures[index]] += int(count)
+        self._on.update(held.fixture_counts())
         depth, held = self._depth(window, SLAVE_SERVO_CP)
         with np.errstate(divide="ignore", invalid="ignore"):
             self._hand.add(depth * 1e3 / held.column("gain"))
 
     def _depth(self, window: Window, topic: Topic) -> tuple[Array, States]:
         """Distance (N,) [m] from the fixture at the samples with it on, and their states."""
-        states = window.states(topic)
+        states, positions = window.states(topic), window.samples(topic).values[:, :3]
         is_on = states.is_fixture_on
         held = states.only(is_on)
-        return fixture_depth(window.samples(topic).values[is_on, :3], held, self._axes), held
+        if held is not states:
+            positions = positions[is_on]
+        return fixture_depth(positions, held, self._axes), held
 
     def values(self) -> FixtureScore:
         """Score of everything so far."""
