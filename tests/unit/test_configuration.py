@@ -196,3 +196,38 @@ def test_groups_of_a_configuration_cannot_be_changed_behind_its_back():
     scaling = configure().groups["motion_scaling"]
     with pytest.raises(dataclasses.FrozenInstanceError):
         scaling.coarse_gain = 2.0
+
+
+# Former names.
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "stage", "name", "meant"),
+    [
+        ("path.kind", "circle", "haptic_master", "operator.kind", "circle"),
+        ("haptic_master.path.period", 5.0, "haptic_master", "operator.period", 5.0),
+        ("fixture.size", "[0.1, 0.2, 0.3]", "motion_scaling", "fixture.box.size", (0.1, 0.2, 0.3)),
+        ("pid.kp", "[1.0]", "slave_sim", "controller.pid.kp", (1.0,)),
+        ("slave_sim.pid.bandwidth", "[1.0]", "slave_sim", "controller.pid.bandwidth", (1.0,)),
+    ],
+)
+def test_former_name_sets_what_it_is_called_now(key, value, stage, name, meant):
+    assert parse_setting(f"{key}={value}") == {stage: {name: meant}}
+
+
+def test_file_with_former_names_gives_the_same_configuration(tmp_path):
+    old = {
+        "haptic_master": {"path": {"kind": "circle", "period": 5.0}, "seed": 3},
+        "motion_scaling": {"fixture.size": [0.1, 0.2, 0.3]},
+        "slave_sim": {"pid": {"kp": [1.0] * 6}},
+    }
+    now = {
+        "haptic_master": {"operator.kind": "circle", "operator.period": 5.0, "seed": 3},
+        "motion_scaling": {"fixture": {"box": {"size": [0.1, 0.2, 0.3]}}},
+        "slave_sim": {"controller.pid.kp": [1.0] * 6},
+    }
+    first, second = (
+        write(tmp_path / name, {stage: {"ros__parameters": group} for stage, group in file.items()})
+        for name, file in (("old.yaml", old), ("now.yaml", now))
+    )
+    assert configure(files=[first]) == configure(files=[second])

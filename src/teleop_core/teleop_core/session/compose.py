@@ -193,8 +193,8 @@ def _say_link(
     source, stamp = f"r{writer}.{plain}", f"r{writer}.{plain}_ns"
     if link.writer.name in played:
         source, stamp = f"row.{link.topic.field}", f"row.{link.topic.field}_ns"
-    is_after = writer > places[link.reader.name] and not link.is_late
-    ticks = round(link.delay / dt) - is_after
+    is_after = writer > places[link.reader.name]  # what it holds is of the last tick already
+    ticks = round(link.delay / dt) + link.is_late - is_after
     how = "add" if link.adds else "copy"
     if ticks <= 0:
         text.say(f"{how}({source}, {reader}.{port})")

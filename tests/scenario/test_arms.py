@@ -1,0 +1,116 @@
+"""Arms: each one as if it were alone, with its own parameters and robot, in one recording."""
+
+import numpy as np
+import pytest
+import yaml
+
+from teleop_core.bags.reader import Bag
+from teleop_core.errors import TeleopError
+from teleop_core.session.configuration import Configuration, configure
+from teleop_core.session.layers import parse_layer
+from teleop_core.session.runner import replay, simulate
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.topics import STREAMS
+
+TICKS = 1500
+SHORT = ("approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]")
+ARMS = ("teleop.arms=[right, left]", "left/robot=scara", "left/seed=7", "left/coarse_gain=0.5",
+        "right/fixture=sphere", "right/fixture.sphere.diameter=0.01")  # fmt: skip
+
+
+def settings(*more):
+    return configure(settings=[*SHORT, *more])
+
+
+@pytest.fixture(scope="module")
+def both():
+    """Rows of a session of two arms with different robots."""
+    return VirtualTime(settings(*ARMS)).run(TICKS)
+
+
+def assert_same_streams(block, arm, other):
+    for topic in STREAMS:
+        field = topic.of_arm(arm).field
+        assert np.array_equal(block[field], other[topic.field]), field
+        assert np.array_equal(block[f"{field}_ns"], other[f"{topic.field}_ns"]), field
+
+
+def test_default_arm_moves_as_alone_to_the_bit(both):
+    alone = VirtualTime(settings("fixture=sphere", "fixture.sphere.diameter=0.01")).run(TICKS)
+    assert_same_streams(both, "", alone)
+    assert np.abs(both["master_servo_cf"]).max() > 0.1
+
+
+def test_second_arm_moves_as_its_robot_alone_to_the_bit(both):
+    alone = VirtualTime(settings("robot=scara", "seed=7", "coarse_gain=0.5")).run(TICKS)
+    assert_same_streams(both, "left", alone)
+
+
+def test_arms_differ_in_what_is_said_of_one_alone():
+    groups = settings(*ARMS, "fine_gain=0.2").groups
+    assert (groups["slave_sim"].robot, groups["left/slave_sim"].robot) == ("rcrt1", "scara")
+    gains = [groups[f"{arm}motion_scaling"].coarse_gain for arm in ("", "left/")]
+    kinds = [groups[f"{arm}motion_scaling"].fixture.kind.kind for arm in ("", "left/")]
+    fine = [groups[f"{arm}motion_scaling"].fine_gain for arm in ("", "left/")]
+    assert (gains, kinds, fine) == ([1.0, 0.5], ["sphere", "box"], [0.2, 0.2])
+
+
+def test_what_is_said_of_an_arm_wins_whatever_comes_later():
+    groups = settings("teleop.arms=[right, left]", "left/seed=7", "seed=9").groups
+    assert (groups["haptic_master"].seed, groups["left/haptic_master"].seed) == (9, 7)
+
+
+def test_arms_are_said_in_files_too(tmp_path):
+    path = tmp_path / "arms.yaml"
+    path.write_text(
+        "teleop: {ros__parameters: {arms: [right, left]}}\n"
+        "left/haptic_master: {ros__parameters: {seed: 7}}\n"
+        "/right/haptic_master: {ros__parameters: {seed: 5}}\n"
+    )
+    groups = configure(files=[path]).groups
+    assert (groups["haptic_master"].seed, groups["left/haptic_master"].seed) == (5, 7)
+
+
+def test_text_of_two_arms_reads_back_the_same():
+    configuration = settings(*ARMS)
+    layer = parse_layer(yaml.safe_load(configuration.text()), "text")
+    assert Configuration.from_layers([layer]) == configuration
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        (("teleop.arms=[left, left]",), "left"),
+        (("teleop.arms=[right, 'left arm']",), "left arm"),
+        (("teleop.arms=[right, left]", "middle/seed=3"), "right, left"),
+        (("left/seed=3",), "left"),
+        (("teleop.arms=[right, left]", "left/slave_sim.robot=mma"), "left/inverse_kinematics"),
+        (
+            ("teleop.arms=[right, left]", "teleop.delays=[up/slave/servo_jp=0.1]"),
+            "left/slave/servo_jp",
+        ),
+    ],
+)
+def test_wrong_arms_are_refused_in_one_line_before_anything_runs(more, says):
+    with pytest.raises(TeleopError, match=says) as error:
+        settings(*more)
+    assert "\n" not in str(error.value)
+
+
+def test_delay_of_one_arm_is_not_one_of_the_other(both):
+    block = VirtualTime(settings(*ARMS, "teleop.delays=[left/slave/servo_jp=0.02]")).run(TICKS)
+    assert np.array_equal(block["slave_setpoint_js"], both["slave_setpoint_js"])
+    setpoints = [rows["left_slave_setpoint_js"] for rows in (block, both)]
+    assert np.array_equal(setpoints[0][20:], setpoints[1][:-20])
+
+
+def test_one_recording_holds_and_replays_both_arms_to_the_bit(tmp_path, both):
+    configuration = settings(*ARMS, "duration=1.5")
+    simulate(configuration, tmp_path / "bag")
+    bag = Bag(tmp_path / "bag")
+    replay(bag, configuration, tmp_path / "again")
+    again = Bag(tmp_path / "again")
+    for arm in ("", "left"):
+        for topic in (topic.of_arm(arm) for topic in STREAMS):
+            assert np.array_equal(bag.read(topic).values, both[topic.field]), topic.name
+            assert np.array_equal(bag.read(topic).values, again.read(topic).values), topic.name

@@ -1,0 +1,275 @@
+"""Own parts in sessions: delays, stages, fixtures, controllers, operators, compiled and plain."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from teleop_core.bags.reader import Bag
+from teleop_core.controllers import register_controller
+from teleop_core.controllers.pid import PID, pid_control
+from teleop_core.fixtures import register_fixture
+from teleop_core.fixtures.box import BOX
+from teleop_core.fixtures.sphere import SPHERE, sphere_depth
+from teleop_core.kernels import kernel
+from teleop_core.parameters import NoParameters, parameter
+from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
+from teleop_core.session.runner import simulate
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.signals import STATE, TICK_NS
+from teleop_core.stage import Stage, register_stage
+from teleop_core.topics import (
+    MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+    STREAMS,
+    Kind,
+    Topic,
+    passed_on,
+)
+
+TICKS = 1500
+MS = 1e-3
+SHORT = ("approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]",
+         "buttons.clutch=[0.9, 1.0]", "fixture.box.size=[0.01, 0.01, 0.01]")  # fmt: skip
+
+
+def session(*settings, scenario="coarse_box", ticks=TICKS):
+    return VirtualTime(configure(scenario, settings=[*SHORT, *settings])).run(ticks)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """Rows of a session without any further part."""
+    return session()
+
+
+def assert_same_streams(block, other, topics=STREAMS):
+    for topic in topics:
+        for field in (topic.field, f"{topic.field}_ns"):
+            assert np.array_equal(block[field], other[field]), field
+
+
+# Delays.
+
+
+def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(plain):
+    delayed = session("teleop.delays=[slave/servo_jp=0.02]")
+    assert_same_streams(delayed, plain, [t for t in STREAMS if t.name.startswith("master/")])
+    for field in ("slave_setpoint_js", "slave_setpoint_cp"):
+        assert np.array_equal(delayed[field][20:], plain[field][:-20]), field
+    assert (delayed["slave_setpoint_js"][:20] == load_robot("rcrt1").home).all()
+    assert np.array_equal(
+        delayed["slave_setpoint_js_ns"], np.maximum(plain["slave_servo_jp_ns"] - 20 * TICK_NS, 0)
+    )
+
+
+@pytest.mark.parametrize(("seconds", "ticks"), [(0.0, 0), (0.0014, 1), (0.001, 1), (0.02, 20)])
+def test_delay_on_a_late_link_comes_on_top_of_its_tick(seconds, ticks):
+    block = session(f"teleop.delays=[master/servo_cf={seconds}]", "max_force=2.0")
+    applied, late = block["master_measured_cf"][:, :3], 1 + ticks
+    # What the device applies is what was asked for, this many ticks ago, below its peak force.
+    assert np.array_equal(applied[late:], block["master_servo_cf"][:-late, :3])
+    assert not applied[:late].any()
+    assert np.abs(applied).max() > 0.1
+
+
+def mirror(name, topic, **more):
+    """Stage that repeats the slave's pose, however old, under the name of its topic."""
+
+    def step(parameters, state, signals, dt):
+        signals[topic.field] = signals["slave_measured_cp"]
+
+    return Stage(name, NoParameters, (SLAVE_MEASURED_CP,), (topic,), step=step, **more)
+
+
+def test_delay_to_one_reader_leaves_the_others_in_time(own_parts, plain):
+    first, second = (
+        Topic(f"test/{name}", Kind.POSE, passed_on("slave/measured_cp")) for name in "ab"
+    )
+    register_stage(mirror("first", first))
+    register_stage(mirror("second", second, late=(SLAVE_MEASURED_CP,)))
+    block = session(
+        "teleop.stages=[first, second]",
+        "teleop.delays=[slave/measured_cp@first=0.005, slave/measured_cp@second=0.002]",
+        ticks=300,
+    )
+    pose, stamp = block["slave_measured_cp"], block["slave_measured_cp_ns"]
+    for name, late in (("a", 5), ("b", 3)):
+        assert np.array_equal(block[f"test_{name}"][late:], pose[:-late])
+        assert np.array_equal(block[f"test_{name}_ns"][late:], stamp[:-late])
+    assert_same_streams(block, plain[:300])
+
+
+def test_slave_whose_setpoints_come_too_late_counts_as_not_following(plain):
+    block = session("teleop.delays=[slave/setpoint_cp=0.15]", ticks=400)
+    state = block["teleop_state"][200:, STATE["is_following"]]
+    assert not state.any()
+    assert plain["teleop_state"][200:400, STATE["is_following"]].all()
+
+
+# Stages.
+
+LIMITED = Topic("slave/limited_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitParameters:
+    """How fast the tool may go."""
+
+    speed: float = parameter(0.02, unit="m/s", lower=1e-3, upper=1.0, doc="along each axis")
+
+
+def limit_step(p, s, row, dt):
+    for i in range(7):
+        row.slave_limited_cp[i] = row.slave_servo_cp[i]
+    reach = p.speed * dt
+    for i in range(3):
+        if s.is_begun:
+            step = min(max(row.slave_servo_cp[i] - s.place[i], -reach), reach)
+            row.slave_limited_cp[i] = s.place[i] + step
+        s.place[i] = row.slave_limited_cp[i]
+    s.is_begun = 1
+
+
+def limit(name, step):
+    return Stage(
+        name, LimitParameters, (SLAVE_SERVO_CP,), (LIMITED,), step=step,
+        state=(("place", "f8", (3,)), ("is_begun", "i8")), trigger=SLAVE_SERVO_CP,
+        replaces=SLAVE_SERVO_CP,
+    )  # fmt: skip
+
+
+def test_plain_stage_gives_the_same_bits_as_the_same_function_compiled(own_parts):
+    register_stage(limit("limit", kernel(limit_step)))
+    register_stage(limit("plain_limit", limit_step))
+    compiled = session("teleop.stages=[limit]")
+    interpreted = session("teleop.stages=[plain_limit]")
+    assert_same_streams(compiled, interpreted, [*STREAMS, LIMITED])
+    steps = np.abs(np.diff(compiled["slave_limited_cp"][:, :3], axis=0))
+    # A place of 0.5 m is rounded to 1e-16 m.
+    assert 0.02 * MS - 1e-15 < steps.max() < 0.02 * MS + 1e-15
+    assert np.abs(np.diff(compiled["slave_servo_cp"][:, :3], axis=0)).max() > 0.02 * MS
+
+
+def test_parameters_of_an_own_stage_are_set_like_others(own_parts):
+    register_stage(limit("limit", kernel(limit_step)))
+    block = session("teleop.stages=[limit]", "limit.speed=0.01")
+    steps = np.abs(np.diff(block["slave_limited_cp"][:, :3], axis=0))
+    assert steps.max() < 0.01 * MS + 1e-15
+
+
+def test_own_stage_is_recorded_with_its_topic_and_stamp(own_parts, tmp_path):
+    register_stage(limit("limit", kernel(limit_step)))
+    simulate(configure(settings=["teleop.stages=[limit]", "duration=0.2"]), tmp_path / "bag")
+    series = Bag(tmp_path / "bag").read(LIMITED)
+    assert np.array_equal(series.stamp_ns, TICK_NS * np.arange(1, 201))
+
+
+def test_what_a_plain_stage_raises_reaches_the_user(own_parts):
+    def step(parameters, state, signals, dt):
+        if signals["now_ns"] > 5 * TICK_NS:
+            raise RuntimeError("my own mistake")
+
+    topic = Topic("test/x", Kind.POSE, passed_on("slave/measured_cp"))
+    register_stage(Stage("raising", NoParameters, (SLAVE_MEASURED_CP,), (topic,), step=step))
+    with pytest.raises(RuntimeError, match="my own mistake"):
+        session("teleop.stages=[raising]", ticks=10)
+
+
+# A second source of force.
+
+PUSH = Topic(
+    "contact/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base",
+    adds_to="master/servo_cf",
+)  # fmt: skip
+
+
+def push_step(p, s, row, dt):
+    row.contact_servo_cf[0] = p.newton
+
+
+@dataclass(frozen=True, kw_only=True)
+class PushParameters:
+    """A steady push."""
+
+    newton: float = parameter(1.0, unit="N", doc="along the master's x")
+
+
+@pytest.mark.parametrize("is_compiled", [True, False])
+def test_second_source_of_force_is_added_and_pushes_the_hand(own_parts, plain, is_compiled):
+    step = kernel(push_step) if is_compiled else push_step
+    register_stage(Stage("contact", PushParameters, (MASTER_MEASURED_CP,), (PUSH,), step=step))
+    block = session("teleop.stages=[contact]", "contact.newton=1.5", "max_force=1.5")
+    applied, walls = block["master_measured_cf"][1:, :3], block["master_servo_cf"][:-1, :3]
+    assert np.array_equal(applied, walls + np.array((1.5, 0.0, 0.0)))
+    assert np.abs(walls).max() > 0.1
+    # Force over the hand's 300 N/m, less what friction holds.
+    moved = block["master_measured_cp"][150, 0] - plain["master_measured_cp"][150, 0]
+    assert 0.5 * 1.5 / 300.0 < moved < 1.1 * 1.5 / 300.0
+
+
+# Fixtures, controllers and operators.
+
+
+@pytest.mark.parametrize("shape", [BOX, SPHERE], ids=["box", "sphere"])
+def test_plain_fixture_gives_the_same_bits_as_the_same_depth_compiled(own_parts, shape):
+    register_fixture(replace(shape, name="plain", depth=shape.depth.py_func))
+    sizes = {"box": "box.size=[0.01, 0.01, 0.01]", "sphere": "sphere.diameter=0.01"}
+    size = sizes[shape.name]
+    compiled = session(f"fixture={shape.name}", f"fixture.{size}")
+    plain_size = f"fixture.plain.{size.partition('.')[2]}"
+    interpreted = session("fixture=plain", plain_size)
+    assert_same_streams(compiled, interpreted)
+    assert np.array_equal(compiled["teleop_state"], interpreted["teleop_state"])
+    assert np.abs(compiled["master_servo_cf"]).max() > 0.1
+
+
+def test_sphere_holds_the_hand_at_the_same_distance_in_all_directions():
+    block = session("fixture=sphere", "fixture.sphere.diameter=0.01", "fixture.wall=soft")
+    force = block["master_servo_cf"][:, :3]
+    center = block["master_measured_cp"][
+        np.argmax(block["teleop_state"][:, STATE["is_fixture_on"]])
+    ]
+    is_free = ~block["master_buttons"][:, 0].astype(bool) & (np.arange(TICKS) < 890)
+    is_pushed = is_free & (np.linalg.norm(force, axis=1) > 0.01)
+    offset = block["master_measured_cp"][is_pushed, :3] - center[:3]
+    push = force[is_pushed]
+    assert is_pushed.sum() > 100
+    # Along the radius, inwards, by the spring of 1000 N/m.
+    assert np.allclose(np.cross(offset, push), 0.0, rtol=0, atol=1e-12)
+    depth = np.linalg.norm(offset, axis=1) - 5 * MS
+    expected = np.minimum(1000.0 * depth, 3.3)
+    assert np.allclose(np.linalg.norm(push, axis=1), expected, rtol=0, atol=1e-9)
+    out = np.empty(3)
+    assert sphere_depth(np.ascontiguousarray(offset[0]), np.array([10 * MS]), out) > 0.0
+
+
+def test_plain_controller_gives_the_same_bits_as_the_same_law_compiled(own_parts, plain):
+    register_controller(replace(PID, name="plain", control=pid_control.py_func))
+    assert_same_streams(session("controller=plain", ticks=300), plain[:300])
+
+
+# Axis maps.
+
+
+def test_default_axis_map_is_the_published_one(plain):
+    named = session("axes=['-z', '-x', '+y']", "tool_axes=['+x', '-y', '-z']", ticks=300)
+    assert_same_streams(named, plain[:300])
+
+
+def test_other_axis_map_moves_the_slave_along_other_axes():
+    line = ("operator=line", "operator.size=[0.02, 0.0, 0.0]", "rotation=0.0",
+            "operator.center=[0.0, 0.0, 0.0]", "operator.tilt=[0.0, 0.0, 0.0]")  # fmt: skip
+    still = (*line, "buttons.fixture=[]", "buttons.clutch=[]", "tremor_amplitude=0.0")
+    axes = {"['-z', '-x', '+y']": (1, -1.0), "['+x', '+y', '+z']": (0, 1.0),
+            "['+y', '+z', '+x']": (2, 1.0), "['-x', '-y', '+z']": (0, -1.0)}  # fmt: skip
+    for text, (axis, sign) in axes.items():
+        block = session(*still, f"axes={text}", ticks=1200)
+        command = block["slave_servo_cp"][:, :3] - block["slave_servo_cp"][0, :3]
+        hand = block["master_measured_cp"][:, 0] - block["master_measured_cp"][0, 0]
+        assert hand.max() > 5 * MS
+        assert np.allclose(command[:, axis], sign * hand, rtol=0, atol=1e-13), text
+        # The hand itself keeps to its line, to a step of the device's reading.
+        assert np.abs(np.delete(command, axis, axis=1)).max() <= 0.056 * MS, text
