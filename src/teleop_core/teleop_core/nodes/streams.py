@@ -190,9 +190,9 @@ class Input:
 
     def _take_held(self) -> bool:
         """As :meth:`take`, of messages whose time has come."""
-        now_ns = time.monotonic_ns()
         while (found := self._next()) is not None:
-            self._held.append((now_ns + self._delay_ns, *found))
+            self._held.append((time.monotonic_ns() + self._delay_ns, *found))
+        now_ns = time.monotonic_ns()
         while self._held and self._held[0][0] <= now_ns:
             _, stamp_ns, values = self._held.popleft()
             if self._accept(stamp_ns, values):
