@@ -73,7 +73,7 @@ def configuration(
     fixture: str | Fixture | None = None,
     controller: str | Controller | None = None,
     robot: str | Robot | DhTable | None = None,
-    stages: Sequence[str | Stage] = (),
+    stages: str | Stage | Sequence[str | Stage] = (),
     arms: Sequence[str] = (),
     delays: Mapping[str, float] | None = None,
     **parameters: Setting,
@@ -90,7 +90,7 @@ def configuration(
         fixture: Shape around the hand: a name, or a part of your own.
         controller: Control law of the slave's joints: a name, or a part of your own.
         robot: The slave: a name, a table's file, or a robot of your own.
-        stages: Further stages of every arm: names, or stages of your own.
+        stages: Further stages of every arm, one or several: names, or stages of your own.
         arms: Names of the arms, the first of which is the default one.
         delays: Delays on links [s]: ``{"slave/servo_jp": 0.02}``.
         **parameters: Parameters by name, with ``__`` for each dot: ``fixture__box__size=...``.
@@ -112,10 +112,11 @@ def configuration(
     if operator is not None:
         named |= _operator_settings(operator)
     if stages:
-        known = [stage if isinstance(stage, str) else _known(STAGES, stage) for stage in stages]
+        several = [stages] if isinstance(stages, str | Stage) else stages
+        known = [stage if isinstance(stage, str) else _known(STAGES, stage) for stage in several]
         named[f"{SESSION}.stages"] = known
     if arms:
-        named[f"{SESSION}.arms"] = list(arms)
+        named[f"{SESSION}.arms"] = [arms] if isinstance(arms, str) else list(arms)
     if delays:
         named[f"{SESSION}.delays"] = [f"{link}={time!r}" for link, time in delays.items()]
     named |= {name.replace("__", "."): value for name, value in parameters.items()}
@@ -141,7 +142,7 @@ def run(
     fixture: str | Fixture | None = None,
     controller: str | Controller | None = None,
     robot: str | Robot | DhTable | None = None,
-    stages: Sequence[str | Stage] = (),
+    stages: str | Stage | Sequence[str | Stage] = (),
     arms: Sequence[str] = (),
     delays: Mapping[str, float] | None = None,
     **parameters: Setting,

@@ -1,1 +1,1 @@
-"""Slave: the simulated arm, its joints and drives, and references that follow each other smoothly."""
+"""Slave: the simulated arm, its joints and drives, and references without jumps."""
