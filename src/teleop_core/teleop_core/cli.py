@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from teleop_core.errors import TeleopError
 
 if TYPE_CHECKING:
-    from teleop_core.recording import Recording
     from teleop_core.session.configuration import Configuration
 
 FAILED = 2
@@ -199,8 +198,8 @@ def _sim(arguments: argparse.Namespace) -> int:
 
     configuration = _configured(arguments)
     with _progress("simulating") as progress:
-        recording = api.run(configuration, out=arguments.out, progress=progress)
-    print(_done(arguments.out, f"{_seconds(recording):g} s recorded"))
+        api.run(configuration, out=arguments.out, progress=progress)
+    print(_done(arguments.out, f"{progress.seconds:g} s recorded"))
     return 0
 
 
@@ -208,11 +207,11 @@ def _replay(arguments: argparse.Namespace) -> int:
     from teleop_core import api
 
     with _progress("replaying") as progress:
-        recording = api.replay(
+        api.replay(
             arguments.bag, out=arguments.out, progress=progress,
             files=arguments.config, texts=arguments.settings,
         )  # fmt: skip
-    print(_done(arguments.out, f"{_seconds(recording):g} s replayed"))
+    print(_done(arguments.out, f"{progress.seconds:g} s replayed"))
     return 0
 
 
@@ -220,13 +219,6 @@ def _configured(arguments: argparse.Namespace) -> "Configuration":
     from teleop_core import api
 
     return api.configuration(arguments.scenario, files=arguments.config, texts=_settings(arguments))
-
-
-def _seconds(recording: "Recording") -> float:
-    """Time of a session: its last tick takes as long as the others."""
-    from teleop_core.signals import DT
-
-    return round(recording.duration + DT, 9)
 
 
 def _done(out: Path, what: str) -> str:
@@ -362,11 +354,32 @@ def _workspace(arguments: argparse.Namespace) -> int:
     return 0
 
 
+class _Progress:
+    """What a session tells of its ticks; shown by a bar if there is one."""
+
+    def __init__(self) -> None:
+        self.ticks = 0
+        self.show: Callable[[int, int], None] | None = None
+
+    def __call__(self, done: int, total: int) -> None:
+        self.ticks = done
+        if self.show is not None:
+            self.show(done, total)
+
+    @property
+    def seconds(self) -> float:
+        """Time of the ticks so far."""
+        from teleop_core.signals import DT
+
+        return round(self.ticks * DT, 9)
+
+
 @contextmanager
-def _progress(text: str) -> Iterator[Callable[[int, int], None]]:
-    """Progress bar on a terminal, nothing when piped; counts are milliseconds."""
+def _progress(text: str) -> Iterator[_Progress]:
+    """Progress bar on a terminal, nothing when piped."""
+    progress = _Progress()
     if not sys.stderr.isatty():
-        yield lambda done, total: None
+        yield progress
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -374,7 +387,8 @@ def _progress(text: str) -> Iterator[Callable[[int, int], None]]:
     columns = (TextColumn(text), BarColumn(), TextColumn("{task.percentage:.0f} %"))
     with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
         task = bar.add_task(text, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        progress.show = lambda done, total: bar.update(task, completed=done, total=total)
+        yield progress
 
 
 if __name__ == "__main__":

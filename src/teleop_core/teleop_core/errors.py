@@ -5,7 +5,11 @@ back as a status beside the value.
 """
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
+
+_SHOWN = 40
+"""Alternatives that a message lists whole."""
 
 
 class TeleopError(Exception):
@@ -21,11 +25,15 @@ class ParameterError(TeleopError, ValueError):
 
 
 class UnknownNameError(ParameterError):
-    """A name is not in its list: carries the ``alternatives`` too."""
+    """A name is not in its list: carries the ``alternatives``; of many the text has the nearest."""
 
     def __init__(self, kind: str, value: object, alternatives: Iterable[str]) -> None:
         self.alternatives = tuple(alternatives)
-        super().__init__(kind, value, "one of: " + ", ".join(self.alternatives))
+        shown = self.alternatives
+        if len(shown) > _SHOWN:
+            near = get_close_matches(str(value), shown, n=8, cutoff=0.3)
+            shown = (*(near or shown[:8]), f"… ({len(self.alternatives)} in all)")
+        super().__init__(kind, value, "one of: " + ", ".join(shown))
 
 
 class PartError(TeleopError):

@@ -215,9 +215,17 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
 
 
 def _as_declared(spec: Spec, value: object) -> object:
-    """Whole numbers as real ones where a real one is declared; text for a name that YAML read."""
+    """Whole numbers as real ones where a real one is declared; text for a name that YAML read.
+
+    A single value stands for a list of one.
+    """
     if isinstance(value, list | tuple):
-        return tuple(_as_declared(spec, element) for element in value)
+        return tuple(_as_element(spec, element) for element in value)
+    one = _as_element(spec, value)
+    return (one,) if spec.kind is tuple and value is not None else one
+
+
+def _as_element(spec: Spec, value: object) -> object:
     if spec.element is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if spec.element is float and isinstance(value, str):  # YAML 1.1 reads 1e-3 as text
