@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup demo test lint format bench bench-setup clean
+.PHONY: setup demo test coverage lint format bench bench-setup clean
 
 setup: $(VENV)/.installed
 
@@ -41,6 +41,10 @@ format: setup
 test: lint
 	$(BIN)/pytest -n 2 -m "not ros"
 	$(BIN)/pytest -n 1 -m ros
+
+# Of kernels, run as plain Python: compiled code leaves no trace.
+coverage: setup
+	$(BIN)/python tests/kernel_coverage.py
 
 bench-setup: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \

@@ -5,12 +5,21 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
+
+from teleop_core.kernels import IS_COMPILED
 
 # Examples are the same in every run, and no clock decides: compiling may take its time.
 settings.register_profile("teleop", deadline=None, derandomize=True, database=None)
 settings.load_profile("teleop")
+if not IS_COMPILED:
+    # Pure-Python kernels are a hundred times slower, and NumPy would warn where compiled code
+    # goes on with infinity.
+    settings.register_profile("pure", settings.get_profile("teleop"), max_examples=10)
+    settings.load_profile("pure")
+    np.seterr(all="ignore")
 
 pytest_plugins = ["forgotten_parts", "middleware_faults"]
 
