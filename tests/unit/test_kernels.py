@@ -105,6 +105,22 @@ def test_record_has_its_fields_as_attributes_and_shares_its_memory():
     assert rows["point"].sum() == 3.0
 
 
+def test_field_named_like_something_that_numpy_numbers_have_is_the_field():
+    @kernel
+    def total(row):
+        row.min = 3.0
+        return row.size + row.min
+
+    row = records([("size", "f8"), ("min", "f8")])[0]
+    row.size = 4.0
+    assert total(row) == 7.0
+    assert (row.size, row.min) == (4.0, 3.0)
+    with pytest.raises(AttributeError, match="record has no field 'sise'"):
+        row.sise = 1.0
+    with pytest.raises(AttributeError, match="no attribute 'sise'"):
+        print(row.sise)
+
+
 def test_kernel_from_source_calls_what_it_is_given_and_is_made_once():
     text = "def twice(x):\n    return polynomial(x) * FACTOR\n"
     made = kernel_from_source(text, "twice", {"polynomial": polynomial, "FACTOR": 2.0})
