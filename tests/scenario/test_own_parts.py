@@ -8,11 +8,13 @@ import pytest
 from teleop_core.bags.reader import Bag
 from teleop_core.controllers import register_controller
 from teleop_core.controllers.pid import PID, pid_control
+from teleop_core.errors import PartError
 from teleop_core.fixtures import register_fixture
 from teleop_core.fixtures.box import BOX
 from teleop_core.fixtures.sphere import SPHERE, sphere_depth
 from teleop_core.kernels import kernel
-from teleop_core.parameters import NoParameters, parameter
+from teleop_core.mapping.motion_scaling import MotionScalingParameters
+from teleop_core.parameters import NoParameters, build, parameter
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.runner import simulate
@@ -175,8 +177,9 @@ def test_what_a_plain_stage_raises_reaches_the_user(own_parts):
 
     topic = Topic("test/x", Kind.POSE, passed_on("slave/measured_cp"))
     register_stage(Stage("raising", NoParameters, (SLAVE_MEASURED_CP,), (topic,), step=step))
-    with pytest.raises(RuntimeError, match="my own mistake"):
+    with pytest.raises(PartError, match=r"RuntimeError: my own mistake \(test_own_parts") as told:
         session("teleop.stages=[raising]", ticks=10)
+    assert isinstance(told.value.__cause__, RuntimeError)
 
 
 # A second source of force.
@@ -274,3 +277,24 @@ def test_other_axis_map_moves_the_slave_along_other_axes():
         assert np.allclose(command[:, axis], sign * hand, rtol=0, atol=1e-13), text
         # The hand itself keeps to its line, to a step of the device's reading.
         assert np.abs(np.delete(command, axis, axis=1)).max() <= 0.056 * MS, text
+
+
+# What composes the tick anew.
+
+
+def test_another_kind_of_fixture_holds_from_the_next_block_on():
+    virtual = VirtualTime(configure("coarse_box"))
+    virtual.run(5000)
+    wide = {"fixture.kind": "sphere", "fixture.sphere.diameter": 0.5}
+    virtual.stages["motion_scaling"].retune(build(MotionScalingParameters, wide))
+    assert not virtual.run(4000)["master_servo_cf"][1:].any()
+    virtual.stages["motion_scaling"].retune(build(MotionScalingParameters, {}))
+    assert virtual.run(4000)["master_servo_cf"].any()
+
+
+def test_reset_stages_repeat_the_session_with_a_jointed_handle_too():
+    virtual = VirtualTime(configure(settings=["device.handle=mma"]))
+    first = virtual.run(300)["master_measured_cp"]
+    for stage in virtual.stages.values():
+        stage.reset()
+    assert np.array_equal(virtual.run(300)["master_measured_cp"], first)

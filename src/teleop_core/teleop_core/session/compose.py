@@ -6,12 +6,15 @@ are plain Python cut it into segments, between which they are called. What was c
 loaded from disk by every later session of the same graph.
 """
 
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from teleop_core.errors import PartError, TeleopError
 from teleop_core.graph import Graph, Link, Member
 from teleop_core.kernels import bound, is_kernel, kernel_from_source, raise_pending, records
 from teleop_core.signals import add, copy, topic_fields
@@ -58,6 +61,8 @@ class _Text:
         self.parts += [call, []]
 
 
+Rings = dict[tuple[str, str, str], Any]
+"""Past values on delayed links, by topic, reader and port."""
 _CLOCK = [("first_ns", "i8"), ("tick_ns", "i8"), ("count", "i8")]
 
 
@@ -109,7 +114,7 @@ class Tick:
             block: Rows of :func:`block_dtype`.
 
         Raises:
-            Exception: What a part in plain Python raised.
+            TeleopError: A part in plain Python raised; its own exception is the cause.
         """
         clock = self._clock
         clock["tick_ns"] = tick_ns
@@ -118,10 +123,26 @@ class Tick:
             clock["first_ns"], clock["count"] = first_ns + begin * tick_ns, len(part)
             if samples is not None:
                 self._samples[: len(part)] = samples[begin : begin + len(part)]
+            self._step()
+            part[:] = self._rows[: len(part)]
+
+    def _step(self) -> None:
+        try:
             for call in self._calls:
                 call()
             raise_pending()
-            part[:] = self._rows[: len(part)]
+        except TeleopError:
+            raise
+        except Exception as error:
+            raise raised_by(error) from error
+
+
+def raised_by(error: Exception) -> PartError:
+    """What a part in plain Python raised, in one line that names function, file and line."""
+    trace = traceback.extract_tb(error.__traceback__)[-1]
+    reason = " ".join(str(error).split())
+    text = f"one that does not raise; {type(error).__name__}: {reason} "
+    return PartError("part", trace.name, f"{text}({Path(trace.filename).name}:{trace.lineno})")
 
 
 def _source(given: Sequence[str], lines: Sequence[str]) -> str:
@@ -143,7 +164,8 @@ def compose(
     dtype: Any,
     dt: float,
     size: int,
-    played: frozenset[str] = frozenset(),
+    played: frozenset[str],
+    rings: Rings,
 ) -> Tick:
     """Tick of a graph.
 
@@ -154,6 +176,7 @@ def compose(
         dt: Length of a tick [s].
         size: Ticks that are made at once, at most.
         played: Members whose topics come from recorded samples; they need no runner.
+        rings: What is on its way on delayed links; an earlier tick's, or empty and filled.
     """
     text = _Text()
     places = {member.name: i for i, member in enumerate(graph.members)}
@@ -167,7 +190,7 @@ def compose(
         if is_compiled:
             text.objects[f"k{number}"] = runner.kernel
         for link in graph.links_of(member):
-            _say_link(text, link, places, runners, played, dt)
+            _say_link(text, link, places, runners, played, dt, rings)
         text.say(f"r{number}.now_ns = now_ns")
         if not is_compiled:
             text.call(_caller(member, runner, dt))
@@ -185,7 +208,7 @@ def _say_played(text: _Text, member: Member) -> None:
 
 def _say_link(
     text: _Text, link: Link, places: Mapping[str, int], runners: Mapping[str, Runner],
-    played: frozenset[str], dt: float,
+    played: frozenset[str], dt: float, rings: Rings,
 ) -> None:  # fmt: skip
     """Lead a value to the port of its reader, through a ring of past ones if it is delayed."""
     reader, port = f"r{places[link.reader.name]}", link.port.field
@@ -200,7 +223,8 @@ def _say_link(
         text.say(f"{how}({source}, {reader}.{port})")
     else:
         ring = f"d{len(text.objects)}"
-        text.objects[ring] = _ring(ticks, link, runners)
+        key = (link.topic.name, link.reader.name, link.port.name)
+        text.objects[ring] = rings.setdefault(key, _ring(ticks, link, runners))
         past = f"past_{ring}"
         text.say(
             f"{past} = {ring}[{ring}[0].at]",

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.kernels import records
-from teleop_core.session.compose import Tick, block_dtype, compose
+from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration
 from teleop_core.signals import TICK_NS
 from teleop_core.stage import Runner, joints_of
@@ -45,10 +45,22 @@ class VirtualTime:
         joints = {arm: len(names) for arm, names in self.joint_names.items()}
         self._dtype = block_dtype(self.graph, joints)
         self._ahead = min([BLOCK, *(stage.ahead for stage in self.stages.values())])
-        self._tick: Tick = compose(
-            self.graph, self.stages, self._dtype, dt, self._ahead, self._played
-        )
+        self._rings: Rings = {}
+        self._tick = self._composed()
         self.now_ns = 0
+
+    def _composed(self) -> Tick:
+        """The tick of the stages as they are now."""
+        self._arguments = [stage.arguments for stage in self.stages.values()]
+        dt = self._tick_ns / 1e9
+        return compose(
+            self.graph, self.stages, self._dtype, dt, self._ahead, self._played, self._rings
+        )
+
+    def _is_stale(self) -> bool:
+        """Whether a stage was given other arguments, as by another kind of fixture."""
+        now = (stage.arguments for stage in self.stages.values())
+        return any(old is not new for old, new in zip(self._arguments, now, strict=True))
 
     def _joints(self, groups: dict[str, Any], arm: str) -> tuple[str, ...]:
         names = [m.name for m in self.graph.members if m.arm == arm]
@@ -95,6 +107,8 @@ class VirtualTime:
 
     def _run(self, ticks: int, samples: Any) -> Any:
         block = self.rows(ticks)
+        if self._is_stale():
+            self._tick = self._composed()
         for begin in range(0, ticks, self._ahead):
             part = block[begin : begin + self._ahead]
             for stage in self.stages.values():
