@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from teleop_core.kernels import IS_COMPILED
+from teleop_core.kernels.versions import SUPPORTED, check_version
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="nothing is kept of what is not compiled")
 
@@ -251,9 +252,40 @@ print(sum(module.factor.stats.cache_hits.values()))
     assert [run(folder), run(folder)] == [([6.0], 0), ([6.0], 1)]
 
 
-def test_versions_of_numba_in_setup_are_those_that_the_kernels_are_written_for():
-    from teleop_core.kernels.numba_private import SUPPORTED
+@pytest.mark.parametrize("left", [0, 0.5])
+def test_broken_files_of_the_cache_are_made_again(tmp_path, left):
+    folder = write_all(tmp_path, CALLS)
+    run(folder)
+    for file in (folder / "c").rglob("*.nb?"):
+        file.write_bytes(file.read_bytes()[: int(left * file.stat().st_size)])
+    assert run(folder) == ([70.0, 7.0], 0)
+    assert run(folder) == ([70.0, 7.0], 1)
 
+
+def test_kernel_works_where_its_cache_cannot_be_written_any_more(tmp_path):
+    folder = write_all(tmp_path, CALLS)
+    (folder / "outer.py").write_text("""
+import shutil
+from pathlib import Path
+from middle import plus_one
+
+first = plus_one(3.0)
+shutil.rmtree("c")
+Path("c").write_text("a file in place of the folder")
+print(first, plus_one(4))
+print(0)
+""")
+    assert run(folder) == ([7.0, 9.0], 0)
+
+
+def test_versions_of_numba_in_setup_are_those_that_the_kernels_are_written_for():
     setup = Path(__file__).parents[2] / "src/teleop_core/setup.py"
     bounds = re.findall(r'"numba>=(\d+)\.(\d+),<(\d+)\.(\d+)"', setup.read_text())
     assert [tuple(map(int, found)) for found in bounds] == [SUPPORTED[0] + SUPPORTED[1]]
+
+
+@pytest.mark.parametrize("found", ["0.67.0", "0.69.0dev0+5.g12ab", "1.0.1"])
+def test_another_version_of_numba_is_refused_in_one_line(found):
+    expected = rf"^numba is {re.escape(found)}, must be >= 0\.68 and < 0\.69$"
+    with pytest.raises(ImportError, match=expected):
+        check_version(found)

@@ -29,6 +29,7 @@ import numpy as np
 from teleop_core.kernels.callables import raise_pending
 from teleop_core.kernels.dependencies import Tokens, hexdigest
 from teleop_core.kernels.fields import record_dtype
+from teleop_core.kernels.versions import check_version
 
 __all__ = [
     "IS_COMPILED",
@@ -50,6 +51,7 @@ IS_COMPILED = not _config.DISABLE_JIT
 """Whether kernels are compiled; False in pure-Python mode."""
 
 if IS_COMPILED:
+    check_version()
     from teleop_core.kernels import numba_private as _compiler
 
 P = ParamSpec("P")

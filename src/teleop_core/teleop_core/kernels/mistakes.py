@@ -8,7 +8,7 @@ from pathlib import Path
 from types import CodeType
 from typing import Any
 
-from numba.core import ir, types
+from numba import types
 
 from teleop_core.errors import KernelError
 
@@ -71,8 +71,9 @@ def _location(error: BaseException) -> tuple[str, int] | None:
     places = [getattr(error, "loc", None)]
     places += [getattr(frame.get("self"), "loc", None) for frame in _frames(error)]
     for place in places:
-        if isinstance(place, ir.Loc) and place.line is not None:
-            return place.filename, place.line
+        file, line = getattr(place, "filename", None), getattr(place, "line", None)
+        if isinstance(file, str) and isinstance(line, int):
+            return file, line
     return None
 
 

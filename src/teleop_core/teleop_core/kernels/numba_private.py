@@ -8,6 +8,8 @@ import gc
 import sys
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
+from pickle import UnpicklingError
 from types import FunctionType
 from typing import Any
 
@@ -28,14 +30,6 @@ from teleop_core import __version__
 from teleop_core.kernels.callables import entry_of
 from teleop_core.kernels.dependencies import digest, source_digest
 from teleop_core.kernels.mistakes import kernel_error
-
-SUPPORTED = ((0, 68), (0, 69))
-"""First version of numba that this module was written for, and the first that may differ."""
-
-_found = tuple(int(part) for part in numba.__version__.split(".")[:2])
-if not SUPPORTED[0] <= _found < SUPPORTED[1]:
-    _first, _last = (".".join(map(str, version)) for version in SUPPORTED)
-    raise ImportError(f"numba is {numba.__version__}, must be >= {_first} and < {_last}")
 
 # Function pointers as arguments are what lets one compiled graph run any robot.
 warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatureWarning)
@@ -159,18 +153,36 @@ def entry(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
     return found
 
 
+class _Cache(FunctionCache):
+    """Cache on disk that is as good as none where its files are broken or cannot be written."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was kept for a signature; None without."""
+        try:
+            return super().load_overload(sig, target_context)
+        except (OSError, EOFError, UnpicklingError):  # as after a loss of power
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled for a signature, if the disk lets us."""
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
+
 def _cache(function: Any) -> Any:
     """Cache on disk of a function; none where it has no source file to stand beside."""
     own = [source_digest(file) for file in (__file__, digest.__code__.co_filename)]
     stamp = (numba.__version__, __version__, *own, digest(function))
     if function in _generated:
-        cache: Any = FunctionCache(_cache)  # beside this package's own
+        cache: Any = _Cache(_cache)  # beside this package's own
         name = f"generated.{function.__qualname__}-py{sys.version_info[0]}{sys.version_info[1]}"
         cache._py_func = function
         cache._cache_file = IndexDataCacheFile(cache.cache_path, name, stamp)
         return cache
     try:
-        cache = FunctionCache(function)
+        cache = _Cache(function)
     except RuntimeError:  # typed in, or given to python -c
         return NullCache()
     cache._cache_file._source_stamp = stamp
