@@ -125,6 +125,19 @@ def test_the_inside_master_comes_back_without_a_jump(peer, session):
     assert np.abs(np.diff(np.array(measured.values)[:, :6], axis=0)).max() < 0.01
 
 
+def test_a_node_may_leave_a_composed_session_in_any_moment(peer, session):
+    for _ in range(20):
+        for transition in (
+            Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
+            Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE,
+        ):  # fmt: skip
+            change(peer, "haptic_master", transition)
+    ticks = peer.status("slave_sim").number("ticks")
+    peer.wait_value("slave_sim", "ticks", lambda now: now > ticks + 500)
+    session.send_signal(signal.SIGINT)
+    assert session.wait(30) == 0
+
+
 def test_parameters_of_a_composed_node_change_at_run_time(peer, session):
     (result,) = peer.set("motion_scaling", fine_gain=0.2)
     assert result.successful

@@ -7,6 +7,7 @@ the topic instead: a real device, or a node elsewhere, takes its place.
 """
 
 import sys
+import threading
 import time
 
 from rclpy.parameter import Parameter
@@ -34,8 +35,9 @@ class TeleopSession:
         graph = graph_of(sys.argv)
         self._recorder = RecorderNode(STAGES.find(RECORDER_NAME), graph=graph)
         self._stages = tuple(_node(graph, member) for member in graph.members)
+        self._gate = threading.Lock()
         for node in self._stages:
-            node.has_own_loop = False
+            node.has_own_loop, node.gate = False, self._gate
         last = self._stages[-1]
         self._schedule = Schedule(time.monotonic_ns, time.sleep, last.options.max_catch_up)
         self._at_work: tuple[bool, ...] = ()
@@ -49,10 +51,11 @@ class TeleopSession:
 
     def _turn(self) -> None:
         """All ticks that are due, each through all stages."""
-        at_work = tuple(node.is_at_work for node in self.nodes)
-        if at_work != self._at_work:
-            self._link()
-            self._at_work = at_work
+        with self._gate:
+            at_work = tuple(node.is_at_work for node in self.nodes)
+            if at_work != self._at_work:
+                self._link()
+                self._at_work = at_work
         if not any(at_work):
             time.sleep(0.01)
             self._schedule.start()
@@ -61,15 +64,15 @@ class TeleopSession:
             self._tick(tick_ns)
 
     def _tick(self, tick_ns: int) -> None:
-        """One tick [ns, monotonic]; a gate keeps a node from being closed while it works."""
-        for node in self._stages:
-            with node.gate:
+        """One tick [ns, monotonic]; the gate keeps all nodes open until all is published."""
+        with self._gate:
+            for node in self._stages:
                 if node.is_at_work:
                     node.tick(tick_ns)
-        # What travels furthest goes first: the slave's command before the master's sample.
-        while self._pending:
-            output, stamp_ns = self._pending.pop()
-            output.publish(stamp_ns)
+            # What travels furthest goes first: the slave's command before the master's sample.
+            while self._pending:
+                output, stamp_ns = self._pending.pop()
+                output.publish(stamp_ns)
 
     def _link(self) -> None:
         """Lead every stage's output to its readers in here, as far as both are at work."""
