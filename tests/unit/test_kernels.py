@@ -1,15 +1,12 @@
-"""Kernels: what the decorators give, plain functions in their place, mistakes, pure Python."""
+"""Kernels: what the decorators give, with the compiler and without."""
 
 import os
 import subprocess
 import sys
-import threading
 
 import numpy as np
 import pytest
-from numba import types
 
-from teleop_core.errors import KernelError
 from teleop_core.geometry import multiply_quaternions
 from teleop_core.kernels import (
     IS_COMPILED,
@@ -18,14 +15,10 @@ from teleop_core.kernels import (
     is_kernel,
     kernel,
     kernel_from_source,
-    pointer,
-    raise_pending,
     records,
 )
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
-
-ROW, TABLE = types.float64[::1], types.float64[:, ::1]
 
 
 def uncached(text: str, name: str):
@@ -43,14 +36,6 @@ def power(x, n):
 @kernel
 def polynomial(x):
     return power(x, 2) + power(x, 3)
-
-
-@kernel
-def call_with_row(function, row, count):
-    total = 0.0
-    for i in range(count):
-        total += function(row, float(i))
-    return total
 
 
 def test_kernel_bound_to_its_arguments_does_the_same():
@@ -134,218 +119,6 @@ def test_traceback_of_generated_source_shows_its_line():
     with pytest.raises(IndexError) as raised:
         broken.py_func([], 3)
     assert str(raised.traceback[-1].statement).strip() == "return row[i]"
-
-
-# --- plain functions in the place of kernels
-
-
-def test_plain_function_serves_in_place_of_a_kernel():
-    @kernel
-    def compiled(row, x):
-        row[0] += x
-        return row[0]
-
-    def plain(row, x):
-        assert isinstance(x, float)
-        row[0] += x
-        return row[0]
-
-    signature = types.float64(ROW, types.float64)
-    first, second = np.zeros(3), np.zeros(3)
-    expected = call_with_row(pointer(compiled, signature), first, 5)
-    assert call_with_row(pointer(plain, signature), second, 5) == expected == 20.0
-    assert np.array_equal(first, second)
-    raise_pending()
-
-
-def test_plain_function_gets_tables_flags_and_counts():
-    seen = []
-
-    def plain(table, flag, count):
-        seen.append((table.shape, flag, count))
-        table[1, 2] = count
-        return count + 1
-
-    @kernel
-    def call(function, table, flag):
-        return function(table, flag, 7)
-
-    table = np.zeros((2, 3))
-    signature = types.int64(TABLE, types.boolean, types.int64)
-    assert call(pointer(plain, signature), table, True) == 8
-    assert seen == [((2, 3), True, 7)]
-    assert table[1, 2] == 7.0
-    assert call(pointer(plain, signature), np.zeros((4, 3)), False) == 8
-    assert seen[1] == ((4, 3), False, 7)
-
-
-def test_plain_function_may_return_nothing_and_may_be_any_callable():
-    class Mover:
-        def __init__(self):
-            self.calls = 0
-
-        def __call__(self, row):
-            self.calls += 1
-            row[:] = self.calls
-
-    @kernel
-    def call(function, row):
-        function(row)
-        function(row)
-
-    mover, row = Mover(), np.zeros(2)
-    call(pointer(mover, types.void(ROW)), row)
-    assert row.tolist() == [2.0, 2.0]
-
-
-def test_plain_function_called_from_python_is_itself():
-    def plain(row, x):
-        raise ValueError("from Python at once")
-
-    with pytest.raises(ValueError, match="at once"):
-        pointer(plain, types.float64(ROW, types.float64))(np.zeros(1), 0.0)
-    raise_pending()
-
-
-@compiled_only
-def test_first_exception_of_a_plain_function_waits_until_the_block_is_over():
-    def plain(row, x):
-        if x >= 2.0:
-            raise ValueError(f"tick {x}")
-        return 1.0
-
-    row = np.full(2, 5.0)
-    assert call_with_row(pointer(plain, types.float64(ROW, types.float64)), row, 5) == 2.0
-    assert row.tolist() == [5.0, 5.0]
-    with pytest.raises(ValueError, match=r"tick 2\.0"):
-        raise_pending()
-    raise_pending()
-
-
-@compiled_only
-def test_result_of_another_type_counts_as_an_exception():
-    call_with_row(
-        pointer(lambda row, x: "three", types.float64(ROW, types.float64)), np.zeros(1), 1
-    )
-    with pytest.raises(ValueError, match="three"):
-        raise_pending()
-
-
-@compiled_only
-def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions():
-    def plain(row, x):
-        row[0] += 1.0
-        if threading.current_thread().name == "bad":
-            raise ValueError("bad")
-        return x
-
-    function = pointer(plain, types.float64(ROW, types.float64))
-    found = {}
-
-    def work():
-        row = np.zeros(2)
-        total = call_with_row(function, row, 2_000)
-        try:
-            raise_pending()
-        except ValueError as error:
-            found[threading.current_thread().name] = (total, row[0], str(error))
-        else:
-            found[threading.current_thread().name] = (total, row[0], None)
-
-    threads = [threading.Thread(target=work, name=name) for name in ("good", "bad", "fine")]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    good = (1_999_000.0, 2_000.0, None)
-    assert found == {"good": good, "fine": good, "bad": (0.0, 2_000.0, "bad")}
-    raise_pending()
-
-
-@compiled_only
-@pytest.mark.parametrize(
-    ("signature", "message"),
-    [
-        (types.float64(ROW), r"test_kernels.py:\d+: 'takes_two' must take 1 argument"),
-        (types.float64(ROW, ROW, ROW), "'takes_two' must take 3 arguments"),
-        (
-            types.float64(ROW, types.float32),
-            "argument 2 of 'takes_two' is float32, must be float64, int64, bool",
-        ),
-        (
-            types.float64(ROW, types.float64[:]),
-            "argument 2 of 'takes_two' is array.*must be .* C-contiguous",
-        ),
-        (
-            types.complex128(ROW, ROW),
-            "result of 'takes_two' is complex128, must be void, float64 or int64",
-        ),
-    ],
-)
-def test_signature_that_a_plain_function_cannot_have_is_refused(signature, message):
-    def takes_two(row, x):
-        return 0.0
-
-    with pytest.raises(KernelError, match=message):
-        pointer(takes_two, signature)
-
-
-# --- mistakes
-
-
-MISTAKES = {
-    "return row.gian": r":5: record has no field 'gian'; did you mean 'gain'\? "
-    r"\(fields: gain, zero, point\)",
-    "row.gian = 2.0": ":5: record has no field 'gian'",
-    "return deep(row)": ":2: record has no field 'zeroo'; did you mean 'zero'",
-    "return row.qqq": r":5: record has no field 'qqq' \(fields: gain, zero, point\)",
-    "return row.gain + 'a'": r":5: kernel 'wrong': no add\(float64, str a\)",
-    "return nothing(row)": ":5: kernel 'wrong': NameError: name 'nothing' is not defined",
-    "return deep(row, 2)": ":5: kernel 'wrong': .* too many positional arguments",
-    "return row.point.foo()": ":5: kernel 'wrong': Unknown attribute 'foo' of type nestedarray",
-    "return row.point[0, 1]": ":5: kernel 'wrong': .*cannot index .* with 2 indices",
-    "return np.linalg.nonsense(row)": "kernel 'wrong': .*no attribute 'nonsense'",
-    "with row as r: pass": "kernel 'wrong': The 'with .* construct is not supported",
-    "return [x for x in row.point if x].foo": "kernel 'wrong': Unknown attribute 'foo' of type",
-}
-
-
-@compiled_only
-@pytest.mark.parametrize("line", MISTAKES)
-def test_mistake_in_a_kernel_is_one_line_with_its_place(line):
-    text = f"@inner\ndef deep(row): return row.zeroo\n@kernel\ndef wrong(row):\n    {line}\n"
-    wrong = uncached(text, "wrong")
-    wrong.py_func.__globals__["np"] = np
-    row = records([("gain", "f8"), ("zero", "f8"), ("point", "f8", (3,))])[0]
-    for way in (wrong, lambda row: bound(wrong, row)()):
-        with pytest.raises(KernelError, match="^<string>.*" + MISTAKES[line]) as raised:
-            way(row)
-        assert "\n" not in str(raised.value)
-        assert len(str(raised.value)) < 400
-        assert raised.value.__cause__ is not None
-
-
-@compiled_only
-def test_mistake_in_a_pointer_or_an_argument_has_its_place_too():
-    wrong = uncached("@kernel\ndef wrong(row):\n    return row.gain\n", "wrong")
-    with pytest.raises(KernelError, match="<string>:3: kernel 'wrong': Unknown attribute 'gain'"):
-        pointer(wrong, types.float64(ROW))
-    with pytest.raises(KernelError, match="kernel 'wrong': argument 'row' must be a number, array"):
-        wrong({"gain": 1.0})
-
-
-@compiled_only
-def test_place_of_a_mistake_is_counted_from_the_package_or_the_working_directory(tmp_path):
-    text = "from teleop_core.kernels import kernel\n@kernel\ndef f(x):\n    return x.gain\nf(1.0)\n"
-    (tmp_path / "own.py").write_text(text)
-    done = subprocess.run(
-        [sys.executable, "own.py"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    last = done.stderr.splitlines()[-1]
-    assert last.startswith("teleop_core.errors.KernelError: own.py:4: kernel 'f': Unknown attri")
-
-
-# --- pure Python
 
 
 PURE = """
