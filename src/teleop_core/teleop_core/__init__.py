@@ -24,7 +24,17 @@ if TYPE_CHECKING:
     from teleop_core import topics
     from teleop_core.api import configuration, replay, run
     from teleop_core.controllers import Controller, register_controller
-    from teleop_core.errors import PartError, TeleopError
+    from teleop_core.errors import (
+        EvaluationError,
+        KernelError,
+        ParameterError,
+        PartError,
+        RecordingError,
+        SessionError,
+        ShapeError,
+        TeleopError,
+        UnknownNameError,
+    )
     from teleop_core.evaluation import Key, Metric, Score, register_metric
     from teleop_core.fixtures import Fixture, register_fixture
     from teleop_core.graph import Graph, build_graph
@@ -46,7 +56,17 @@ if TYPE_CHECKING:
 _PLACES = {
     "api": ("configuration", "replay", "run"),
     "controllers": ("Controller", "register_controller"),
-    "errors": ("PartError", "TeleopError"),
+    "errors": (
+        "EvaluationError",
+        "KernelError",
+        "ParameterError",
+        "PartError",
+        "RecordingError",
+        "SessionError",
+        "ShapeError",
+        "TeleopError",
+        "UnknownNameError",
+    ),
     "evaluation": ("Key", "Metric", "Score", "register_metric"),
     "fixtures": ("Fixture", "register_fixture"),
     "graph": ("Graph", "build_graph"),
@@ -63,22 +83,29 @@ _HOME = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
     "Controller",
+    "EvaluationError",
     "Fixture",
     "Graph",
+    "KernelError",
     "Key",
     "Kind",
     "Metric",
     "NoParameters",
     "Operator",
+    "ParameterError",
     "PartError",
     "Recording",
+    "RecordingError",
     "Robot",
     "RobotParameters",
     "Score",
+    "SessionError",
+    "ShapeError",
     "Stage",
     "Stream",
     "TeleopError",
     "Topic",
+    "UnknownNameError",
     "__version__",
     "build_graph",
     "configuration",
@@ -111,4 +138,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

@@ -8,6 +8,7 @@
 The command line is a thin layer on this module.
 """
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -187,6 +188,8 @@ def run(
             controller=controller, robot=robot, stages=stages, arms=arms, delays=delays,
             **parameters,
         )  # fmt: skip
+    for note in made.graph.notes:
+        warnings.warn(note, stacklevel=2)
     ticks = session_ticks(made)
     session = VirtualTime(made)
     return _kept(session, made, run_blocks(session, ticks), ticks, out, progress)

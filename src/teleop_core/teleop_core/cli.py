@@ -5,6 +5,8 @@ Imports stand inside the commands: ``teleop --help`` answers at once.
 
 import argparse
 import sys
+import threading
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,6 +38,7 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: list[str] | None = None) -> int:
     """Entry point of ``teleop``; returns the exit code: 0, 2 for wrong use, 130 for Ctrl-C."""
     parsed = _parser().parse_args(arguments)
+    warnings.showwarning = _note  # type: ignore[assignment]
     try:
         _take_parts(parsed.parts)
         code: int = parsed.run(parsed)
@@ -52,6 +55,11 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"teleop {parsed.command}: {error.filename}: {error.strerror}", file=sys.stderr)
         return FAILED
     return code
+
+
+def _note(message: Warning | str, *_: object) -> None:
+    """Show a warning as one line."""
+    print(f"note: {message}", file=sys.stderr)
 
 
 def _take_parts(files: list[Path]) -> None:
@@ -157,6 +165,10 @@ def _command(
 ) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
     parser.set_defaults(run=run)
+    parser.add_argument(
+        "--parts", type=Path, action="append", default=argparse.SUPPRESS, metavar="FILE.py",
+        help="Python file that registers parts of your own",
+    )  # fmt: skip
     return parser
 
 
@@ -378,6 +390,22 @@ class _Progress:
 def _progress(text: str) -> Iterator[_Progress]:
     """Progress bar on a terminal, nothing when piped."""
     progress = _Progress()
+    patience = threading.Timer(2.0, _say_compiling, (progress,))
+    patience.daemon = True
+    patience.start()
+    try:
+        yield from _shown(text, progress)
+    finally:
+        patience.cancel()
+
+
+def _say_compiling(progress: _Progress) -> None:
+    """Say what takes so long before the first tick."""
+    if not progress.ticks:
+        print("compiling kernels, once for this graph …", file=sys.stderr)
+
+
+def _shown(text: str, progress: _Progress) -> Iterator[_Progress]:
     if not sys.stderr.isatty():
         yield progress
         return

@@ -254,6 +254,22 @@ class Graph:
         """The stage of each arm at which a sample begins its way; replay plays it."""
         return tuple(m for m in self.members if m.stage.name == BUILT_IN[0])
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What runs but may not be meant: outputs that look like an input and reach nobody."""
+        read = {link.topic.name for link in self.links}
+        found = []
+        for stage in self.stages:
+            for topic in stage.writes:
+                alike = [t.name for t in stage.reads if t.kind is topic.kind]
+                is_lost = topic.name not in read and not topic.adds_to and stage.replaces is None
+                if is_lost and alike and stage.name not in BUILT_IN:
+                    found.append(
+                        f"stage {stage.name!r} writes {topic.name}, which no stage reads; "
+                        f"replaces= would lead it to the readers of {alike[0]}"
+                    )
+        return tuple(found)
+
     def links_of(self, member: Member) -> tuple[Link, ...]:
         """Links that end at a stage."""
         return tuple(link for link in self.links if link.reader == member)

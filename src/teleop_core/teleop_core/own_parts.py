@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterable
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from traceback import extract_tb
 
 from teleop_core.errors import PartError, TeleopError
 
@@ -39,6 +40,8 @@ def _load(path: Path) -> None:
         raise PartError("file of parts", str(path), "a Python file that exists")
     module = module_from_spec(spec)
     sys.modules[name] = module
+    if str(path.parent) not in sys.path:  # as of any script, for what stands beside it
+        sys.path.append(str(path.parent))
     try:
         spec.loader.exec_module(module)
     except TeleopError:
@@ -47,5 +50,8 @@ def _load(path: Path) -> None:
     except Exception as error:  # whatever a user's file raises, one line names it
         del sys.modules[name]
         reason = " ".join(str(error).split())
-        text = f"a file that can be loaded; it raises {type(error).__name__}: {reason}"
+        line = next((f.lineno for f in reversed(extract_tb(error.__traceback__))
+                     if f.filename == str(path)), None)  # fmt: skip
+        place = f" (line {line})" if line else ""
+        text = f"a file that can be loaded; it raises {type(error).__name__}: {reason}{place}"
         raise PartError("file of parts", str(path), text) from error

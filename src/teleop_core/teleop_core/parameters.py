@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
-from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.errors import ParameterError, PartError, UnknownNameError
 
 if TYPE_CHECKING:
     from teleop_core.registry import Registry
@@ -174,9 +174,14 @@ def specs(group: type, prefix: str = "") -> Iterator[Spec]:
         kind = get_origin(hint) or hint
         if kind is UnionType or kind not in {bool, int, float, str, tuple}:
             raise TypeError(f"{group.__name__}.{entry.name}: a parameter cannot be a {hint}")
+        if "doc" not in entry.metadata:
+            text = f"one whose fields are made by parameter(...); {entry.name} is not"
+            raise PartError("parameter group", group.__name__, text)
         element = get_args(hint)[0] if kind is tuple else kind
         default: Any = entry.default
-        yield Spec(prefix + entry.name, kind, element, default, **entry.metadata)
+        spec = Spec(prefix + entry.name, kind, element, default, **entry.metadata)
+        spec.check(default)
+        yield spec
 
 
 def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:

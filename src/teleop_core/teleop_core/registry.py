@@ -9,6 +9,7 @@ package adds parts through a Python entry-point group of the registry's name::
 A program adds them with :meth:`Registry.add`. Nothing is imported before it is asked for.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -17,6 +18,7 @@ from typing import Generic, TypeVar
 from teleop_core.errors import PartError, UnknownNameError
 
 Part = TypeVar("Part")
+_NAME = re.compile(r"\w[\w-]*")
 
 
 class Registry(Generic[Part]):
@@ -78,6 +80,9 @@ class Registry(Generic[Part]):
         Raises:
             PartError: The name is taken, or this is no such part.
         """
+        if not _NAME.fullmatch(name):
+            text = "named by letters, digits, _ and -, for it stands in keys and files"
+            raise PartError(self.kind, name, text)
         checked = self._check(name, part)
         if self._parts.get(name) is checked:
             return checked

@@ -4,9 +4,11 @@ A stage names its parameters, the topics at its ports and the kernel that makes 
 tuple of stages everything else follows: the order of a tick, the nodes, the links, the recording.
 """
 
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, is_dataclass
 from inspect import signature
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -99,6 +101,14 @@ class Stage:
 
     def __post_init__(self) -> None:
         """Refuse what could never run."""
+        self._insist(self.name.isidentifier(), "a name of letters, digits and _")
+        for word in ("reads", "writes", "late", "needs"):
+            found = getattr(self, word)
+            is_right = isinstance(found, tuple) and all(isinstance(t, Topic) for t in found)
+            text = (
+                f"with {word} as a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
+            )
+            self._insist(is_right, text)
         known = {topic.name for topic in self.reads}
         for word, topics in (("late", self.late), ("needs", self.needs)):
             for topic in topics:
@@ -125,7 +135,8 @@ class Stage:
 
     def _check_parts(self) -> None:
         """Refuse what has not the form that is asked for."""
-        self._insist(is_dataclass(self.parameters), "one whose parameters are a dataclass")
+        is_group = isinstance(self.parameters, type) and is_dataclass(self.parameters)
+        self._insist(is_group, "one whose parameters are a dataclass, not an instance of one")
         if self.step is not None:
             takes = "one whose step takes four arguments, step(parameters, state, signals, dt)"
             try:
@@ -228,6 +239,29 @@ class _Plain(RunningStage):
         self.arguments = (self._parameters, self._state)
         self._begin = self.signals.copy()
         self.retune(parameters)
+        self._try()
+
+    def _try(self) -> None:
+        """Make one step of a compiled kernel in plain Python, on copies: that one checks indices.
+
+        Raises:
+            PartError: It reaches beyond the end of an array.
+        """
+        plain = getattr(self.kernel, "py_func", None)
+        if plain is None:
+            return
+        copies = [records(record.dtype) for record in (*self.arguments, self.signals)]
+        for copy, record in zip(copies, (*self.arguments, self.signals), strict=True):
+            copy[0] = record
+        try:
+            plain(*(copy[0] for copy in copies), self.dt)
+        except IndexError as error:
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            where = f"{Path(place.filename).name}:{place.lineno}"
+            text = f"one that stays inside its arrays; {error} ({where})"
+            raise PartError("stage", self.stage.name, text) from error
+        except Exception:  # what calls inner kernels runs compiled only
+            return
 
     def reset(self) -> None:
         """State and signals as before the first step."""

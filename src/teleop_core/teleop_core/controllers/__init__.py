@@ -85,8 +85,9 @@ def per_joint(robot: Robot, name: str, values: tuple[float, ...], default: Array
 def _checked(name: str, part: object) -> Controller:
     if not isinstance(part, Controller):
         raise PartError("controller", name, f"a Controller, not a {type(part).__name__}")
-    if not is_dataclass(part.parameters):
-        raise PartError("controller", name, "one whose parameters are a dataclass")
+    if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
+        text = "one whose parameters are a dataclass, not an instance of one"
+        raise PartError("controller", name, text)
     for field in ("gains", "control", "begin", "shift"):
         if not callable(getattr(part, field)):
             raise PartError("controller", name, f"one whose {field} can be called")

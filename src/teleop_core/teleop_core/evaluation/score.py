@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeVar, cast
+from typing import NoReturn, TypeVar, cast
 
 from teleop_core.errors import EvaluationError, UnknownNameError
 from teleop_core.evaluation.accumulators import Delay, Spread
@@ -137,6 +137,11 @@ class Score:
                 found = type(result.values).__name__
                 raise EvaluationError(f"{metric} gives a {found}, must be a {kind.__name__}")
         raise UnknownNameError("metric", metric, [result.name for result in self.results])
+
+    def __getattr__(self, name: str) -> NoReturn:
+        """Say where the values of further metrics are."""
+        hint = f"{name!r} is none; values of any metric: score.value({name + '.rms'!r})"
+        raise AttributeError(f"attribute of a Score: {hint}")
 
     def to_json(self) -> dict[str, Plain]:
         """The score as plain dictionaries with the keys of :func:`keys`."""

@@ -1,5 +1,7 @@
 """Records in plain Python: their fields as attributes, as kernels read them."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -17,13 +19,27 @@ class Record(_NUMPY_RECORD):
     def __getattribute__(self, name: str) -> Any:
         """Value of a field, else what NumPy has of that name."""
         fields = np.void.__getattribute__(self, "dtype").fields
-        return self[name] if name in fields else super().__getattribute__(name)
+        if name in fields:
+            return self[name]
+        try:
+            return super().__getattribute__(name)
+        except AttributeError:
+            raise AttributeError(_missing(name, fields)) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a field; there is nothing else to set."""
-        if name not in np.void.__getattribute__(self, "dtype").fields:
-            raise AttributeError(f"record has no field {name!r}")
+        fields = np.void.__getattribute__(self, "dtype").fields
+        if name not in fields:
+            raise AttributeError(_missing(name, fields))
         self[name] = value
+
+
+def _missing(name: str, fields: Iterable[str]) -> str:
+    """What is wrong with a name, as the compiler's messages have it."""
+    known = list(fields)
+    near = get_close_matches(name, known, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ";"
+    return f"record has no field {name!r}{hint} (fields: {', '.join(known)})"
 
 
 def record_dtype(fields: Any) -> np.dtype[Any]:

@@ -174,7 +174,9 @@ class _Cache(FunctionCache):
 def _cache(function: Any) -> Any:
     """Cache on disk of a function; none where it has no source file to stand beside."""
     own = [source_digest(file) for file in (__file__, digest.__code__.co_filename)]
-    stamp = (numba.__version__, __version__, *own, digest(function))
+    config: Any = numba.config
+    checked = str(config.BOUNDSCHECK)  # NUMBA_BOUNDSCHECK=1 makes other code
+    stamp = (numba.__version__, __version__, checked, *own, digest(function))
     if function in _generated:
         cache: Any = _Cache(_cache)  # beside this package's own
         name = f"generated.{function.__qualname__}-py{sys.version_info[0]}{sys.version_info[1]}"

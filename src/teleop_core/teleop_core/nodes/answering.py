@@ -70,7 +70,7 @@ class AnsweringNode(CoreNode):
             self.row[name] = stamp_ns
         with self.lock:
             self.stage.step()
-        self.send_all(stamp_ns)
+        self.ports.send(stamp_ns)
         self.counts.ticks += 1
         self.delay.put(time.time_ns() - stamp_ns)
         if self._report is not None:

@@ -4,30 +4,27 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 
-from teleop_core.bags.layouts import layout
 from teleop_core.errors import ParameterError, TeleopError
-from teleop_core.geometry import Array
-from teleop_core.kernels import bare
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.loop import Loop
+from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.rate import Recent, Schedule, TickCounts
 from teleop_core.nodes.real_time import apply_options
-from teleop_core.nodes.streams import Input, Output, message_type, profile
+from teleop_core.nodes.streams import Input, message_type, profile
 from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.layers import RealTimeParameters
 from teleop_core.signals import TICK_NS
 from teleop_core.stage import Stage, joints_of
-from teleop_core.topics import Kind, Topic
+from teleop_core.topics import Topic
 
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE,
@@ -107,12 +104,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         """Whether the node works in a thread of its own, or in that of a whole session."""
         self.is_at_work = False
         self._loop: Loop | None = None
-        self.inputs: dict[str, list[Input]] = {}
-        self.outputs: dict[Topic, Output] = {}
+        self.ports = NO_PORTS
         self._own_publishers: list[Any] = []
-        self._summed: dict[str, list[Array]] = {}
-        self._stamps: list[tuple[Output, str]] = []
-        self._ports: list[tuple[str, str, list[Input]]] = []
         self._fresh_counts()
         self._word = "unconfigured"
         self._reporter = Reporter(self)
@@ -124,7 +117,11 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         """Make the stage and open its topics."""
         self.stage = self.description.run(parameters, TICK_NS / 1e9)
         self.stage.load()
-        self.open_streams(joints_of(parameters))
+        self.ports = Ports(
+            self, self.arm, self.description, self.stage.signals, joints_of(parameters),
+            self.options.feeds, self.open_publisher,
+        )  # fmt: skip
+        self.row = self.ports.row
 
     def turn(self) -> None:
         """One round of work; blocks for a tenth of a second at most."""
@@ -168,28 +165,6 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         """Name of the node with its namespace, without the slash before it."""
         return f"{self.arm}/{self.get_name()}" if self.arm else str(self.get_name())
 
-    def open_streams(self, joint_names: tuple[str, ...] = ()) -> None:
-        """Open the streams that the stage reads and writes, on the fields of its signals."""
-        signals = self.stage.signals
-        self.row = bare(signals)
-        for port in self.description.reads:
-            feeds = self.options.feeds(port.name)
-            for name, delay in feeds:
-                target = signals[port.field] if len(feeds) == 1 else signals[port.field].copy()
-                topic = replace(port, name=name).of_arm(self.arm)
-                entry = Input(self, topic, name, joint_names, target, delay)
-                self.inputs.setdefault(port.name, []).append(entry)
-                if len(feeds) > 1:
-                    self._summed.setdefault(port.field, []).append(target)
-            self._ports.append((port.name, f"{port.field}_ns", self.inputs[port.name]))
-        for written in self.description.writes:
-            if written.kind is not Kind.REPORT:
-                topic = written.of_arm(self.arm)
-                publisher = self.open_publisher(written)
-                form = layout(topic, joint_names)
-                self.outputs[topic] = Output(publisher, form, signals[written.field])
-                self._stamps.append((self.outputs[topic], self._stamp_field(written)))
-
     def open_publisher(self, topic: Topic) -> Any:
         """Publisher that is silent unless the node is active, and closed at cleanup."""
         kind = message_type(topic.kind.ros_type)
@@ -199,49 +174,17 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def input(self, port: Topic) -> Input:
         """What the node reads at a port, of several the one that others are added to."""
-        return self.inputs[port.name][0]
-
-    def output(self, topic: Topic) -> Output:
-        """What the node writes to a topic of its stage."""
-        return self.outputs[topic.of_arm(self.arm)]
-
-    def all_inputs(self) -> list[Input]:
-        """What the node reads at all its ports."""
-        return [entry for entries in self.inputs.values() for entry in entries]
+        return self.ports.input(port)
 
     def read_ports(self, trigger: Topic | None = None) -> None:
         """Bring the signals up to date, all ports but that of the trigger."""
-        own = trigger.name if trigger is not None else ""
-        for name, stamp_field, entries in self._ports:
-            if name != own:
-                for entry in entries:
-                    entry.newest()
-                stamp_ns = entries[0].stamp_ns
-                if stamp_ns is not None:
-                    self.row[stamp_field] = stamp_ns
-        for name, parts in self._summed.items():
-            self.row[name] = np.sum(parts, axis=0)
-
-    def send_all(self, now_ns: int) -> None:
-        """Send what the stage wrote, each under the stamp that its topic says."""
-        row = self.row
-        for output, stamp_field in self._stamps:
-            output.send(int(row[stamp_field]) if stamp_field else now_ns)
-
-    def _stamp_field(self, written: Topic) -> str:
-        """Field of the stamp that an output passes on; empty for the time of sampling."""
-        if written.stamp.is_in_force:
-            return f"{written.field}_ns"
-        ports = [port for port in self.description.reads if port.name == written.stamp.of]
-        return f"{ports[0].field}_ns" if ports else ""
+        self.ports.read(trigger)
 
     def _close(self) -> None:
-        for entry in self.all_inputs():
-            entry.close()
+        self.ports.close()
         for publisher in self._own_publishers:
             self.destroy_lifecycle_publisher(publisher)
-        self.inputs, self.outputs, self._own_publishers = {}, {}, []
-        self._summed, self._stamps, self._ports = {}, [], []
+        self.ports, self._own_publishers = NO_PORTS, []
         self.stage = self.row = None
 
     # -- lifecycle -------------------------------------------------------------------------------
@@ -278,7 +221,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         return self._guard("recovery", self._clear, "unconfigured")
 
     def _begin(self) -> None:
-        for entry in self.all_inputs():
+        for entry in self.ports.all_inputs():
             entry.forget()
         self.start()
         self.is_at_work = True
@@ -397,9 +340,10 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def report(self) -> None:
         """Publish how the node is."""
-        inputs = self.all_inputs()
+        inputs = self.ports.all_inputs()
         is_active = self._word == "active"
         concerns = self._reporter.input_concerns(inputs)
+        concerns += self.ports.concerns()
         if is_active:
             concerns += self.concerns()
         elif self._word == "failed":
@@ -407,7 +351,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         rate = self._reporter.rate(self.counts.ticks)
         values = tick_values(self._word, rate, self.counts, TICK_NS * 1e-6)
         values |= input_values(inputs)
-        values |= {f"sent.{t.name}": str(o.sent) for t, o in self.outputs.items()}
+        values |= {f"sent.{t.name}": str(o.sent) for t, o in self.ports.outputs.items()}
         values |= recent_values("lateness", self.schedule.lateness)
         values |= recent_values("delay", self.delay) | (self.values() if is_active else {})
         self._reporter.send(concerns, self._word, values)

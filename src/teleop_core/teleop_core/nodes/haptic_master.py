@@ -56,7 +56,7 @@ class HapticMasterNode(TickingNode):
 
     def read_ports(self, trigger: Topic | None = None) -> None:
         """Bring the signals up to date; a source of force that fell silent adds none."""
-        for entry in self.inputs[MASTER_SERVO_CF.name]:
+        for entry in self.ports.inputs[MASTER_SERVO_CF.name]:
             if entry.age() > self.parameters.force_timeout:
                 entry.zero()
         super().read_ports(trigger)

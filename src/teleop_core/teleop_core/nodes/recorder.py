@@ -58,10 +58,12 @@ class _Channel:
         if is_inside is (self._inside_ns is None):
             self._inside_ns = time.time_ns() if is_inside else None
 
-    def give(self, data: bytes) -> None:
-        """Take a message from a sender in this process, whose thread may be another one."""
-        now_ns = time.time_ns()
-        self._given.append((now_ns, self.topic, data, now_ns))
+    def give(self, data: bytes, sent_ns: int) -> None:
+        """Take a message from a sender in this process, whose thread may be another one.
+
+        It came when it was given to the next stage, before it was published.
+        """
+        self._given.append((sent_ns, self.topic, data, sent_ns))
 
     def drain(self, came: list[Arrival]) -> None:
         """Append what has come since the last call."""

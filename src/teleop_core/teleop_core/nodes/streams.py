@@ -11,6 +11,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
+import numpy as np
 from rclpy.callback_groups import CallbackGroup
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -279,7 +280,8 @@ class Output:
     Attributes:
         sent: Number of messages.
         inputs: Readers of the topic in this process, which get the values beside the topic.
-        tap: Called with the bytes of every message, in place of a subscription in this process.
+        tap: Called with the bytes of every message and the time at which it was sent [ns], in
+            place of a subscription in this process.
         pending: Where messages wait for :meth:`publish` of their session; None to publish at once.
     """
 
@@ -287,22 +289,26 @@ class Output:
         self._publish, self._encode, self._source = publisher.publish, form.encode_one, source
         self.sent = 0
         self.inputs: list[Input] = []
-        self.tap: Callable[[bytes], None] | None = None
-        self.pending: list[tuple[Output, int]] | None = None
+        self.tap: Callable[[bytes, int], None] | None = None
+        self.pending: list[tuple[Output, int, int]] | None = None
 
     def send(self, stamp_ns: int) -> None:
         """Hand on the present values under a stamp [ns], inside the process first."""
         for entry in self.inputs:
             entry.give(stamp_ns, self._source)
         if self.pending is None:
-            self.publish(stamp_ns)
+            self.publish(stamp_ns, 0)
         else:
-            self.pending.append((self, stamp_ns))
+            self.pending.append((self, stamp_ns, time.time_ns()))
 
-    def publish(self, stamp_ns: int) -> None:
-        """Publish the present values under a stamp [ns]."""
+    def publish(self, stamp_ns: int, sent_ns: int) -> None:
+        """Publish the present values under a stamp, handed on inside at ``sent_ns`` [ns]."""
         data = self._encode(stamp_ns, self._source)
         self._publish(data)
         if self.tap is not None:
-            self.tap(data)
+            self.tap(data, sent_ns)
         self.sent += 1
+
+    def is_sound(self) -> bool:
+        """Whether the present values are finite."""
+        return bool(np.isfinite(self._source).all())

@@ -41,7 +41,7 @@ class TeleopSession:
         last = self._stages[-1]
         self._schedule = Schedule(time.monotonic_ns, time.sleep, last.options.max_catch_up)
         self._at_work: tuple[bool, ...] = ()
-        self._pending: list[tuple[Output, int]] = []
+        self._pending: list[tuple[Output, int, int]] = []
         Loop("session", self._turn, last.fail, last.prepare)
 
     @property
@@ -71,8 +71,8 @@ class TeleopSession:
                     node.tick(tick_ns)
             # What travels furthest goes first: the slave's command before the master's sample.
             while self._pending:
-                output, stamp_ns = self._pending.pop()
-                output.publish(stamp_ns)
+                output, stamp_ns, sent_ns = self._pending.pop()
+                output.publish(stamp_ns, sent_ns)
 
     def _link(self) -> None:
         """Lead every stage's output to its readers in here, as far as both are at work."""
@@ -80,8 +80,8 @@ class TeleopSession:
         for node in self._stages:  # what is late for one is for all that tick
             if node.description.trigger is None:
                 node.schedule = self._schedule
-        outputs = {topic.name: out for node in active for topic, out in node.outputs.items()}
-        inputs = [entry for node in active for entry in node.all_inputs()]
+        outputs = {topic.name: out for node in active for topic, out in node.ports.outputs.items()}
+        inputs = [entry for node in active for entry in node.ports.all_inputs()]
         for name, out in outputs.items():
             out.inputs = [entry for entry in inputs if entry.topic.name == name]
             channel = self._recorder.channels.get(name)

@@ -28,7 +28,7 @@ class TickingNode(CoreNode):
             now_ns = tick_ns + self.epoch_ns
             self.row["now_ns"] = now_ns
             self.advance(now_ns)
-            self.send_all(now_ns)
+            self.ports.send(now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Make one step that starts at ``now_ns`` [ns]."""

@@ -12,11 +12,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from teleop_core.errors import PartError, TeleopError
 from teleop_core.graph import Graph, Link, Member
-from teleop_core.kernels import bound, is_kernel, kernel_from_source, raise_pending, records
+from teleop_core.kernels import (
+    bound,
+    is_kernel,
+    kernel_from_source,
+    raise_pending,
+    record_dtype,
+    records,
+)
 from teleop_core.signals import add, copy, topic_fields
 from teleop_core.stage import Runner
 
@@ -35,7 +40,7 @@ def block_dtype(graph: Graph, joints: Mapping[str, int]) -> Any:
         fields += topic_fields(member.writes, joints[member.arm])
         prefix = f"{member.arm}_" if member.arm else ""
         fields += [(prefix + note[0], *note[1:]) for note in member.stage.notes]
-    return np.dtype((np.record, np.dtype(fields)))
+    return record_dtype(fields)
 
 
 Segment = list[str]

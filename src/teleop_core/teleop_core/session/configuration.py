@@ -113,6 +113,10 @@ def _check_names(merged: Layer, graph: Graph) -> None:
         arm, _, stage = name.rpartition("/")
         if arm and arm not in graph.arms:
             raise UnknownNameError(f"arm of {name}", arm, [a for a in graph.arms if a] or ["none"])
+        if stage not in {SESSION, RECORDER_NAME, *stages} and stage in STAGES.names():
+            keys = ", ".join(f"{name}.{key}" for key in merged[name])
+            needed = f"left out: this session has no stage {stage}; add stages=[{stage}]"
+            raise ParameterError(keys, tuple(merged[name].values()), needed)
         if stage not in {SESSION, RECORDER_NAME, *stages}:
             raise UnknownNameError("stage of teleop.stages", stage, (*stages, RECORDER_NAME))
 

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from teleop_core.errors import PartError
+from teleop_core.graph import BUILT_IN
 from teleop_core.kernels import records
 from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration
@@ -88,7 +90,7 @@ class VirtualTime:
             Rows (ticks,): ``now_ns``, the fields and stamps of all topics, and the stages' notes.
 
         Raises:
-            TeleopError: A part cannot go on.
+            TeleopError: A part cannot go on, or writes NaN.
         """
         return self._run(ticks, None)
 
@@ -115,8 +117,25 @@ class VirtualTime:
                 stage.prepare(len(part))
             taken = None if samples is None else samples[begin : begin + self._ahead]
             self._tick.run(self.now_ns + self._tick_ns, self._tick_ns, taken, part)
+            self._check(part)
             self.now_ns += len(part) * self._tick_ns
         return block
+
+    def _check(self, part: Any) -> None:
+        """Make sure that further stages wrote numbers.
+
+        Raises:
+            PartError: One wrote NaN or infinity; the text says where and when.
+        """
+        for member in self.graph.members:
+            if member.stage.name in BUILT_IN:
+                continue
+            for topic in member.writes:
+                is_sound = np.isfinite(part[topic.field]).all(axis=1)
+                if not is_sound.all():
+                    when = part["now_ns"][int(np.flatnonzero(~is_sound)[0])] * 1e-9
+                    text = f"one that writes finite numbers; {topic.name} at {when:g} s is not"
+                    raise PartError("stage", member.name, text)
 
 
 def stamps_of(first_ns: int, last_ns: int, tick_ns: int = TICK_NS) -> "np.ndarray[Any, Any]":

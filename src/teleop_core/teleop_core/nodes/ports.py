@@ -1,0 +1,141 @@
+"""Ports: what a node reads and writes, on the fields of its stage's signals."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from rclpy.publisher import Publisher
+
+from teleop_core.bags.layouts import layout
+from teleop_core.geometry import Array
+from teleop_core.graph import BUILT_IN
+from teleop_core.kernels import bare
+from teleop_core.nodes.streams import Input, Output
+from teleop_core.parameters import NoParameters
+from teleop_core.signals import make_signals
+from teleop_core.stage import Stage
+from teleop_core.topics import Kind, Topic
+
+Feeds = Callable[[str], list[tuple[str, float]]]
+"""Port to the topics that feed it, each with its delay [s]."""
+
+
+class Ports:
+    """Inputs and outputs of one stage.
+
+    Args:
+        node: Node that owns them.
+        arm: Its namespace, without the slash before it.
+        stage: What they are the ports of.
+        signals: Record of the stage.
+        joint_names: Order of the joints.
+        feeds: What feeds a port.
+        publisher: Opens the publisher of a topic.
+
+    Attributes:
+        inputs: Per port, by its name, what feeds it; where there are several they are added.
+        outputs: What is written, by the topic in its namespace.
+        row: The signals, to be read and written by names of fields only.
+    """
+
+    def __init__(
+        self,
+        node: Any,
+        arm: str,
+        stage: Stage,
+        signals: Any,
+        joint_names: tuple[str, ...],
+        feeds: Feeds,
+        publisher: Callable[[Topic], Publisher],
+    ) -> None:
+        self._arm, self._stage, self.row = arm, stage, bare(signals)
+        self._must_check = stage.name not in BUILT_IN
+        self.refused = 0
+        """Steps whose outputs were not sent, because they held NaN or infinity."""
+        self.inputs: dict[str, list[Input]] = {}
+        self.outputs: dict[Topic, Output] = {}
+        self._summed: list[tuple[str, list[Array]]] = []
+        for port in stage.reads:
+            given = feeds(port.name)
+            own = signals[port.field]
+            targets = [own] if len(given) == 1 else [own.copy() for _ in given]
+            self.inputs[port.name] = [
+                Input(node, replace(port, name=name).of_arm(arm), name, joint_names, target, delay)
+                for (name, delay), target in zip(given, targets, strict=True)
+            ]
+            if len(targets) > 1:
+                self._summed.append((port.field, targets))
+        # Bound once: a tick goes through them a thousand times a second.
+        self._ports = [(p.name, f"{p.field}_ns", self.inputs[p.name]) for p in stage.reads]
+        self._stamped: list[tuple[Output, str]] = []
+        for topic in stage.writes:
+            if topic.kind is not Kind.REPORT:
+                form = layout(topic.of_arm(arm), joint_names)
+                output = Output(publisher(topic), form, signals[topic.field])
+                self.outputs[topic.of_arm(arm)] = output
+                self._stamped.append((output, self._stamp_field(topic)))
+
+    def _stamp_field(self, written: Topic) -> str:
+        """Field of the stamp that an output passes on; empty for the time of sampling."""
+        if written.stamp.is_in_force:
+            return f"{written.field}_ns"
+        ports = [port for port in self._stage.reads if port.name == written.stamp.of]
+        return f"{ports[0].field}_ns" if ports else ""
+
+    def input(self, port: Topic) -> Input:
+        """What is read at a port, of several the one that others are added to."""
+        return self.inputs[port.name][0]
+
+    def output(self, topic: Topic) -> Output:
+        """What is written to a topic of the stage."""
+        return self.outputs[topic.of_arm(self._arm)]
+
+    def all_inputs(self) -> list[Input]:
+        """What is read at all ports."""
+        return [entry for entries in self.inputs.values() for entry in entries]
+
+    def read(self, trigger: Topic | None = None) -> None:
+        """Bring the signals up to date, all ports but that of the trigger."""
+        own = trigger.name if trigger is not None else ""
+        for name, stamp_field, entries in self._ports:
+            if name != own:
+                for entry in entries:
+                    entry.newest()
+                stamp_ns = entries[0].stamp_ns
+                if stamp_ns is not None:
+                    self.row[stamp_field] = stamp_ns
+        for name, parts in self._summed:
+            self.row[name] = np.sum(parts, axis=0)
+
+    def send(self, now_ns: int) -> None:
+        """Send what the stage wrote, each under the stamp that its topic says.
+
+        A stage that is not of this package may write anything: what is not finite is not sent.
+        """
+        row = self.row
+        if self._must_check and not all(output.is_sound() for output, _ in self._stamped):
+            self.refused += 1
+            return
+        for output, stamp_field in self._stamped:
+            output.send(int(row[stamp_field]) if stamp_field else now_ns)
+
+    def concerns(self) -> list[str]:
+        """What is wrong with what the stage writes, in words."""
+        lost = f"{self.refused} steps wrote NaN or infinity: not sent"
+        return [lost] if self.refused else []
+
+    def close(self) -> None:
+        """Stop listening."""
+        for entry in self.all_inputs():
+            entry.close()
+
+
+def _nothing(*_: object) -> Any:
+    """Stand in for feeds and publishers that nobody asks for."""
+
+
+NO_PORTS = Ports(
+    None, "", Stage("none", NoParameters, (), ()), make_signals((), 0)[0], (), _nothing, _nothing
+)
+"""Ports of a node that is not configured."""
