@@ -66,6 +66,7 @@ class _Text:
         self.parts += [call, []]
 
 
+_PACKAGE = Path(__file__).resolve().parents[1]
 Rings = dict[tuple[str, str, str], Any]
 """Past values on delayed links, by topic, reader and port."""
 _CLOCK = [("first_ns", "i8"), ("tick_ns", "i8"), ("count", "i8")]
@@ -144,7 +145,9 @@ class Tick:
 
 def raised_by(error: Exception) -> PartError:
     """What a part in plain Python raised, in one line that names function, file and line."""
-    trace = traceback.extract_tb(error.__traceback__)[-1]
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if _PACKAGE not in Path(frame.filename).parents]
+    trace = (own or frames)[-1]
     reason = " ".join(str(error).split())
     text = f"one that does not raise; {type(error).__name__}: {reason} "
     return PartError("part", trace.name, f"{text}({Path(trace.filename).name}:{trace.lineno})")
