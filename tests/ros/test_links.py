@@ -78,19 +78,34 @@ STAGES = """
                       "master_base", adds_to="master/servo_cf"),),
         step=push, trigger=MASTER_MEASURED_CP,
     )
+
+
+    def fails(p, s, row, dt):
+        for i in range(7):
+            row.test_failing[i] = row.master_measured_cp[i]
+        if row.master_measured_cp[0] > 0.5:
+            row.test_failing[0] = float("nan")
+
+
+    FAILING = Stage(
+        "failing", Nothing, reads=(MASTER_MEASURED_CP,),
+        writes=(Topic("test/failing", Kind.POSE, passed_on("master/measured_cp")),),
+        step=fails, trigger=MASTER_MEASURED_CP,
+    )
 """
 ENTRIES = """
     [teleop_core.stages]
     compiled_raise = my_stages:COMPILED
     plain_raise = my_stages:PLAIN
     helper = my_stages:HELPER
+    failing = my_stages:FAILING
 """
 both_ways = pytest.mark.parametrize("way", [(), ("--composed",)], ids=["processes", "composed"])
 
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """A user's installed package with three stages."""
+    """A user's installed package with four stages."""
     folder = tmp_path / "site"
     about = folder / "my_stages-1.0.dist-info"
     about.mkdir(parents=True)
@@ -200,3 +215,19 @@ def test_a_source_of_force_that_falls_silent_acts_no_more(peer, silent):
         return felt.take() and felt.values[-1][0] == left
 
     peer.wait(is_alone, "the other one alone")
+
+
+def test_an_answer_that_is_no_number_is_counted_and_told_but_not_sent(package, peer):
+    answers = peer.listen(Topic("test/failing", Kind.POSE))
+    peer.start("failing")
+
+    def ask(x):
+        peer.send(topics.MASTER_MEASURED_CP, time.time_ns(), [x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+        return answers.take()
+
+    peer.wait(lambda: ask(0.25), "an answer")
+    told = "steps wrote NaN or infinity: not sent"
+    peer.wait(lambda: ask(1.0) and told in peer.status("failing").message, "a warning")
+    count = ask(0.25)
+    peer.wait(lambda: ask(0.25) > count, "more answers")
+    assert {values[0] for values in answers.values} == {0.25}

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -146,14 +147,31 @@ def test_parameters_of_a_composed_node_change_at_run_time(peer, session):
     assert "fine_gain" in refused.reason
 
 
-def test_live_composed_records_a_session(tmp_path):
+@pytest.fixture(scope="module")
+def composed(tmp_path_factory):
+    """Recording of a composed session of three seconds, and what was shown of it."""
     show = Console(file=io.StringIO(), width=200)
     configuration = configure("coarse_box", settings=["teleop.duration=3.0"])
-    live(configuration, tmp_path / "bag", show, is_composed=True)
-    text = show.file.getvalue()
+    out = tmp_path_factory.mktemp("composed") / "bag"
+    live(configuration, out, show, is_composed=True)
+    return Bag(out), show.file.getvalue()
+
+
+def test_live_composed_records_a_session(composed):
+    bag, text = composed
     assert all(f"{name} is ready" in text for name in NODES)
     for topic in STREAMS:
-        assert Bag(tmp_path / "bag").topics[topic.name].count > 1500, topic.name
+        assert bag.topics[topic.name].count > 1500, topic.name
+
+
+def test_times_of_recording_rise_from_stage_to_stage_in_a_composed_session(composed):
+    chain = (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP,
+             topics.SLAVE_SETPOINT_JS)  # fmt: skip
+    series = [composed[0].read(topic) for topic in chain]
+    for before, after in pairwise(series):
+        _, i, j = np.intersect1d(before.stamp_ns, after.stamp_ns, return_indices=True)
+        assert len(i) > 500
+        assert (after.log_ns[j] >= before.log_ns[i]).all()
 
 
 def test_real_time_options_are_taken_or_refused_in_one_line():

@@ -219,6 +219,13 @@ def test_unknown_key_is_told_with_the_alternatives_nearby(bag):
         score.record("jerk", dict)
 
 
+def test_attribute_that_a_score_has_not_leads_to_its_values(bag):
+    score = evaluate(bag)
+    with pytest.raises(AttributeError, match=r"'jerk' .*: score\.value\('jerk\.rms'\)"):
+        score.jerk  # noqa: B018
+    assert not hasattr(score, "jerk")
+
+
 def test_score_tells_what_it_is_in_two_lines_and_as_a_table(bag):
     score = evaluate(bag)
     first, second = repr(score).splitlines()
@@ -268,7 +275,7 @@ def test_wrong_metric_is_refused_before_anything_runs(added, part, told):
 
 @pytest.mark.parametrize("name", ["session", "a.b", ""])
 def test_name_that_json_cannot_hold_is_refused(added, name):
-    with pytest.raises(PartError, match="without dots"):
+    with pytest.raises(PartError, match=r"without dots|named by letters"):
         added(name, changed(name=name, keys=()))
 
 

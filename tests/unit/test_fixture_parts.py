@@ -81,10 +81,10 @@ def reads_beyond(offset, shape, out):
     return offset[0] - shape[3]
 
 
-def fills(value):
+def fills(value, length=0.0):
     def depth(offset, shape, out):
         out[:] = value
-        return 0.0
+        return length
 
     return depth
 
@@ -102,7 +102,10 @@ BAD = {
     "vector has another shape": ({"depth": fills(np.zeros(4))}, "depth(offset, shape, out)"),
     "kernel writes beyond the vector": ({"depth": kernel(writes_four)}, "three numbers"),
     "kernel reads beyond the numbers": ({"depth": kernel(reads_beyond)}, "finite and >= 0"),
-    "middle is outside": ({"depth": lambda o, s, out: 1.0}, "middle is inside"),
+    "middle is outside": ({"depth": fills((1.0, 0.0, 0.0), 1.0)}, "middle is inside"),
+    "vector is shorter than the depth": (
+        {"depth": lambda o, s, out: float(np.linalg.norm(o))}, "out is as long as its depth",
+    ),
     "depth is none": ({"depth": None}, "depth can be called"),
     "outline is flat": ({"outline": lambda p: np.zeros((4, 2))}, "outline (N, 3)"),
     "outline has no points": ({"outline": lambda p: np.full((4, 3), np.nan)}, "finite points"),

@@ -102,6 +102,17 @@ def test_chain_passes_through_a_replacing_stage():
     assert "limit" in [name for name, _ in Graph((*BASE, limit())).chain()]
 
 
+def test_answer_like_its_input_that_nobody_reads_is_noted_unless_it_replaces_or_adds():
+    push = stage("push", writes=(PUSH,))
+    watch = stage("watch", writes=(Topic("test/x", Kind.WRENCH, passed_on("slave/measured_cp")),))
+    assert Graph((*BASE, limit(), push, watch)).notes == ()
+    (note,) = Graph((*BASE, stage())).notes
+    assert "'echo' writes test/echo, which no stage reads; replaces= would lead it to the" in note
+    assert note.endswith("readers of slave/measured_cp")
+    reader = stage("reader", (ECHO,), ())
+    assert Graph((*BASE, stage(), reader)).notes == ()
+
+
 # Delays.
 
 

@@ -40,7 +40,7 @@ def main(arguments: list[str] | None = None) -> int:
     parsed = _parser().parse_args(arguments)
     warnings.showwarning = _note  # type: ignore[assignment]
     try:
-        _take_parts(parsed.parts)
+        _take_parts([*parsed.parts, *parsed.more_parts])
         code: int = parsed.run(parsed)
     except TeleopError as error:
         print(f"teleop {parsed.command}: {error}", file=sys.stderr)
@@ -166,7 +166,7 @@ def _command(
     parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
     parser.set_defaults(run=run)
     parser.add_argument(
-        "--parts", type=Path, action="append", default=argparse.SUPPRESS, metavar="FILE.py",
+        "--parts", type=Path, action="append", default=[], metavar="FILE.py", dest="more_parts",
         help="Python file that registers parts of your own",
     )  # fmt: skip
     return parser

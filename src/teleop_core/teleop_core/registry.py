@@ -80,7 +80,7 @@ class Registry(Generic[Part]):
         Raises:
             PartError: The name is taken, or this is no such part.
         """
-        if not _NAME.fullmatch(name):
+        if not (isinstance(name, str) and _NAME.fullmatch(name)):
             text = "named by letters, digits, _ and -, for it stands in keys and files"
             raise PartError(self.kind, name, text)
         checked = self._check(name, part)

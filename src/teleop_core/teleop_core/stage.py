@@ -254,7 +254,8 @@ class _Plain(RunningStage):
         for copy, record in zip(copies, (*self.arguments, self.signals), strict=True):
             copy[0] = record
         try:
-            plain(*(copy[0] for copy in copies), self.dt)
+            with np.errstate(all="ignore"):  # as compiled code goes on with infinity
+                plain(*(copy[0] for copy in copies), self.dt)
         except IndexError as error:
             place = traceback.extract_tb(error.__traceback__)[-1]
             where = f"{Path(place.filename).name}:{place.lineno}"

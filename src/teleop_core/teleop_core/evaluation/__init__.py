@@ -48,4 +48,5 @@ __all__ = [
 
 def register_metric(metric: type[Metric], *, replace: bool = False) -> type[Metric]:
     """Add a metric under its own name for the rest of the program; see :meth:`Registry.add`."""
-    return METRICS.add(getattr(metric, "name", metric.__name__), metric, replace=replace)
+    fallback = getattr(metric, "__name__", type(metric).__name__)
+    return METRICS.add(getattr(metric, "name", fallback), metric, replace=replace)

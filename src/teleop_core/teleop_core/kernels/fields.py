@@ -38,7 +38,7 @@ def _missing(name: str, fields: Iterable[str]) -> str:
     """What is wrong with a name, as the compiler's messages have it."""
     known = list(fields)
     near = get_close_matches(name, known, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ";"
+    hint = f"; did you mean {near[0]!r}?" if near else ""
     return f"record has no field {name!r}{hint} (fields: {', '.join(known)})"
 
 

@@ -101,8 +101,9 @@ def _checked(name: str, part: object) -> Operator:
     if isinstance(part, Operator):
         if not callable(part.make) or part.ahead < 1:
             raise PartError("operator", name, "one whose make can be called, asked >= 1 tick ahead")
-        if not is_dataclass(part.parameters):
-            raise PartError("operator", name, "one whose parameters are a dataclass")
+        if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
+            text = "one whose parameters are a dataclass, not an instance of one"
+            raise PartError("operator", name, text)
         return part
     if callable(part):  # a motion alone: the shortest way to an own operator
         motion: Motion = part

@@ -1,0 +1,146 @@
+"""What a session tells of parts of one's own: NaN, misspelt fields, answers that nobody reads."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import teleop_core as tc
+from teleop_core.session.configuration import configure
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.signals import TICK_NS
+from teleop_core.topics import SLAVE_SERVO_CP, passed_on
+
+
+def stage(name, step, **more):
+    """Stage that answers every pose commanded with one of its own."""
+    topic = tc.Topic(f"test/{name}", tc.Kind.POSE, passed_on("slave/servo_cp"))
+    made = tc.Stage(
+        name, tc.NoParameters, (SLAVE_SERVO_CP,), (topic,), step, trigger=SLAVE_SERVO_CP, **more
+    )
+    return tc.register_stage(made)
+
+
+def session(*names):
+    return VirtualTime(configure(settings=[f"teleop.stages=[{', '.join(names)}]"]))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_stage_that_writes_no_number_ends_the_session_with_topic_and_time(own_parts, value):
+    def fails(p, s, row, dt):
+        row.test_failing[2] = value if row.now_ns > 5 * TICK_NS else 0.0
+
+    stage("failing", fails)
+    told = "^stage 'failing' must be one that writes finite numbers; test/failing at 0.006 s is not"
+    with pytest.raises(tc.PartError, match=told):
+        session("failing").run(10)
+
+
+def test_misspelt_field_in_a_plain_stage_is_told_with_the_near_one_and_the_line(own_parts):
+    def misspells(p, s, row, dt):
+        row.test_misspelling[0] = row.slave_servo_pc[0]
+
+    stage("misspelling", misspells)
+    line = misspells.__code__.co_firstlineno + 1
+    told = rf"'slave_servo_pc'; did you mean 'slave_servo_cp'\?.*_sessions\.py:{line}\)$"
+    with pytest.raises(tc.PartError, match=told):
+        session("misspelling").run(1)
+
+
+def test_stages_that_replace_the_same_topic_work_in_the_order_in_which_they_are_named(own_parts):
+    def adds(p, s, row, dt):
+        row.test_adding[:] = row.slave_servo_cp
+        row.test_adding[2] += 0.001
+
+    def doubles(p, s, row, dt):
+        row.test_doubling[:] = row.slave_servo_cp
+        row.test_doubling[2] *= 2.0
+
+    stage("adding", adds, replaces=SLAVE_SERVO_CP)
+    stage("doubling", doubles, replaces=SLAVE_SERVO_CP)
+    for first, last, expected in (
+        ("adding", "doubling", lambda height: 2.0 * (height + 0.001)),
+        ("doubling", "adding", lambda height: 2.0 * height + 0.001),
+    ):
+        block = session(first, last).run(5)
+        height = block["slave_servo_cp"][:, 2]
+        assert np.array_equal(block[f"test_{last}"][:, 2], expected(height))
+
+
+def copies(p, s, row, dt):
+    row.test_forgetful[:] = row.slave_servo_cp
+
+
+def test_answer_that_nobody_reads_is_a_warning_with_the_way_out(own_parts):
+    told = "'forgetful' writes test/forgetful, which no stage reads; replaces= would lead it to the"
+    with pytest.warns(UserWarning, match=told):
+        tc.run(duration=0.01, stages=stage("forgetful", copies))
+
+
+FORGETFUL = """
+import numpy as np
+import teleop_core as tc
+from beside import NAME
+from teleop_core.topics import SLAVE_SERVO_CP, passed_on
+
+
+def copies(p, s, row, dt):
+    row.test_cp[:] = row.slave_servo_cp
+
+
+TOPIC = tc.Topic("test/cp", tc.Kind.POSE, passed_on("slave/servo_cp"))
+tc.register_stage(
+    tc.Stage(NAME, tc.NoParameters, (SLAVE_SERVO_CP,), (TOPIC,), copies, trigger=SLAVE_SERVO_CP)
+)
+"""
+
+
+@pytest.fixture
+def forgetful(tmp_path):
+    """File with a stage, which takes its name from a file beside it."""
+    (tmp_path / "beside.py").write_text("NAME = 'forgetful'\n")
+    (tmp_path / "parts.py").write_text(FORGETFUL)
+    return tmp_path / "parts.py"
+
+
+def test_file_of_parts_takes_what_stands_beside_it_before_and_after_the_command(
+    teleop, forgetful, tmp_path
+):
+    text = "import teleop_core as tc\n\ntc.register_operator('still', lambda t: 0.0 * t)\n"
+    (tmp_path / "more.py").write_text(text)
+    for arguments in (["--parts", forgetful, "parts"], ["parts", "--parts", forgetful]):
+        assert "forgetful" in teleop(*arguments).stdout
+    both = teleop("--parts", forgetful, "parts", "--parts", tmp_path / "more.py").stdout
+    assert "forgetful" in both
+    assert "still" in both
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("x = 1\n\ny = x / 0\n", r"ZeroDivisionError: division by zero \(line 3\)"),
+        ("import json\njson.loads('{')\n", r"JSONDecodeError: .* \(line 2\)"),
+        ("import nothing_of_this_name\n", r"ModuleNotFoundError: .* \(line 1\)"),
+        ("x = (\n", r"SyntaxError: .*line 1\)"),
+    ],
+)
+def test_file_of_parts_that_raises_is_told_with_its_line(teleop, tmp_path, text, told):
+    file = tmp_path / "wrong.py"
+    file.write_text(text)
+    (line,) = teleop("parts", "--parts", file, code=2).stderr.splitlines()
+    assert str(file) in line
+    assert re.search(told, line), line
+
+
+def test_command_notes_an_answer_that_nobody_reads_and_scores_without_its_file(
+    teleop, forgetful, tmp_path
+):
+    out, scores = tmp_path / "bag", tmp_path / "scores.json"
+    done = teleop("sim", "--parts", forgetful, "--duration", 0.5, "--out", out,
+                  "--set", "stages=[forgetful]")  # fmt: skip
+    notes = [line for line in done.stderr.splitlines() if not line.startswith("compiling kernels")]
+    (note,) = notes
+    assert note.startswith("note: stage 'forgetful' writes test/cp, which no stage reads; replaces")
+    teleop("evaluate", out, "--json", scores)
+    assert "forgetful" not in json.loads(scores.read_text())[0]["latency_ms"]

@@ -1,0 +1,239 @@
+"""Mistakes in parts of one's own: one line each, which names the part and what was expected."""
+
+import os
+import subprocess
+import sys
+import warnings
+from dataclasses import dataclass, replace
+
+import pytest
+
+from teleop_core import evaluation
+from teleop_core.controllers import register_controller
+from teleop_core.controllers.pid import PID
+from teleop_core.errors import ParameterError, PartError
+from teleop_core.evaluation import Metric
+from teleop_core.fixtures import register_fixture
+from teleop_core.fixtures.sphere import SPHERE
+from teleop_core.kernels import IS_COMPILED, kernel, records
+from teleop_core.operators import Operator, register_operator
+from teleop_core.parameters import NoParameters, build, parameter, specs
+from teleop_core.session.configuration import configure
+from teleop_core.stage import Stage, register_stage
+from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, passed_on
+
+ECHO = Topic("test/echo", Kind.POSE, passed_on("slave/measured_cp"))
+
+
+def rest(parameters, state, signals, dt):
+    """Step of a stage that does nothing."""
+
+
+def stage(name="echo", parameters=NoParameters, step=rest, reads=(SLAVE_MEASURED_CP,), **more):
+    return Stage(name, parameters, reads, (ECHO,), step=step, **more)
+
+
+# Parameter groups.
+
+
+@dataclass(frozen=True, kw_only=True)
+class TooFast:
+    speed: float = parameter(2.0, unit="m/s", lower=0.0, upper=1.0, doc="of the tool")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Whole:
+    speed: float = parameter(1, unit="m/s", doc="of the tool")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutOfChoice:
+    side: str = parameter("middle", choices=("left", "right"), doc="where")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unmade:
+    speed: float = 1.0
+
+
+WRONG_GROUPS = {
+    TooFast: (ParameterError, "^speed is 2.0, must be between 0 and 1 m/s$"),
+    Whole: (ParameterError, r"^speed is 1, must be of type float \(write 1.0, not 1\)$"),
+    OutOfChoice: (ParameterError, "^side is 'middle', must be one of: left, right$"),
+    Unmade: (PartError, r"'Unmade' must be .* made by parameter\(\.\.\.\); speed is not$"),
+}
+
+
+@pytest.mark.parametrize("group", WRONG_GROUPS)
+def test_wrong_declaration_of_a_parameter_is_refused_before_it_is_used(group):
+    kind, told = WRONG_GROUPS[group]
+    for way in (lambda: list(specs(group)), lambda: build(group, {}), lambda: stage("own", group)):
+        with pytest.raises(kind, match=told):
+            way()
+
+
+WAYS_IN = {
+    "fixture": lambda group: register_fixture(replace(SPHERE, name="own", parameters=group)),
+    "controller": lambda group: register_controller(replace(PID, name="own", parameters=group)),
+    "operator": lambda group: register_operator("own", Operator("own", lambda p, s: None, group)),
+    "stage": lambda group: stage("own", group),
+}
+
+
+@pytest.mark.parametrize("kind", WAYS_IN)
+@pytest.mark.parametrize("group", [NoParameters(), TooFast(), dict], ids=repr)
+def test_group_that_is_no_dataclass_but_an_object_is_refused(own_parts, kind, group):
+    with pytest.raises(
+        PartError, match=f"^{kind} 'own' must be one whose parameters are a dataclas"
+    ):
+        WAYS_IN[kind](group)
+
+
+# Names.
+
+
+@pytest.mark.parametrize("name", ["", "my fixture", "a.b", "a/b", "-a", "a=b", None, 5])
+def test_name_that_keys_and_files_cannot_hold_is_refused(own_parts, name):
+    with pytest.raises(PartError, match="named by letters, digits, _ and -") as error:
+        register_fixture(replace(SPHERE, name=name))
+    assert (error.value.kind, error.value.name) == ("fixture", name)
+
+
+@pytest.mark.parametrize("name", ["my_2nd", "my-cone", "Kegel", "größe"])
+def test_name_of_letters_digits_underscores_and_hyphens_is_taken(own_parts, name):
+    assert register_fixture(replace(SPHERE, name=name)).name == name
+
+
+@pytest.mark.parametrize("name", ["", "my-limit", "my limit", "2nd", "a.b"])
+def test_name_of_a_stage_that_is_no_identifier_is_refused(name):
+    with pytest.raises(PartError, match="a name of letters, digits and _"):
+        stage(name)
+
+
+# Topics of a stage.
+
+
+@pytest.mark.parametrize("word", ["reads", "writes", "late", "needs"])
+@pytest.mark.parametrize(
+    "value", [SLAVE_SERVO_CP, "slave/servo_cp", ("slave/servo_cp",), [SLAVE_SERVO_CP], None]
+)
+def test_topics_of_a_stage_that_are_no_tuple_of_topics_are_refused_with_an_example(word, value):
+    given = {"reads": (SLAVE_MEASURED_CP,), "writes": (ECHO,), word: value}
+    with pytest.raises(PartError, match=rf"with {word} as a tuple of Topic, such as \(topics\."):
+        Stage("echo", NoParameters, step=rest, **given)
+
+
+# Fields of a record.
+
+
+def misspells(p, s, row, dt):
+    row.test_ehco[0] = 1.0
+
+
+def test_misspelt_field_of_a_plain_record_suggests_the_near_one():
+    row = records([("gain", "f8"), ("place", "f8", (3,))])[0]
+    told = r"^record has no field 'gian'; did you mean 'gain'\? \(fields: gain, place\)$"
+    with pytest.raises(AttributeError, match=told):
+        row.gian  # noqa: B018
+    with pytest.raises(AttributeError, match=told):
+        row.gian = 1.0
+    with pytest.raises(
+        AttributeError, match=r"^record has no field 'xyz' \(fields: gain, place\)$"
+    ):
+        row.xyz  # noqa: B018
+
+
+# Indices.
+
+
+@kernel
+def beyond_the_end(p, s, row, dt):
+    for i in range(8):
+        row.test_echo[i] = row.slave_measured_cp[i]
+
+
+def test_index_beyond_the_end_is_told_with_file_and_line_before_the_first_tick():
+    line = beyond_the_end.py_func.__code__.co_firstlineno + 3
+    told = rf"^stage 'echo' must be one that stays inside its arrays; index 7 is .*\.py:{line}\)$"
+    with pytest.raises(PartError, match=told):
+        stage(step=beyond_the_end).run(NoParameters())
+
+
+@kernel
+def counts(p, s, row, dt):
+    s.count += 1
+    row.test_echo[0] = 1.0 / row.test_echo[1] + s.count
+
+
+def test_trial_of_a_step_leaves_no_trace():
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        runner = stage(step=counts, state=(("count", "i8"),)).run(NoParameters())
+    assert told == []
+    assert runner.arguments[1]["count"] == 0
+    assert runner.signals["test_echo"].tolist() == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+
+
+LATER = """
+from teleop_core.kernels import kernel
+from teleop_core.parameters import NoParameters
+from teleop_core.stage import Stage
+from teleop_core.topics import SLAVE_MEASURED_CP
+
+
+@kernel
+def step(p, s, row, dt):
+    s.count += 1
+    s.held = row.slave_measured_cp[5 + s.count]
+
+
+runner = Stage(
+    "later", NoParameters, (SLAVE_MEASURED_CP,), (), step=step,
+    state=(("count", "i8"), ("held", "f8")),
+).run(NoParameters())
+for _ in range(3):
+    runner.step()
+"""
+
+
+@pytest.mark.skipif(not IS_COMPILED, reason="plain Python always checks")
+def test_index_that_goes_wrong_later_is_found_with_checks_compiled_in(tmp_path):
+    (tmp_path / "later.py").write_text(LATER)
+    errors = []
+    for checks in ("0", "1", "0"):  # each finds its own kernels on the disk
+        done = subprocess.run(
+            [sys.executable, "later.py"], cwd=tmp_path, capture_output=True, text=True, check=False,
+            env=os.environ | {"NUMBA_BOUNDSCHECK": checks},
+        )  # fmt: skip
+        errors.append(done.stderr.strip().splitlines()[-1:])
+    assert errors[0] == errors[2] == []
+    assert "IndexError" in errors[1][0]
+
+
+# Sessions and metrics.
+
+
+def test_parameter_of_a_stage_that_the_session_has_not_is_refused_with_the_way_out(own_parts):
+    @dataclass(frozen=True, kw_only=True)
+    class Limit:
+        speed: float = parameter(0.1, unit="m/s", doc="of the tool")
+
+    register_stage(stage("limit", Limit))
+    told = r"limit\.speed is .*0\.5.*, must be left out: this session has no stage limit; add stag"
+    with pytest.raises(ParameterError, match=told):
+        configure(settings=["limit.speed=0.5"])
+    assert configure(settings=["teleop.stages=[limit]", "limit.speed=0.5"]).value("speed") == 0.5
+
+
+class Nameless(Metric):
+    def add(self, window):
+        """Take nothing."""
+
+    def values(self):
+        return {}
+
+
+@pytest.mark.parametrize("part", [Nameless, Nameless(None), object()], ids=["class", "one", "none"])
+def test_metric_class_without_a_name_or_no_class_is_refused(part):
+    with pytest.raises(PartError, match=r"^metric '\w+' must be .*(own name|a class below)"):
+        evaluation.register_metric(part)
