@@ -33,8 +33,10 @@ def parameters_page() -> str:
     parts = [
         "# Parameters",
         "`teleop parameters` prints them; `--set NAME=VALUE` changes them, by the full name or by "
-        "its end, which sets every stage that has it: `--set robot=puma560`. Parts of your own add "
-        "theirs. *Fixed* ones can be set before a session alone, all others while nodes run too.",
+        "its end, which sets every stage that has it: `--set robot=puma560`. An end that different "
+        "parameters share is refused with their names: `pid.bandwidth`, not `bandwidth`. Parts of "
+        "your own add theirs. *Fixed* ones can be set before a session alone, all others while "
+        "nodes run too.",
     ]
     for group in declared_groups():
         rows = [f"| `{name}` | {default} | {allowed} | {text} |"
