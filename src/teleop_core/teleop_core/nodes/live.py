@@ -98,6 +98,7 @@ class _Session:
         self._parameters = folder / "parameters.yaml"
         self._parameters.write_text(parameter_file(configuration, str(out)))
         self._children: dict[str, Child] = {}
+        self._ready = 0.0
         self.crews = _crews(self._graph, is_composed=False)
 
     def run(self) -> None:
@@ -124,7 +125,7 @@ class _Session:
         home = {node: name for name, nodes in crew.items() for node in nodes}
         while waiting:
             self._observer.listen(0.1)
-            self._check()
+            self._check_alive()  # who compiles kernels, perhaps for all, reports later
             for name in [name for name in waiting if self._observer.is_active(name)]:
                 waiting.remove(name)
                 self._say(f"{name} is ready")
@@ -132,6 +133,7 @@ class _Session:
                 child = self._children[home[waiting[0]]]
                 reason = f"{waiting[0]} was not ready within {START_TIMEOUT:g} s"
                 raise SessionError(reason + child.last_words())
+        self._ready = time.monotonic()
 
     def _await_operator(self) -> None:
         """Wait until the hand moves; it does after a while even if nothing follows it."""
@@ -150,7 +152,12 @@ class _Session:
                 shown = int(elapsed)
                 self._say(f"{shown:3d}/{self._duration:g} s  {self._line()}")
 
+    def _check_alive(self) -> None:
+        for child in self._children.values():
+            child.check()
+
     def _check(self) -> None:
+        """Make sure that all processes run and all nodes report."""
         for crew in self.crews:
             for name in [name for name in crew if name in self._children]:
                 child = self._children[name]
@@ -160,7 +167,8 @@ class _Session:
     def _check_reports(self, child: Child, nodes: tuple[str, ...]) -> None:
         for name in nodes:
             status = self._observer.statuses.get(name)
-            silence = time.monotonic() - status.arrival if status else 0.0
+            heard = max(status.arrival, self._ready) if status else time.monotonic()
+            silence = time.monotonic() - heard
             if silence > SILENCE:
                 reason = f"{name} hangs: it has not reported for {silence:.0f} s"
                 raise SessionError(reason + child.last_words())
