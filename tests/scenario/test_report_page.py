@@ -146,7 +146,7 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(br
 @pytest.mark.slow
 def test_page_of_a_session_shows_both_arms_with_their_fixtures(browser, teleop, tmp_path):
     bag, page = tmp_path / "two", tmp_path / "report.html"
-    arms = ("arms=[right,left]", "left/robot=puma560", "left/seed=2", "left/fixture=sphere")
+    arms = ("arms=[left,right]", "right/robot=puma560", "right/seed=2", "right/fixture=sphere")
     teleop("sim", "--scenario", "coarse_box", "--duration", 6, "--out", bag, "--set", *arms)
     teleop("evaluate", bag, "--html", page)
     attributes, _, _ = opened(browser, page, tmp_path)

@@ -78,11 +78,14 @@ def test_replacing_stage_comes_between_writer_and_readers():
     assert feeds(graph, "limit", "slave/servo_cp") == ["slave/servo_cp"]
 
 
-def test_two_replacing_stages_follow_each_other():
-    second = Topic("test/second_cp", Kind.POSE, passed_on("slave/servo_cp"))
-    graph = Graph((*BASE, limit(), limit("second", second)))
-    assert feeds(graph, "second", "slave/servo_cp") == ["test/limited_cp"]
-    assert feeds(graph, "inverse_kinematics", "slave/servo_cp") == ["test/second_cp"]
+def test_stages_that_replace_the_same_topic_follow_each_other_in_the_order_of_their_names():
+    one, two = (Topic(f"test/{name}_cp", Kind.POSE, passed_on("slave/servo_cp")) for name in "ab")
+    stages = limit("a", one), limit("b", two)
+    for first, last in (stages, stages[::-1]):
+        graph = Graph((*BASE, first, last))
+        assert feeds(graph, first.name, "slave/servo_cp") == ["slave/servo_cp"]
+        assert feeds(graph, last.name, "slave/servo_cp") == [first.writes[0].name]
+        assert feeds(graph, "inverse_kinematics", "slave/servo_cp") == [last.writes[0].name]
 
 
 def test_topic_that_adds_to_another_arrives_beside_it():
