@@ -37,9 +37,10 @@ format: setup
 	$(BIN)/ruff check --fix .
 
 # Live nodes need the processors for themselves, and come last, when the kernels are compiled. In a
-# worker a crash of the middleware inside a test costs that test, not the run.
+# worker a crash of the middleware inside a test costs that test, not the run. The tests of a file
+# stay together: what they compile, one process does.
 test: lint
-	$(BIN)/pytest -n 2 -m "not ros"
+	$(BIN)/pytest -n 2 --dist loadfile -m "not ros"
 	$(BIN)/pytest -n 1 -m ros
 
 # Of kernels, run as plain Python: compiled code leaves no trace.
