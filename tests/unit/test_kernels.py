@@ -102,7 +102,7 @@ def test_field_named_like_something_that_numpy_numbers_have_is_the_field():
     assert (row.size, row.min) == (4.0, 3.0)
     with pytest.raises(AttributeError, match="record has no field 'sise'"):
         row.sise = 1.0
-    with pytest.raises(AttributeError, match="no attribute 'sise'"):
+    with pytest.raises(AttributeError, match="record has no field 'sise'; did you mean 'size'"):
         print(row.sise)
 
 
