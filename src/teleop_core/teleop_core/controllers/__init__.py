@@ -18,6 +18,7 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import pointer
 from teleop_core.registry import Registry
 from teleop_core.robots.robot import Robot
+from teleop_core.signals import DT
 from teleop_core.trials import fenced, is_whole
 
 __all__ = ["CONTROLLERS", "Controller", "per_joint", "register_controller"]
@@ -137,7 +138,7 @@ def _tried_effort(part: Controller, gains: Array, home: Array) -> tuple[Array, b
     zero, one = np.zeros(n), np.ones(n)
     part.begin(memory, home.copy(), zero)
     part.shift(memory, zero)
-    part.control(table, memory, home.copy(), home.copy(), zero, one, 1e-3, effort)
+    part.control(table, memory, home.copy(), home.copy(), zero, one, DT, effort)
     return effort, is_whole(fence) and is_whole(after)
 
 

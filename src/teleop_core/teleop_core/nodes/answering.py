@@ -7,6 +7,7 @@ from teleop_core.bags.reports import read_reports
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.streams import Waiter
 from teleop_core.session.runner import state_report
+from teleop_core.signals import DT
 from teleop_core.topics import Kind, Topic
 
 
@@ -45,7 +46,7 @@ class AnsweringNode(CoreNode):
             assert self._question.subscription is not None
             self._waiter = Waiter(self.context, self._question.subscription)
         # What is held back on a slow link comes without a message to wait for.
-        self._waiter.wait(1e-3 if self._question.delay else 0.1)
+        self._waiter.wait(DT if self._question.delay else 0.1)
         self.work()
 
     def tick(self, tick_ns: int) -> None:
