@@ -36,12 +36,13 @@ format: setup
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# Live nodes come last, when the kernels are compiled, and beside no compiler; each test has a ROS
-# domain of its own. In a worker a crash of the middleware inside a test costs that test, not the run.
-# The tests of a file stay together: what they compile, one process does.
+# Live nodes need the processors for themselves, and come last, when the kernels are compiled. In a
+# worker a crash of the middleware inside a test costs that test, not the run; it is run again, which
+# files that stay together would not allow. Elsewhere the tests of a file stay together: what they
+# compile, one process does.
 test: lint
 	$(BIN)/pytest -n 2 --dist loadfile -m "not ros"
-	$(BIN)/pytest -n 2 --dist loadfile -m ros
+	$(BIN)/pytest -n 1 -m ros
 
 # Of kernels, run as plain Python: compiled code leaves no trace.
 coverage: setup
