@@ -14,14 +14,14 @@ from typing import Any, Protocol
 import numpy as np
 
 from teleop_core.errors import PartError
-from teleop_core.kernels import bound, is_kernel, pointer, raise_pending, records
+from teleop_core.kernels import bound, raise_pending, records
 from teleop_core.parameters import Value, specs, values_of
 from teleop_core.registry import Registry
 from teleop_core.robots import load_robot_set
 from teleop_core.signals import DT, Field, assign, make_signals
 from teleop_core.topics import Kind, Topic
 
-__all__ = ["STAGES", "Runner", "RunningStage", "Stage", "register_stage"]
+__all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
 
 _WITH_JOINTS = (Kind.JOINTS, Kind.STATE)
 
@@ -321,6 +321,3 @@ STAGES: Registry[Stage] = Registry(
 def register_stage(stage: Stage, *, replace: bool = False) -> Stage:
     """Add a stage under its own name for the rest of the program; see :meth:`Registry.add`."""
     return STAGES.add(stage.name, stage, replace=replace)
-
-
-__all__ += ["is_kernel", "joints_of", "pointer"]
