@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
-from teleop_core.cli import _Progress, _say_compiling
+from teleop_core.commands.progress import Progress, say_compiling
 from teleop_core.topics import STREAMS
 
 COMPILING = "compiling kernels"
@@ -227,10 +227,10 @@ def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop, tmp_path):
 
 
 def test_long_compiling_is_told_while_no_tick_was_made(capsys):
-    progress = _Progress()
-    _say_compiling(progress)
+    progress = Progress()
+    say_compiling(progress)
     progress(1, 10)
-    _say_compiling(progress)
+    say_compiling(progress)
     assert capsys.readouterr().err == f"{COMPILING}, once for this graph …\n"
 
 

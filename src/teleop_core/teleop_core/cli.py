@@ -5,17 +5,21 @@ Imports stand inside the commands: ``teleop --help`` answers at once.
 
 import argparse
 import sys
-import threading
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
+from teleop_core.commands.arguments import (
+    command,
+    configured,
+    done,
+    geometry_argument,
+    out_argument,
+    session_arguments,
+    setting_arguments,
+)
+from teleop_core.commands.progress import shown_progress
 from teleop_core.errors import TeleopError
-
-if TYPE_CHECKING:
-    from teleop_core.session.configuration import Configuration
 
 FAILED = 2
 INTERRUPTED = 130
@@ -90,14 +94,14 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_sim(commands: Any) -> None:
-    sim = _command(commands, "sim", _sim, "run and record a session in virtual time")
-    _session_arguments(sim)
+    sim = command(commands, "sim", _sim, "run and record a session in virtual time")
+    session_arguments(sim)
     sim.add_argument("--seed", type=int, help="seed of everything random (haptic_master.seed)")
 
 
 def _add_live(commands: Any) -> None:
-    live = _command(commands, "live", _live, "run and record a session as ROS 2 nodes")
-    _session_arguments(live)
+    live = command(commands, "live", _live, "run and record a session as ROS 2 nodes")
+    session_arguments(live)
     live.add_argument(
         "--composed", action="store_true", help="all nodes in one process: the fastest session"
     )
@@ -105,145 +109,83 @@ def _add_live(commands: Any) -> None:
 
 def _add_replay(commands: Any) -> None:
     text = "run a recorded master through the graph again, in virtual time"
-    again = _command(commands, "replay", _replay, text)
+    again = command(commands, "replay", _replay, text)
     again.add_argument("bag", type=Path, help="recording whose master is replayed")
-    _out_argument(again)
-    _setting_arguments(again)
+    out_argument(again)
+    setting_arguments(again)
 
 
 def _add_play(commands: Any) -> None:
-    play = _command(commands, "play", _play, "publish a recording on live ROS 2 topics")
+    play = command(commands, "play", _play, "publish a recording on live ROS 2 topics")
     play.add_argument("bag", type=Path, help="recording to publish")
     play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
     play.add_argument("--rate", type=float, default=1.0, help="times real time (default: 1)")
 
 
 def _add_evaluate(commands: Any) -> None:
-    score = _command(commands, "evaluate", _evaluate, "score recordings beside published figures")
+    score = command(commands, "evaluate", _evaluate, "score recordings beside published figures")
     score.add_argument("bags", type=Path, nargs="+", metavar="BAG", help="recordings to score")
     score.add_argument("--json", type=Path, metavar="FILE", help="write the scores as JSON")
     score.add_argument("--html", type=Path, metavar="FILE", help="write one page with plots")
 
 
 def _add_lookups(commands: Any) -> None:
-    recover = _command(commands, "recover", _recover, "save what a cut-off recording holds")
+    recover = command(commands, "recover", _recover, "save what a cut-off recording holds")
     recover.add_argument("bag", type=Path, help="recording that was not closed")
     recover.add_argument("--out", type=Path, help="new recording (default: BAG_recovered)")
-    _command(commands, "scenarios", _scenarios, "list the scenarios")
+    command(commands, "scenarios", _scenarios, "list the scenarios")
     text = "list the parts that --set and teleop.stages take by name, also your own"
-    _command(commands, "parts", _parts, text)
+    command(commands, "parts", _parts, text)
     text = "list every parameter with unit, bounds and meaning"
-    parameters = _command(commands, "parameters", _parameters, text)
+    parameters = command(commands, "parameters", _parameters, text)
     parameters.add_argument("stage", nargs="?", help="only this stage")
     parameters.add_argument("--markdown", action="store_true", help="as a table for documents")
-    robot = _command(commands, "robot", _robot, "show a robot: joints, limits, home, tip pose")
+    robot = command(commands, "robot", _robot, "show a robot: joints, limits, home, tip pose")
     robot.add_argument("name", nargs="?", help="robot; without one, all are listed")
-    _geometry_argument(robot)
+    geometry_argument(robot)
     robot.add_argument(
         "--from", type=Path, dest="table", metavar="TABLE.yaml",
         help="chain from a Denavit-Hartenberg table, as in config/robots",
     )  # fmt: skip
     text = "draw where a robot's tip can be"
-    space = _command(commands, "workspace", _workspace, text)
+    space = command(commands, "workspace", _workspace, text)
     space.add_argument("name", metavar="ROBOT", help="one of `teleop robot`")
-    _geometry_argument(space)
+    geometry_argument(space)
     space.add_argument("--html", type=Path, metavar="FILE", help="page with the picture")
     space.add_argument("--csv", type=Path, metavar="FILE", help="x, y, z, manipulability")
     space.add_argument("--samples", type=int, default=20_000, help="joint vectors to draw")
     space.add_argument("--seed", type=int, default=1, help="seed of the draws")
 
 
-def _geometry_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--geometry", nargs="+", default=[], metavar="SYMBOL=VALUE",
-        help="lengths and options in place of the published ones [m, rad]",
-    )  # fmt: skip
-
-
-def _command(
-    commands: Any, name: str, run: Callable[[argparse.Namespace], int], text: str
-) -> argparse.ArgumentParser:
-    parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
-    parser.set_defaults(run=run)
-    parser.add_argument(
-        "--parts", type=Path, action="append", default=[], metavar="FILE.py", dest="more_parts",
-        help="Python file that registers parts of your own",
-    )  # fmt: skip
-    return parser
-
-
-def _out_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--out", type=Path, required=True, help="directory of the recording; must not exist"
-    )
-
-
-def _session_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenario", help="one of `teleop scenarios`")
-    parser.add_argument("--duration", type=float, metavar="S", help="seconds, in its place")
-    _out_argument(parser)
-    _setting_arguments(parser)
-
-
-def _setting_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--config", type=Path, action="append", default=[], metavar="FILE",
-        help="ROS 2 parameter file over the scenario; may be repeated",
-    )  # fmt: skip
-    parser.add_argument(
-        "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", dest="settings",
-        help="parameter over all files, e.g. fine_gain=0.2 or slave_sim.command_timeout=0.2",
-    )  # fmt: skip
-
-
-def _settings(arguments: argparse.Namespace) -> list[str]:
-    given = list(arguments.settings)
-    if arguments.duration is not None:
-        given.append(f"teleop.duration={arguments.duration!r}")
-    if getattr(arguments, "seed", None) is not None:
-        given.append(f"seed={arguments.seed}")
-    return given
-
-
 def _sim(arguments: argparse.Namespace) -> int:
     from teleop_core import api
 
-    configuration = _configured(arguments)
-    with _progress("simulating") as progress:
+    configuration = configured(arguments)
+    with shown_progress("simulating") as progress:
         api.run(configuration, out=arguments.out, progress=progress)
-    print(_done(arguments.out, f"{progress.seconds:g} s recorded"))
+    print(done(arguments.out, f"{progress.seconds:g} s recorded"))
     return 0
 
 
 def _replay(arguments: argparse.Namespace) -> int:
     from teleop_core import api
 
-    with _progress("replaying") as progress:
+    with shown_progress("replaying") as progress:
         api.replay(
             arguments.bag, out=arguments.out, progress=progress,
             files=arguments.config, texts=arguments.settings,
         )  # fmt: skip
-    print(_done(arguments.out, f"{progress.seconds:g} s replayed"))
+    print(done(arguments.out, f"{progress.seconds:g} s replayed"))
     return 0
-
-
-def _configured(arguments: argparse.Namespace) -> "Configuration":
-    from teleop_core import api
-
-    return api.configuration(arguments.scenario, files=arguments.config, texts=_settings(arguments))
-
-
-def _done(out: Path, what: str) -> str:
-    return f"{out}: {what}; next: teleop evaluate {out}"
 
 
 def _live(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
-    configuration = _configured(arguments)
+    configuration = configured(arguments)
     composed = arguments.composed
     _ros("live").live(configuration, arguments.out, Console(), is_composed=composed)
-    print(_done(arguments.out, "recorded"))
+    print(done(arguments.out, "recorded"))
     return 0
 
 
@@ -364,59 +306,6 @@ def _workspace(arguments: argparse.Namespace) -> int:
         write_workspace_page(robot, points, values, arguments.html)
         print(arguments.html)
     return 0
-
-
-class _Progress:
-    """What a session tells of its ticks; shown by a bar if there is one."""
-
-    def __init__(self) -> None:
-        self.ticks = 0
-        self.show: Callable[[int, int], None] | None = None
-
-    def __call__(self, done: int, total: int) -> None:
-        self.ticks = done
-        if self.show is not None:
-            self.show(done, total)
-
-    @property
-    def seconds(self) -> float:
-        """Time of the ticks so far."""
-        from teleop_core.signals import DT
-
-        return round(self.ticks * DT, 9)
-
-
-@contextmanager
-def _progress(text: str) -> Iterator[_Progress]:
-    """Progress bar on a terminal, nothing when piped."""
-    progress = _Progress()
-    patience = threading.Timer(2.0, _say_compiling, (progress,))
-    patience.daemon = True
-    patience.start()
-    try:
-        yield from _shown(text, progress)
-    finally:
-        patience.cancel()
-
-
-def _say_compiling(progress: _Progress) -> None:
-    """Say what takes so long before the first tick."""
-    if not progress.ticks:
-        print("compiling kernels, once for this graph …", file=sys.stderr)
-
-
-def _shown(text: str, progress: _Progress) -> Iterator[_Progress]:
-    if not sys.stderr.isatty():
-        yield progress
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn(text), BarColumn(), TextColumn("{task.percentage:.0f} %"))
-    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
-        task = bar.add_task(text, total=None)
-        progress.show = lambda done, total: bar.update(task, completed=done, total=total)
-        yield progress
 
 
 if __name__ == "__main__":

@@ -1,0 +1,79 @@
+"""Arguments that several commands share, and what becomes of them."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from teleop_core.session.configuration import Configuration
+
+
+def geometry_argument(parser: argparse.ArgumentParser) -> None:
+    """Let a command take lengths in place of the published ones."""
+    parser.add_argument(
+        "--geometry", nargs="+", default=[], metavar="SYMBOL=VALUE",
+        help="lengths and options in place of the published ones [m, rad]",
+    )  # fmt: skip
+
+
+def command(
+    commands: Any, name: str, run: Callable[[argparse.Namespace], int], text: str
+) -> argparse.ArgumentParser:
+    """Parser of a command, which calls ``run`` and says ``text`` in its help."""
+    parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
+    parser.set_defaults(run=run)
+    parser.add_argument(
+        "--parts", type=Path, action="append", default=[], metavar="FILE.py", dest="more_parts",
+        help="Python file that registers parts of your own",
+    )  # fmt: skip
+    return parser
+
+
+def out_argument(parser: argparse.ArgumentParser) -> None:
+    """Let a command write a recording."""
+    parser.add_argument(
+        "--out", type=Path, required=True, help="directory of the recording; must not exist"
+    )
+
+
+def session_arguments(parser: argparse.ArgumentParser) -> None:
+    """Let a command configure a session, from a scenario on."""
+    parser.add_argument("--scenario", help="one of `teleop scenarios`")
+    parser.add_argument("--duration", type=float, metavar="S", help="seconds, in its place")
+    out_argument(parser)
+    setting_arguments(parser)
+
+
+def setting_arguments(parser: argparse.ArgumentParser) -> None:
+    """Let a command take files and values of parameters."""
+    parser.add_argument(
+        "--config", type=Path, action="append", default=[], metavar="FILE",
+        help="ROS 2 parameter file over the scenario; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", dest="settings",
+        help="parameter over all files, e.g. fine_gain=0.2 or slave_sim.command_timeout=0.2",
+    )  # fmt: skip
+
+
+def settings(arguments: argparse.Namespace) -> list[str]:
+    """Texts ``key=value`` of all that was given."""
+    given = list(arguments.settings)
+    if arguments.duration is not None:
+        given.append(f"teleop.duration={arguments.duration!r}")
+    if getattr(arguments, "seed", None) is not None:
+        given.append(f"seed={arguments.seed}")
+    return given
+
+
+def configured(arguments: argparse.Namespace) -> "Configuration":
+    """Configuration of a session, as its arguments say."""
+    from teleop_core import api
+
+    return api.configuration(arguments.scenario, files=arguments.config, texts=settings(arguments))
+
+
+def done(out: Path, what: str) -> str:
+    """Last line of a command that recorded."""
+    return f"{out}: {what}; next: teleop evaluate {out}"
