@@ -1,12 +1,15 @@
 """Description of a robot: one line for the prompt, a page of text, a table for notebooks."""
 
+import math
 from collections.abc import Iterator
 from html import escape
 
 import numpy as np
 
+from teleop_core.geometry import Array
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.room import room
 
 _OF_CHAINS = "fixed0_00"  # a symbol of chains from tables, whose geometry is a row of matrices
 
@@ -18,10 +21,11 @@ def short(robot: Robot) -> str:
 
 
 def text(robot: Robot) -> str:
-    """Page: controlled directions, joints, drives, geometry, pose of the tip at home."""
+    """Page: controlled directions, joints, drives, geometry, room, pose of the tip at home."""
     lines = [f"{robot.name}: {robot.n} joints [rad, m], controls {controlled(robot)} of the tip"]
-    for row in rows(robot):
-        lines.append("  {:14} {:9.4f} … {:8.4f}   home {:8.4f}".format(*row))
+    for row, start in zip(rows(robot), robot.start.tolist(), strict=True):
+        lines.append("  {:14} {:9.4f} … {:8.4f}   home {:8.4f}   start {:8.4f}".format(*row, start))
+    lines += [f"room at {name}: {room_text(robot, q)}" for name, q in postures(robot).items()]
     lines.append(f"drives: {drives(robot)}")
     if _OF_CHAINS not in robot.geometry:
         lines.append("geometry: " + ", ".join(f"{k} = {v:g}" for k, v in robot.geometry.items()))
@@ -38,6 +42,21 @@ def html(robot: Robot) -> str:
     )
     caption = f"{escape(robot.name)}: {robot.n} joints [rad, m]; drives {escape(drives(robot))}"
     return f"<table><caption>{caption}</caption><tr>{head}</tr>{body}</table>"
+
+
+def postures(robot: Robot) -> dict[str, Array]:
+    """Home and start by their names; one entry if they are the same."""
+    if np.array_equal(robot.home, robot.start):
+        return {"home and start": robot.home}
+    return {"home": robot.home, "start": robot.start}
+
+
+def room_text(robot: Robot, q: Array) -> str:
+    """How far the tip can go from a posture in its worst direction, in millimetres and degrees."""
+    metres, radians = room(robot, q)
+    ways = [f"{1e3 * metres:.0f} mm"] if math.isfinite(metres) else []
+    ways += [f"{math.degrees(radians):.0f}°"] if math.isfinite(radians) else []
+    return " and ".join(ways) + " in the worst direction"
 
 
 def rows(robot: Robot) -> Iterator[tuple[str, float, float, float]]:

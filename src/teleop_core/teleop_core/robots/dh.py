@@ -13,7 +13,10 @@ variable::
       - {theta: q - 90}
 
 Entries that are left out are 0. A row without ``q`` is a fixed frame, such as a tool. Turning
-joints without limits have ±180 degrees; sliding ones must state theirs.
+joints without limits have ±180 degrees; sliding ones must state theirs. ``home`` is the posture of
+the published or natural zero; ``start`` the one at which sessions start, which joints without it
+start at home; if no row has it, one with room in all directions is looked for
+(:mod:`teleop_core.robots.room`).
 
 Every chain can be a slave. What its drives are stands, joint by joint, in a section of its own::
 
@@ -65,7 +68,7 @@ __all__ = [
     "robot_from_table",
 ]
 _EXPRESSION = re.compile(r"([+-]?)\s*q\s*(?:([+-])\s*([0-9.eE]+))?")
-_JOINT_KEYS = ("name", "lower", "upper", "home")
+_JOINT_KEYS = ("name", "lower", "upper", "home", "start")
 
 
 def load_table(path: Path | str) -> DhTable:
@@ -137,7 +140,7 @@ def _row(number: int, row: Any, convention: str, unit: float) -> DhRow:
         constants[symbol] = scale * (-offset if match[2] == "-" else offset)
         joint = _joint(number, row, symbol, -1.0 if match[1] == "-" else 1.0, scale, kind)
     if joint is None and any(key in row for key in _JOINT_KEYS[1:]):
-        raise ParameterError(where, dict(row), "without limits and home, for it has no q")
+        raise ParameterError(where, dict(row), "without limits, home and start, for it has no q")
     return DhRow(constants=constants, joint=joint)
 
 
@@ -154,10 +157,14 @@ def _joint(
         raise ParameterError(f"{where} lower", lower, f"below upper ({upper!r})")
     middle = 0.0 if lower <= 0.0 <= upper else 0.5 * (lower + upper)
     home = scale * _number(f"{where} home", row["home"]) if "home" in row else middle
-    if not lower <= home <= upper:
-        raise ParameterError(f"{where} home", home, f"between {lower!r} and {upper!r}")
+    start = scale * _number(f"{where} start", row["start"]) if "start" in row else None
+    for name, value in (("home", home), ("start", home if start is None else start)):
+        if not lower <= value <= upper:
+            raise ParameterError(f"{where} {name}", value, f"between {lower!r} and {upper!r}")
     name = str(row.get("name", f"q{number}"))
-    return DhJoint(name=name, symbol=symbol, sign=sign, lower=lower, upper=upper, home=home)
+    return DhJoint(
+        name=name, symbol=symbol, sign=sign, lower=lower, upper=upper, home=home, start=start
+    )
 
 
 def _number(name: str, value: Any) -> float:

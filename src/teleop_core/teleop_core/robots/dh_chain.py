@@ -35,6 +35,7 @@ class DhJoint:
     lower: float
     upper: float
     home: float
+    start: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +107,7 @@ class DhTable:
             lower=np.array([joint.lower for joint in self.joints]),
             upper=np.array([joint.upper for joint in self.joints]),
             home=np.array([joint.home for joint in self.joints]),
+            start=self._start(),
             geometry=self._geometry(),
             kernels=Kernels(
                 fk=dh_kernels.fk,
@@ -117,6 +119,12 @@ class DhTable:
             dynamics=independent_axes(drives.inertia),
             task_mask=tuple(direction in self.task for direction in DIRECTIONS),
         )
+
+    def _start(self) -> Array | None:
+        """Start posture, if any joint states its own."""
+        if all(joint.start is None for joint in self.joints):
+            return None
+        return np.array([j.home if j.start is None else j.start for j in self.joints])
 
     def _geometry(self) -> dict[str, float]:
         """Row of :mod:`teleop_core.robots.dh_kernels`, every number with a name."""

@@ -32,6 +32,8 @@ from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = ("theta1", "theta2", "theta3", "theta3_prime", "theta6", "theta8", "theta10")
 HOME = np.radians([0.0, -90.0, 0.0, 90.0, 90.0, 0.0, 0.0])
+# Answer of :func:`teleop_core.robots.room.start_posture` for the published lengths, rounded.
+START = np.array([1.2611, -0.5588, -1.012, 1.6884, 0.3097, 0.0, 0.0])
 
 # All assumed. Inertia: 0.3 kg spread over the arm's 0.2 m, and small motors at the wrist.
 DRIVES = Drives(
@@ -74,6 +76,7 @@ def make(model: str = "C", **geometry: float) -> Robot:
         lower=HOME - math.pi,
         upper=HOME + math.pi,
         home=HOME.copy(),
+        start=START.copy() if row == GEOMETRY else None,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,

@@ -37,6 +37,8 @@ LOWER = np.array([-160.0, -225.0, -225.0, -110.0, -100.0, -266.0]) * _DEGREES
 UPPER = np.array([160.0, 45.0, 45.0, 170.0, 100.0, 266.0]) * _DEGREES
 # Upper arm 45 degrees up, forearm level, tool 45 degrees down.
 HOME = np.array([0.0, -45.0, -45.0, 0.0, 45.0, 0.0]) * _DEGREES
+# Answer of :func:`teleop_core.robots.room.start_posture` for the published lengths, rounded.
+START = np.array([-0.4783, -1.6627, -0.035, 0.3949, 1.0084, -0.57])
 
 DRIVES = Drives(  # assumed, of the size of this arm's drives; quoted from memory, not checked
     inertia=np.array([2.6, 6.8, 1.16, 0.20, 0.18, 0.19]),
@@ -337,6 +339,7 @@ def make(**geometry: float | str) -> Robot:
         lower=LOWER.copy(),
         upper=UPPER.copy(),
         home=HOME.copy(),
+        start=START.copy() if row == GEOMETRY else None,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,

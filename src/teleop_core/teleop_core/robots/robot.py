@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import cast
+from typing import cast, overload
 
 import numpy as np
 
@@ -29,6 +29,27 @@ from teleop_core.robots.kinematics import (
 )
 
 
+class _Start:
+    """Start posture of a robot: as given, else by the rule, when it is first asked for."""
+
+    @overload
+    def __get__(self, robot: None, owner: type) -> None: ...
+    @overload
+    def __get__(self, robot: "Robot", owner: type) -> Array: ...
+    def __get__(self, robot: "Robot | None", owner: type) -> Array | None:
+        if robot is None:
+            return None  # the field's default
+        if robot.__dict__["start"] is None:
+            from teleop_core.robots.room import start_of
+
+            posture = read_only("start", start_of(robot), (robot.n,))
+            robot.__dict__["start"] = posture
+        return cast("Array", robot.__dict__["start"])
+
+    def __set__(self, robot: "Robot", value: Array | None) -> None:
+        robot.__dict__["start"] = value
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Robot:
     """An arm: names, limits, home and the kinematics over them; metres and radians.
@@ -40,7 +61,10 @@ class Robot:
         joint_names: Names in the order of every joint vector.
         lower: Smallest joint positions (n,) [rad, m].
         upper: Largest joint positions (n,) [rad, m].
-        home: Joint vector (n,) at which the simulated slave starts, inside the limits.
+        home: Joint vector (n,) of the published or natural zero, inside the limits.
+        start: Joint vector (n,) at which a session starts, inside the limits; None for one with
+            room in all directions (:func:`teleop_core.robots.room.start_posture`), looked for
+            when it is first asked for.
         geometry: Symbols and their values [m, rad], in the order the kernels expect.
         kernels: Compiled functions.
         drives: Drive table, None for robots that are not used as slaves.
@@ -48,8 +72,8 @@ class Robot:
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
 
     Raises:
-        ShapeError: Limits, home or drives are not vectors (n,).
-        ParameterError: Limits that cross, or a home outside them.
+        ShapeError: Limits, home, start or drives are not vectors (n,).
+        ParameterError: Limits that cross, or a home or start outside them.
     """
 
     name: str
@@ -62,6 +86,7 @@ class Robot:
     drives: Drives | None = None
     dynamics: Dynamics | None = None
     task_mask: tuple[bool, ...] = (True,) * 6
+    start: _Start = _Start()
     # Writable copies for the kernels, which are compiled for such arrays alone.
     _row: Array = field(init=False)
     _free: Array = field(init=False)
@@ -75,6 +100,7 @@ class Robot:
             raise ParameterError("lower", self.lower.tolist(), f"below {self.upper.tolist()}")
         if not ((self.lower <= self.home) & (self.home <= self.upper)).all():
             raise ParameterError("home", self.home.tolist(), "inside the limits")
+        self._check_start(shape)
         if self.drives is not None:
             if self.drives.inertia.shape != shape:
                 raise ShapeError("drives", shape, self.drives.inertia.shape)
@@ -85,6 +111,14 @@ class Robot:
         object.__setattr__(self, "_row", np.array(list(geometry.values()), dtype=np.float64))
         object.__setattr__(self, "_free", self.limits())
         object.__setattr__(self, "_home", self.home.copy())
+
+    def _check_start(self, shape: tuple[int, ...]) -> None:
+        given = self.__dict__["start"]
+        if given is None:
+            return
+        object.__setattr__(self, "start", read_only("start", given, shape))
+        if not ((self.lower <= self.start) & (self.start <= self.upper)).all():
+            raise ParameterError("start", self.start.tolist(), "inside the limits")
 
     def __repr__(self) -> str:
         from teleop_core.robots.description import short

@@ -50,6 +50,8 @@ _L1, _L2, _H1, _E, _LEGS, _W, _CARRIED = 0, 1, 2, 3, 4, 6, 9
 _TURN = math.radians(175.0)
 _STROKES = 0.45, 1.6  # of the leg length on a level platform
 HOME_JOINTS = -math.pi / 4.0, math.pi / 2.0, 0.25
+# Answer of :func:`teleop_core.robots.room.start_posture` for the published lengths, rounded.
+START = np.array([-0.0032, 2.145, 0.2651, 0.2327, 0.3012, 0.1801, 0.1219, 0.1221, 0.1767])
 HOME_TILT = math.radians(30.0)  # alpha of the published example; level would hide the turn
 _NEAR = 0.02  # sine of the elbow under which small moves need large joint moves
 _SWING = 1.25 * math.pi  # rad, of a joint that a path sends round the other way
@@ -286,6 +288,7 @@ def make(*, heading: str = "fixed", **geometry: float | str) -> Robot:
         raise UnknownNameError("heading", heading, HEADINGS)
     row = geometry_of(GEOMETRY, geometry)
     _check(row)
+    is_published = row == GEOMETRY and heading == "fixed"
     row["carried"] = float(heading == "carried")
     g = np.array(list(row.values()))[_LEGS:_CARRIED]
     platform, legs = np.eye(4), np.empty(6)
@@ -301,6 +304,7 @@ def make(*, heading: str = "fixed", **geometry: float | str) -> Robot:
         lower=lower,
         upper=upper,
         home=np.concatenate((HOME_JOINTS, legs)),
+        start=START.copy() if is_published else None,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=scara_stewart_drives.DRIVES,

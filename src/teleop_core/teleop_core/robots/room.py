@@ -1,0 +1,188 @@
+"""Room: how far the tip can go in every direction, and the posture a slave starts from.
+
+The tip is walked away from a posture along 26 directions, and turned about as many axes, in small
+steps, as the hand will move it. A direction ends where a joint limit ends it, and where the arm
+comes beside a singularity: there a joint has to move :data:`SWIFT` times as far as the tool. What
+is left in the worst direction is the room there.
+"""
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.geometry import Array, rotations_from_quaternions
+from teleop_core.kernels import raise_pending
+from teleop_core.robots import kinematics
+from teleop_core.robots.kinematics import IkStatus
+from teleop_core.robots.robot import Robot
+
+# One step of the walk turns the tool so far [rad], or takes it as far as a lever of reach/pi would.
+STEP = math.radians(2.0)
+STEPS = 45
+# Beside a singularity a joint moves more than so many times as far as the tool.
+SWIFT = 3.0
+# Home has room enough if the tip can turn so far [rad] in the worst direction, and move as far as
+# the lever would take it by the second angle: reach/15.
+ENOUGH = math.radians(30.0)
+ENOUGH_MOVE = math.radians(12.0)
+# Postures count as equal from this share of the most room on.
+EQUAL = 0.9
+# Postures that are looked at.
+SAMPLES = 512
+_FOLLOWED = int(IkStatus.FOLLOWED)
+_KNOWN: dict[tuple[object, ...], Array] = {}
+
+
+class Room(NamedTuple):
+    """How far the tip can go from a posture in its worst direction, of those it controls."""
+
+    metres: float
+    """Way of the tip with its attitude kept; inf if no position is controlled."""
+    radians: float
+    """Turn about the tip in place; inf if no rotation is controlled."""
+
+
+def room(robot: Robot, q: object) -> Room:
+    """How far the tip can go from a posture in every direction.
+
+    Args:
+        robot: The arm.
+        q: Joint vector (n,) [rad, m] inside the limits.
+
+    Returns:
+        :class:`Room`, in whole steps of 2 degrees and reach/pi times that, up to 90 degrees.
+
+    Raises:
+        ShapeError: Another shape.
+        ParameterError: NaN or infinity.
+    """
+    postures = np.array(q, dtype=np.float64, ndmin=2)
+    moves, turns = _steps(robot, postures)
+    return Room(float(moves[0]) * STEP * lever(robot), float(turns[0]) * STEP)
+
+
+def lever(robot: Robot) -> float:
+    """Distance [m] that counts as much as a radian: reach/pi.
+
+    The reach is the largest distance of the tip from the base's origin over the postures that are
+    looked at.
+    """
+    return float(np.linalg.norm(robot.fk(samples(robot))[:, :3, 3], axis=1).max()) / math.pi
+
+
+def samples(robot: Robot) -> Array:
+    """Joint vectors (:data:`SAMPLES`, n) spread evenly inside the limits, the same every time.
+
+    Source:
+        Roberts 2018, the R sequence: multiples of powers of the root of x^(n+1) = x + 1.
+    """
+    root = 2.0
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (robot.n + 1))
+    shares = np.arange(1, SAMPLES + 1)[:, None] * root ** -np.arange(1.0, robot.n + 1) + 0.5
+    return robot.lower + (shares % 1.0) * (robot.upper - robot.lower)
+
+
+def start_of(robot: Robot) -> Array:
+    """:func:`start_posture`, looked for once per program for robots that are alike."""
+    arrays = (robot.lower, robot.upper, robot.home, robot.geometry_row, np.array(robot.task_mask))
+    key = (robot.kernels, *(array.tobytes() for array in arrays))
+    if key not in _KNOWN:
+        _KNOWN[key] = start_posture(robot)
+    return _KNOWN[key]
+
+
+def start_posture(robot: Robot) -> Array:
+    """Posture from which the tip has room in all directions, by a rule without chance.
+
+    Home, if it has room enough: a turn by 30 degrees and a move by reach/15. Else of the
+    postures looked at that hold the tool as home does, where some can turn and move by 30
+    degrees, or else of all, those within :data:`EQUAL` of the most room; of these the one nearest
+    to home, by the largest share of a joint's range.
+
+    Args:
+        robot: The arm.
+
+    Returns:
+        Joint vector (n,) [rad, m], inside the limits; home if no posture has more room.
+    """
+    moves, turns = _steps(robot, robot.home[None])
+    if moves[0] >= round(ENOUGH_MOVE / STEP) and turns[0] >= round(ENOUGH / STEP):
+        return robot.home
+    spread = samples(robot)
+    held = robot.fk(spread)
+    held[:, :3, :3] = robot.fk(robot.home)[:3, :3]
+    answer = robot.ik_batch(held)
+    postures = np.vstack((robot.home, answer.q[answer.status == _FOLLOWED]))
+    steps = np.minimum(*_steps(robot, postures))
+    if steps.max() < round(ENOUGH / STEP):
+        postures = np.vstack((postures, spread))
+        steps = np.concatenate((steps, np.minimum(*_steps(robot, spread))))
+    good = postures[steps >= EQUAL * steps.max()]
+    away = np.abs((good - robot.home) / (robot.upper - robot.lower)).max(axis=1)
+    return np.asarray(good[int(away.argmin())])
+
+
+def _steps(robot: Robot, postures: Array) -> tuple[Array, Array]:
+    """Steps (N,) that every posture has in its worst direction: of moving, of turning; or inf."""
+    mask = np.array(robot.task_mask)
+    return (
+        _walk(robot, postures, _directions(mask[:3]), is_turn=False),
+        _walk(robot, postures, _directions(mask[3:]), is_turn=True),
+    )
+
+
+def _directions(controlled: NDArray[np.bool_]) -> Array:
+    """Unit vectors (k, 3) along the axes that are controlled and halfway between them."""
+    every = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
+    kept = every[(every != 0.0).any(axis=1) & (every[:, ~controlled] == 0.0).all(axis=1)]
+    return kept / np.linalg.norm(kept, axis=1)[:, None]
+
+
+def _walk(robot: Robot, postures: Array, directions: Array, *, is_turn: bool) -> Array:
+    """Steps (N,) that each posture has in its worst direction."""
+    count, fan = len(postures), len(directions)
+    if not fan:
+        return np.full(count, np.inf)
+    slide = STEP * lever(robot)
+    limits, unit = robot.limits(), STEP if is_turn else slide
+    is_sliding = np.abs(robot.jacobian(robot.home)[3:]).max(axis=0) < 1e-9
+    limits[2] = SWIFT * np.where(is_sliding, slide, STEP)
+    begin, alive, steps = robot.fk(postures), np.arange(count), np.zeros(count)
+    seeds = np.repeat(postures, fan, axis=0)
+    for step in range(1, STEPS + 1):
+        poses = _moved(begin[alive], step * unit * directions, is_turn)
+        seeds, status = _solve(robot, poses, seeds, limits)
+        is_there = (status == _FOLLOWED).reshape(-1, fan).all(axis=1)
+        alive, seeds = alive[is_there], seeds[np.repeat(is_there, fan)]
+        steps[alive] = step
+        if not len(alive):
+            break
+    return steps
+
+
+def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
+    """Poses (N k, 4, 4): each of N moved by each of k offsets (k, 3) [m], or turned [rad]."""
+    poses = np.repeat(begin, len(offsets), axis=0).reshape(len(begin), -1, 4, 4)
+    if is_turn:
+        angle = np.linalg.norm(offsets, axis=1)[:, None]
+        quaternions = np.hstack((np.cos(angle / 2), offsets / angle * np.sin(angle / 2)))
+        poses[..., :3, :3] = rotations_from_quaternions(quaternions) @ poses[..., :3, :3]
+    else:
+        poses[..., :3, 3] += offsets
+    return poses.reshape(-1, 4, 4)
+
+
+def _solve(
+    robot: Robot, poses: Array, seeds: Array, limits: Array
+) -> tuple[Array, NDArray[np.int64]]:
+    q, residual = np.empty_like(seeds), np.empty((len(seeds), 2))
+    status = np.zeros(len(seeds), np.int64)
+    kinematics.ik_batch(
+        robot.ik_pointer, poses, seeds, False, limits, robot.geometry_row, q, residual, status
+    )
+    raise_pending()
+    return q, status
