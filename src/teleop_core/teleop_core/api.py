@@ -11,6 +11,7 @@ The command line is a thin layer on this module.
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,7 @@ from teleop_core.session.layers import (
     setting,
 )
 from teleop_core.session.runner import (
+    NewSamples,
     StateReports,
     describe,
     record_blocks,
@@ -190,8 +192,8 @@ def run(
         )  # fmt: skip
     for note in made.graph.notes:
         warnings.warn(note, stacklevel=2)
-    ticks = session_ticks(made)
     session = VirtualTime(made)
+    ticks = session_ticks(made, session)
     return _kept(session, made, run_blocks(session, ticks), ticks, out, progress)
 
 
@@ -257,10 +259,10 @@ class _Memory:
 
     def __init__(self, session: VirtualTime) -> None:
         self._session, self._reports = session, StateReports(session)
-        self._parts: dict[Topic, list[tuple[NDArray[np.int64], Array]]] = {
+        self._is_new = NewSamples()
+        self._parts: dict[Topic, list[Sequence[NDArray[Any]]]] = {
             topic: [] for topic in session.graph.streams
         }
-        self._logs: list[NDArray[np.int64]] = []
         self._messages: dict[Topic, list[Message]] = {
             topic: [] for topic in session.graph.topics if topic not in self._parts
         }
@@ -268,9 +270,9 @@ class _Memory:
 
     def take(self, block: NDArray[np.void]) -> None:
         self.ticks += len(block)
-        self._logs.append(np.array(block["now_ns"]))
+        log_ns = block["now_ns"]
         for topic, parts in self._parts.items():
-            parts.append((np.array(block[f"{topic.field}_ns"]), np.array(block[topic.field])))
+            parts.append([np.array(part) for part in self._is_new.of(topic, block, log_ns)])
         self._reports.write(self, block)
 
     def write(self, topic: Topic, log_ns: int, data: bytes) -> None:
@@ -278,10 +280,10 @@ class _Memory:
         self._messages[topic].append((log_ns, data))
 
     def bag(self, made: Configuration) -> MemoryBag:
-        logs, series = np.concatenate(self._logs), {}
+        series = {}
         for topic, parts in self._parts.items():
-            stamps, values = (np.concatenate(column) for column in zip(*parts, strict=True))
-            names = self._session.joint_names[topic.arm] if "Joint" in topic.kind.value else ()
+            stamps, values, logs = (np.concatenate(column) for column in zip(*parts, strict=True))
+            names = topic.names(self._session.joint_names[topic.arm])
             series[topic] = Series(stamps, logs, values, names, topic.frame_id)
         about = describe(made)
         return MemoryBag(about["scenario"] or "session", series, self._messages, about)

@@ -121,6 +121,42 @@ def rotation_angle_between(a: Array, b: Array) -> float:
 
 
 @kernel
+def rotation_vector_between(a: Array, b: Array, vector: Array) -> None:
+    """Write the rotation vector (3,) [rad], in the base, that turns the rotation of a to that of b.
+
+    Half a turn, whose axis has two directions, comes out about either of them.
+    """
+    qa, qb = np.empty(4), np.empty(4)
+    quaternion_from_rotation(a, qa)
+    quaternion_from_rotation(b, qb)
+    turn_between(qa, qb, vector)
+
+
+@kernel
+def turn_between(a: Array, b: Array, vector: Array) -> None:
+    """Write the rotation vector (3,) [rad], in the base, that turns quaternion a to b."""
+    inverse, turn = np.empty(4), np.empty(4)
+    inverse[0], inverse[1], inverse[2], inverse[3] = a[0], -a[1], -a[2], -a[3]
+    multiply_quaternions(b, inverse, turn)
+    sign = -1.0 if turn[0] < 0.0 else 1.0
+    sine = math.sqrt(turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3])
+    scale = 2.0 * sign
+    if sine > 1e-8:
+        scale = 2.0 * sign * math.atan2(sine, sign * turn[0]) / sine
+    for i in range(3):
+        vector[i] = scale * turn[1 + i]
+
+
+@kernel
+def turn_by(vector: Array, quaternion: Array) -> None:
+    """Turn a quaternion by a rotation vector (3,) [rad] in the base."""
+    turn, unit = np.empty(4), np.zeros(4)
+    unit[0] = 1.0
+    rotate_by_vector(unit, vector[0], vector[1], vector[2], turn)
+    multiply_quaternions(turn, quaternion, quaternion)
+
+
+@kernel
 def is_rigid(transform: Array) -> bool:
     """Whether a (4, 4) matrix is finite, with a right-handed rotation within 1e-6.
 

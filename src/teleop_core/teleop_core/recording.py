@@ -168,7 +168,7 @@ class Recording:
         if not columns:
             raise RecordingError(self._bag.path, f"{name} holds texts, which are not columns")
         reports = self._bag.reports(name)
-        rows = [[float(report.values[column]) for column in columns] for report in reports]
+        rows = [[float(report.values.get(c, "nan")) for c in columns] for report in reports]
         stamps = np.array([report.stamp_ns for report in reports], np.int64)
         series = Series(stamps, stamps, np.array(rows, np.float64).reshape(-1, len(columns)))
         return self._stream(name, series, columns)
@@ -225,7 +225,7 @@ class Recording:
         if not isinstance(self._bag, MemoryBag):
             return self._copied(Path(path))
         bag = self._bag
-        names = {t.arm: found.names for t, found in bag.streams.items() if found.names}
+        names = {t.arm: found.names for t, found in bag.streams.items() if t.kind.has_joints}
         reports = [t for t in BY_NAME.values() if t.kind is Kind.REPORT]
         reports = [t.of_arm(arm) for arm in ("", *self.arms[1:]) for t in reports]
         topics = [*bag.streams, *(t for t in reports if t.name in bag.topics)]
@@ -266,7 +266,7 @@ class Recording:
 
 def _columns(kind: Kind | None, series: Series) -> tuple[str, ...]:
     width = series.values.shape[1]
-    if kind in {Kind.JOINTS, Kind.STATE}:
+    if kind is not None and kind.has_joints:
         kind = Kind.JOINTS if width == len(series.names) else Kind.STATE
     assert kind is not None
     return kind.columns(series.names)

@@ -19,11 +19,9 @@ from teleop_core.parameters import Value, specs, values_of
 from teleop_core.registry import Registry
 from teleop_core.robots import load_robot_set
 from teleop_core.signals import DT, Field, assign, make_signals
-from teleop_core.topics import Kind, Topic
+from teleop_core.topics import Topic
 
 __all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
-
-_WITH_JOINTS = (Kind.JOINTS, Kind.STATE)
 
 
 class Runner(Protocol):
@@ -129,7 +127,7 @@ class Stage:
             self._insist(callable(self.step) is not callable(self.make), text)
         self._check_parts()
         names = {spec.name for spec in specs(self.parameters)}
-        has_joints = any(topic.kind in _WITH_JOINTS for topic in (*self.reads, *self.writes))
+        has_joints = any(topic.kind.has_joints for topic in (*self.reads, *self.writes))
         text = "one whose parameters inherit RobotParameters, for it has topics with joints"
         self._insist("robot" in names or not has_joints, text)
 
@@ -192,7 +190,9 @@ class RunningStage:
 
     def __init__(self, stage: Stage, joints: int, dt: float) -> None:
         self.stage, self.dt = stage, dt
-        self.signals: Any = make_signals(stage.ports, joints, stage.notes)[0]
+        self.signals: Any = make_signals(
+            stage.ports, joints, (*stage.notes, ("answered_ns", "i8"))
+        )[0]
         self.kernel: Callable[..., None] = _nothing
         self.arguments: tuple[Any, ...] = ()
         self.ahead = 1000

@@ -5,7 +5,7 @@ arm called ``left`` has ``left/slave/servo_cp`` and so on.
 """
 
 from dataclasses import dataclass, replace
-from enum import Enum
+from enum import Enum, IntEnum
 
 
 class Quality(Enum):
@@ -14,6 +14,16 @@ class Quality(Enum):
     STREAM = "best effort, keep last 1: only the newest sample matters"
     LATCHED = "reliable, transient local, keep last 1: late joiners get the last value"
     REPORT = "reliable, keep last 10: rare reports"
+
+
+class Limit(IntEnum):
+    """What keeps the slave from doing all that the hand asks for."""
+
+    NONE = 0  # it follows
+    JOINT = 1  # a joint is at the end of its range
+    WORKSPACE = 2  # no joint vector brings the tip there
+    SINGULARITY = 3  # joints would have to turn faster than they can, for the arm is near one
+    SPEED = 4  # joints would have to move faster than they can
 
 
 class Kind(Enum):
@@ -28,6 +38,7 @@ class Kind(Enum):
     BUTTONS  clutch, fixture, mode: 1 pressed, 0 released
     JOINTS   position of each joint [rad or m]
     STATE    position, velocity, effort of all joints: 3 n columns
+    NUMBERS  the numbers that the topic names in ``columns``
     REPORT   no fixed columns: key-value pairs
     ======== ==================================================================
     """
@@ -36,8 +47,10 @@ class Kind(Enum):
     TWIST = "geometry_msgs/msg/TwistStamped"
     WRENCH = "geometry_msgs/msg/WrenchStamped"
     BUTTONS = "sensor_msgs/msg/Joy"
+    # Blanks keep those of one message type apart; see ros_type.
+    NUMBERS = "sensor_msgs/msg/JointState  "
     JOINTS = "sensor_msgs/msg/JointState"
-    STATE = "sensor_msgs/msg/JointState "  # the blank keeps it apart from JOINTS; see ros_type
+    STATE = "sensor_msgs/msg/JointState "
     REPORT = "diagnostic_msgs/msg/DiagnosticArray"
 
     @property
@@ -45,9 +58,19 @@ class Kind(Enum):
         """Name of the ROS message type."""
         return self.value.strip()
 
+    @property
+    def has_joints(self) -> bool:
+        """Whether its columns are those of a robot's joints."""
+        return self in {Kind.JOINTS, Kind.STATE}
+
+    @property
+    def has_names(self) -> bool:
+        """Whether its messages carry the names of their numbers."""
+        return self.has_joints or self is Kind.NUMBERS
+
     def columns(self, joint_names: tuple[str, ...]) -> tuple[str, ...]:
         """Names of the columns, for a robot with these joints; none for reports."""
-        if self is Kind.JOINTS:
+        if self in {Kind.JOINTS, Kind.NUMBERS}:
             return joint_names
         if self is Kind.STATE:
             parts = ("position", "velocity", "effort")
@@ -55,9 +78,11 @@ class Kind(Enum):
         return _COLUMNS[self]
 
     def width(self, joints: int) -> int:
-        """Number of columns for a robot with this many joints."""
+        """Number of columns for a robot with this many joints, or a topic with so many names."""
         fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0}
-        return {Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed}[self]
+        return {
+            Kind.NUMBERS: joints, Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed
+        }[self]  # fmt: skip
 
 
 _COLUMNS = {
@@ -108,7 +133,7 @@ class Topic:
         stamp: Which time its header carries.
         frame_id: Frame of the header, below the arm's namespace.
         quality: How it is transported.
-        columns: Names of the numbers of a report; empty for streams.
+        columns: Names of the numbers, of reports and of :attr:`Kind.NUMBERS`; else empty.
         adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
             another source of force; empty for a topic of its own.
         arm: Namespace; empty for the default arm.
@@ -140,7 +165,13 @@ class Topic:
 
     def width(self, joints: int) -> int:
         """Number of its numbers for a robot with this many joints."""
-        return len(self.columns) if self.kind is Kind.REPORT else self.kind.width(joints)
+        return len(self.columns) if self.columns else self.kind.width(joints)
+
+    def names(self, joint_names: tuple[str, ...]) -> tuple[str, ...]:
+        """Names in its messages, for a robot with these joints; empty without any."""
+        if self.kind is Kind.NUMBERS:
+            return self.columns
+        return joint_names if self.kind.has_joints else ()
 
 
 MASTER_MEASURED_CP = Topic("master/measured_cp", Kind.POSE, SAMPLED, "master_base")
@@ -152,6 +183,17 @@ MASTER_SERVO_CF = Topic(
 )
 SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, passed_on("master/measured_cp"), "slave_base")
 SLAVE_SERVO_JP = Topic("slave/servo_jp", Kind.JOINTS, passed_on("slave/servo_cp"), "slave_base")
+SLAVE_REACH = Topic(
+    "slave/reach", Kind.NUMBERS, passed_on("slave/servo_cp"), "slave_base",
+    columns=(
+        "status", "limit", "joint", "position_residual", "rotation_residual",
+        "cut_x", "cut_y", "cut_z", "cut_rx", "cut_ry", "cut_rz",
+    ),
+)  # fmt: skip
+"""How far inverse kinematics can follow: status as of
+:class:`~teleop_core.robots.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none),
+what the answer leaves [m, rad], and by what the command would have to be moved, in slave_base
+[m, rad], to be one that the arm can reach given time."""
 SLAVE_SETPOINT_JS = Topic(
     "slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base"
 )
@@ -163,15 +205,15 @@ TELEOP_STATE = Topic(
     columns=(
         "is_following", "is_clutched", "is_fine", "gain", "is_fixture_on",
         "fixture_center_x", "fixture_center_y", "fixture_center_z",
-        "fixture_size_x", "fixture_size_y", "fixture_size_z",
+        "fixture_size_x", "fixture_size_y", "fixture_size_z", "limit", "limited_joint",
     ),
 )  # fmt: skip
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (
     MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_SERVO_CF,
-    SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP, SLAVE_MEASURED_JS,
-    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_REACH, SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP,
+    SLAVE_MEASURED_JS, SLAVE_MEASURED_CP,
 )  # fmt: skip
 """Topics of the built-in stages that carry one message per tick."""
 ALL = (*STREAMS, TELEOP_STATE, DIAGNOSTICS)

@@ -164,7 +164,7 @@ class Layout:
 
 def layout_of(kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> Layout:
     """Layout of a kind of message, with the names if it has joints; made once."""
-    return _make(kind, joint_names if kind in {Kind.JOINTS, Kind.STATE} else (), frame_id)
+    return _make(kind, joint_names if kind.has_names else (), frame_id)
 
 
 @cache
@@ -185,7 +185,8 @@ def layout(topic: Topic, joint_names: tuple[str, ...], frame_id: str | None = No
     """
     if topic.kind is Kind.REPORT:
         raise ValueError(f"{topic.name} carries reports, which have no fixed layout")
-    return layout_of(topic.kind, joint_names, topic.frame_id if frame_id is None else frame_id)
+    names = topic.names(joint_names)
+    return layout_of(topic.kind, names, topic.frame_id if frame_id is None else frame_id)
 
 
 def discover(kind: Kind, data: bytes) -> Layout | None:
@@ -198,7 +199,7 @@ def discover(kind: Kind, data: bytes) -> Layout | None:
     try:
         frame_id, at = _read_string(data, 12)
         names: list[str] = []
-        if kind in {Kind.JOINTS, Kind.STATE}:
+        if kind.has_names:
             count, at = _read_length(data, at)
             for _ in range(count):
                 name, at = _read_string(data, at)

@@ -59,7 +59,11 @@ class MemoryBag(Bag):
         for name in wanted:
             if name not in self._series:
                 raise RecordingError(self.path, f"{name} is a report, which is not read as numbers")
-        return {name: _ordered(self._series[name], joint_names) for name in wanted}
+        kinds = {topic.name: topic.kind for topic in self.streams}
+        return {
+            name: _ordered(self._series[name], joint_names if kinds[name].has_joints else None)
+            for name in wanted
+        }
 
     def blocks(
         self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None

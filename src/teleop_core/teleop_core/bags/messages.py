@@ -27,7 +27,7 @@ from teleop_core.topics import Kind
 
 __all__ = [
     "SECOND_NS", "Layout", "Refusal", "Report", "Stamps", "Values", "check", "discover", "layout",
-    "layout_of", "read_reports", "read_values", "report", "write_values",
+    "layout_of", "read_numbers", "read_reports", "read_values", "report", "write_values",
 ]  # fmt: skip
 
 QUATERNION_TOLERANCE = 1e-3
@@ -39,7 +39,7 @@ class Refusal(Enum):
     NOT_FINITE = "holds NaN or infinite numbers"
     NOT_UNIT = "its quaternion is not of unit length"
     NOT_NEWER = "its stamp is not newer than the last one"
-    WRONG_NAMES = "lacks a joint name of the robot"
+    WRONG_NAMES = "lacks a name that it must have, as of a joint of the robot"
     WRONG_LENGTH = "has too few or too many numbers"
 
 
@@ -84,6 +84,17 @@ def read_values(
     if isinstance(values, Refusal):
         return values
     return stamp.sec * SECOND_NS + stamp.nanosec, np.array(values, dtype=np.float64)
+
+
+def read_numbers(data: bytes, columns: tuple[str, ...]) -> tuple[int, Values] | Refusal:
+    """Stamp [ns] and the named numbers, shape (columns,), of a report; or why it has none."""
+    for found in read_reports(data):
+        try:
+            row = [float(found.values[name]) for name in columns]
+        except (KeyError, ValueError):
+            continue
+        return found.stamp_ns, np.array(row, dtype=np.float64)
+    return Refusal.WRONG_NAMES
 
 
 def _row(kind: Kind, message: Any, joint_names: tuple[str, ...]) -> list[float] | Refusal:

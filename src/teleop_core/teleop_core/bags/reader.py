@@ -137,7 +137,8 @@ class Bag:
             if kind is None or kind is Kind.REPORT:
                 reason = f"{name} is a {self.topics[name].type}, which is not read as numbers"
                 raise RecordingError(self.path, reason)
-            columns[name] = Column(name, kind, joint_names or ())
+            wanted_names = joint_names if joint_names and kind.has_joints else ()
+            columns[name] = Column(name, kind, wanted_names)
         return columns
 
     def _blocks(self, columns: dict[str, Column]) -> Iterator[dict[str, Series]]:

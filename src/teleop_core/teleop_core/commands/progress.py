@@ -14,6 +14,7 @@ class Progress:
         self.show: Callable[[int, int], None] | None = None
 
     def __call__(self, done: int, total: int) -> None:
+        """Take how many ticks are done, of how many."""
         self.ticks = done
         if self.show is not None:
             self.show(done, total)

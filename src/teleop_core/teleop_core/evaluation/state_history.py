@@ -15,6 +15,8 @@ from teleop_core.signals import STATE, STATE_FIELDS
 from teleop_core.topics import TELEOP_STATE
 
 _CENTER = slice(STATE["fixture_center_x"], STATE["fixture_center_x"] + 3)
+# Fields that recordings of earlier versions lack.
+_SINCE = {"limit": "nan", "limited_joint": "nan"}
 _SIZE = slice(STATE["fixture_size_x"], STATE["fixture_size_x"] + 3)
 
 
@@ -24,7 +26,7 @@ class StateHistory:
 
     Attributes:
         stamp_ns: Time from which a row holds, shape (N,), [ns].
-        rows: Columns as in :data:`~teleop_core.signals.STATE_FIELDS`, shape (N, 11).
+        rows: Columns as in :data:`~teleop_core.signals.STATE_FIELDS`, shape (N, 13).
         fixture: Which of ``fixtures`` each row tells, shape (N,).
         fixtures: All that were told, each once; on or off.
     """
@@ -104,7 +106,9 @@ def read_history(bag: Bag) -> StateHistory:
     which: list[int] = []
     for report in bag.reports(TELEOP_STATE) if info is not None and info.count else ():
         stamps.append(report.stamp_ns)
-        row = np.array([_number(bag, name, report.values.get(name)) for name in STATE_FIELDS])
+        row = np.array(
+            [_number(bag, name, report.values.get(name, _SINCE.get(name))) for name in STATE_FIELDS]
+        )
         rows.append(row)
         fixture = reported_fixture(report.values, row[_SIZE])
         which.append(fixtures.setdefault(fixture, len(fixtures)))

@@ -13,16 +13,30 @@ from teleop_core.geometry import (
     multiply_quaternions,
     quaternion_from_rotation,
     rotation,
+    turn_between,
+    turn_by,
 )
 from teleop_core.kernels import inner, kernel, records
+from teleop_core.mapping.limits import (
+    LIMIT_FIELDS,
+    SENT,
+    SENT_FIELDS,
+    ReachForceParameters,
+    align,
+    draw_back,
+    forget_limits,
+    measure_depth,
+    remember,
+)
 from teleop_core.mapping.walls import wall_force
 from teleop_core.parameters import Choice, choice, parameter, values_of
-from teleop_core.signals import DT, STATE
+from teleop_core.signals import DT, STATE, assign
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
     MASTER_SERVO_CF,
+    SLAVE_REACH,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
@@ -71,11 +85,21 @@ class MotionScalingParameters:
         ("+x", "-y", "-z"), choices=AXES, length=3,
         doc="the tool's x, y, z as axes of the stylus, before tool_roll",
     )  # fmt: skip
+    rotation_gain: float = parameter(
+        1.0, unit="rad/rad", lower=0.0, upper=1.0,
+        doc="tool turn per stylus turn; below 1 the tool keeps no fixed relation to the stylus",
+    )  # fmt: skip
+    longest_pause: float = parameter(
+        0.3, unit="s", lower=0.002, upper=5.0,
+        doc="after a longer pause of the master the slave is aligned anew and does not jump",
+    )  # fmt: skip
     feedback_timeout: float = parameter(
         0.1, unit="s", lower=0.002, upper=5.0,
-        doc="slave counts as not following when its setpoint is older than this",
+        doc="slave counts as not following when its setpoint lags behind the last command by more; "
+        "of slow masters twice their period counts",
     )  # fmt: skip
     fixture: FixtureParameters = field(default_factory=FixtureParameters)
+    reach_force: ReachForceParameters = field(default_factory=ReachForceParameters)
 
     def __post_init__(self) -> None:
         if self.fine_gain > self.coarse_gain:
@@ -88,16 +112,20 @@ _PARAMETERS = [
     ("gain", "f8", (2,)), ("stylus_tool", "f8", (4,)), ("slave_master", "f8", (4,)),
     ("axis", "i8", (3,)), ("sign", "f8", (3,)),
     ("size", "f8", (3,)), ("stiffness", "f8"), ("max_force", "f8"), ("timeout_ns", "i8"),
+    ("pause_ns", "i8"), ("rotation_gain", "f8"), ("reach_stiffness", "f8"), ("reach_depth", "f8"),
 ]  # fmt: skip
 _STATE = [
     ("buttons", "f8", (3,)), ("is_fine", "i8"), ("is_engaged", "i8"), ("must_latch", "i8"),
-    ("is_fixture_on", "i8"),
+    ("is_fixture_on", "i8"), ("last_ns", "i8"),
     ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
-    ("alignment", "f8", (4,)),
+    ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
 ]  # fmt: skip
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
 _CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
+_LIMIT, _JOINT = STATE["limit"], STATE["limited_joint"]
+# Depth [m] up to which the hand's stand against a limit is measured, where no force is felt.
+_SHALLOW = 2e-3
 
 
 def axis_map(name: str, axes: tuple[str, ...]) -> Array:
@@ -154,7 +182,7 @@ def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
 
 
 @inner
-def _latch(s: Any, position: Array, tool: Array) -> None:
+def _latch(s: Any, position: Array) -> None:
     """Hold the command and measure further motion from here: no step, whatever happened before.
 
     The fixture goes with the hand, so that it stays where it is around the slave.
@@ -162,15 +190,12 @@ def _latch(s: Any, position: Array, tool: Array) -> None:
     if s.is_engaged:
         for i in range(3):
             s.center[i] += position[i] - s.master[i]
-    inverse = np.empty(4)
-    inverse[0] = tool[0]
-    for i in range(1, 4):
-        inverse[i] = -tool[i]
-    multiply_quaternions(s.command[3:7], inverse, s.alignment)
+    align(s)
+    forget_limits(s)
 
 
 @inner
-def _move(p: Any, s: Any, gain: float, position: Array, tool: Array) -> None:
+def _move(p: Any, s: Any, gain: float, position: Array, turn: Array) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = np.empty(3)
     for i in range(3):
@@ -178,13 +203,37 @@ def _move(p: Any, s: Any, gain: float, position: Array, tool: Array) -> None:
     to_slave_axes(p, step, step)
     for i in range(3):
         s.command[i] += gain * step[i]
-    multiply_quaternions(s.alignment, tool, s.command[3:7])
+    if p.rotation_gain == 1.0:
+        multiply_quaternions(s.tool, s.alignment, s.command[3:7])
+    else:
+        for i in range(3):
+            turn[i] *= p.rotation_gain
+        turn_by(turn, s.command[3:7])
+        align(s)
     # One Newton step keeps the product of many unit quaternions a unit quaternion.
     square = 0.0
     for i in range(3, 7):
         square += s.command[i] * s.command[i]
     for i in range(3, 7):
         s.command[i] *= 1.5 - 0.5 * square
+
+
+@inner
+def _follows(p: Any, s: Any, row: Any) -> bool:
+    """Whether the slave had the last command in force, and the master has not paused since."""
+    pause_ns = row.master_measured_cp_ns - s.last_ns
+    lag_ns = s.last_ns - row.slave_setpoint_cp_ns
+    is_known = row.slave_setpoint_cp_ns != 0 and s.last_ns != 0
+    return is_known and pause_ns <= p.pause_ns and lag_ns <= max(p.timeout_ns, 2 * pause_ns)
+
+
+@inner
+def _push_back(p: Any, s: Any, force: Array) -> None:
+    """Add the push of the slave's limit, in the master's base, to the force (3,) [N]."""
+    push = p.reach_stiffness * s.depth
+    if push > 0.0:
+        for i in range(3):
+            force[p.axis[i]] -= p.sign[i] * push * s.out[i]
 
 
 @inner
@@ -205,15 +254,17 @@ def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
             # Rounded to a nanometre: a fixture that stands still reports no change.
             state[_CENTER + i] = round((s.command[i] + gain * offset[i]) * 1e9) / 1e9
             state[_SIZE + i] = gain * p.size[p.axis[i]]
+    state[_LIMIT], state[_JOINT] = s.limit, s.joint
 
 
 @kernel
-def motion_scaling_step(p: Any, s: Any, fixture: Any, row: Any, dt: float) -> None:
+def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: float) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
 
     Args:
         p: Parameter record.
         s: State record; written.
+        sent: Records of :data:`~teleop_core.mapping.limits.SENT_FIELDS`; written.
         fixture: :class:`Shape`.
         row: Signals.
         dt: Tick [s].
@@ -221,35 +272,45 @@ def motion_scaling_step(p: Any, s: Any, fixture: Any, row: Any, dt: float) -> No
     Position is incremental (X_S += gain X_P), so a change of gain alone moves nothing;
     orientation follows the stylus absolutely, up to an alignment that is latched whenever the
     slave is engaged anew. While clutched the command is held; while the slave does not follow it
-    is the slave's own setpoint.
+    is the slave's own setpoint. What the arm cannot reach is cut off, and motion goes on from
+    there: see :mod:`teleop_core.mapping.limits`.
 
     Source:
         Vongbunyong 2008, sections 6.2-6.3.
     """
     pose, buttons = row.master_measured_cp, row.master_buttons
+    is_following = _follows(p, s, row)
+    draw_back(s, sent, p.gain[s.is_fine], row)
     _toggle_mode(s, buttons)
     gain = p.gain[s.is_fine]
-    is_following = row.master_measured_cp_ns - row.slave_setpoint_cp_ns <= p.timeout_ns
-    tool = np.empty(4)
+    tool, turn = np.empty(4), np.empty(3)
     mapped_orientation(p, pose[3:7], tool)
+    turn_between(s.tool, tool, turn)
+    for i in range(4):
+        s.tool[i] = tool[i]
+    to_slave_axes(p, pose, s.hand)
     if not (is_following and s.is_engaged):
         s.must_latch = 1
         for i in range(7):
             s.command[i] = row.slave_setpoint_cp[i]
     if s.must_latch or buttons[0] > 0.0 or s.buttons[0] > 0.0:
-        _latch(s, pose, tool)
+        _latch(s, pose)
     else:
-        _move(p, s, gain, pose, tool)
+        _move(p, s, gain, pose, turn)
+        measure_depth(s, p.reach_depth, row.master_measured_cp_ns)
     _toggle_fixture(s, buttons, pose)
     s.is_engaged, s.must_latch = 1, 0
     for i in range(3):
         s.master[i], s.buttons[i] = pose[i], buttons[i]
+    s.last_ns = row.master_measured_cp_ns
+    remember(s, sent, s.last_ns)
     length = 0.0
     if s.is_fixture_on:
         for i in range(3):
             fixture.offset[i] = pose[i] - s.center[i]
         length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
     wall_force(fixture.out, length, p.stiffness, p.max_force, row.master_servo_cf)
+    _push_back(p, s, row.master_servo_cf)
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
     _report(p, s, gain, is_following, row)
@@ -270,6 +331,7 @@ class MotionScaling(RunningStage):
     def __init__(self, parameters: MotionScalingParameters, dt: float = DT) -> None:
         super().__init__(MOTION_SCALING, 0, dt)
         self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
+        self._sent = records(SENT_FIELDS, SENT)
         self._values = parameters
         self.kernel = motion_scaling_step
         self._shape = Shape(None, np.empty(0), np.zeros(3), np.zeros(3))
@@ -278,12 +340,11 @@ class MotionScaling(RunningStage):
 
     def reset(self) -> None:
         """Forget the latched poses: the next sample starts from the slave's setpoint."""
-        self.state["is_engaged"] = 0
-        self.state["is_fixture_on"] = 0
-        self.state["is_fine"] = MODES.index(self._values.mode)
-        self.state["buttons"] = 0.0
-        self.state["command"] = self.state["alignment"] = 0.0
-        self.state["command"][3] = self.state["alignment"][0] = 1.0
+        s = self.state
+        assign(s, 0)
+        assign(self._sent, 0)
+        s["is_fine"], s["joint"] = MODES.index(self._values.mode), -1
+        s["command"][3] = s["alignment"][0] = s["tool"][0] = s["turned"][0] = 1.0
 
     def retune(self, parameters: MotionScalingParameters) -> None:
         """Take new parameters from the next sample on; nothing moves. A new mode is switched to."""
@@ -300,12 +361,21 @@ class MotionScaling(RunningStage):
         p["stiffness"] = math.inf if fixture.wall == "hard" else fixture.stiffness
         p["max_force"] = fixture.max_force
         p["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
+        p["pause_ns"] = round(parameters.longest_pause * 1e9)
+        p["rotation_gain"] = parameters.rotation_gain
+        self._take_reach_force(parameters.reach_force)
         if parameters.mode != self._values.mode:
             self.state["is_fine"] = MODES.index(parameters.mode)
         turned = ("tool_roll", "axes", "tool_axes")
         if any(getattr(parameters, name) != getattr(self._values, name) for name in turned):
             self.state["must_latch"] = 1  # align anew: the tool does not turn
         self._values = parameters
+
+    def _take_reach_force(self, force: ReachForceParameters) -> None:
+        stiffness = force.stiffness if force.is_on else 0.0
+        depth = force.max_force / stiffness if stiffness * force.max_force > 0.0 else _SHALLOW
+        self.parameters["reach_stiffness"] = stiffness if force.max_force > 0.0 else 0.0
+        self.parameters["reach_depth"] = depth
 
     def _take_fixture(self, fixture: FixtureParameters) -> None:
         kind, numbers = FIXTURES.find(fixture.kind.kind), shape_of(fixture.kind.parameters)
@@ -315,7 +385,7 @@ class MotionScaling(RunningStage):
             self._shape.numbers[:] = numbers  # the tick that is composed already goes on
             return
         self._shape = self._shape._replace(depth=depth, numbers=numbers)
-        self.arguments = (self.parameters, self.state, self._shape)
+        self.arguments = (self.parameters, self.state, self._sent, self._shape)
         self._bound = None
 
     def described(self) -> dict[str, str]:
@@ -328,9 +398,9 @@ class MotionScaling(RunningStage):
 MOTION_SCALING = Stage(
     "motion_scaling",
     MotionScalingParameters,
-    reads=(MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SETPOINT_CP),
+    reads=(MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SETPOINT_CP, SLAVE_REACH),
     writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE),
-    late=(SLAVE_SETPOINT_CP,),
+    late=(SLAVE_SETPOINT_CP, SLAVE_REACH),
     trigger=MASTER_MEASURED_CP,
     needs=(SLAVE_SETPOINT_CP,),
     make=MotionScaling,

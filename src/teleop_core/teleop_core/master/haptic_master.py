@@ -16,7 +16,7 @@ from teleop_core.geometry import (
     rotation,
     transform,
 )
-from teleop_core.kernels import kernel, records
+from teleop_core.kernels import inner, kernel, records
 from teleop_core.master.device import (
     DeviceParameters,
     make_handle,
@@ -29,7 +29,7 @@ from teleop_core.operators import OPERATORS, Setting
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.shapes import PHASES
 from teleop_core.parameters import parameter
-from teleop_core.signals import DT, assign
+from teleop_core.signals import DT, STATE, assign
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
     MASTER_BUTTONS,
@@ -37,6 +37,7 @@ from teleop_core.topics import (
     MASTER_MEASURED_CP,
     MASTER_MEASURED_CV,
     MASTER_SERVO_CF,
+    TELEOP_STATE,
 )
 
 # The stylus rests in the inkwell at this tilt about x (Vongbunyong 2008, table 6.1; its sign is
@@ -79,6 +80,10 @@ class HapticMasterParameters:
     force_timeout: float = parameter(
         0.1, unit="s", lower=0.002, upper=5.0, doc="without a newer servo_cf the force is zero"
     )
+    patience: float = parameter(
+        10.0, unit="s", lower=0.0, upper=3600.0, fixed=True,
+        doc="the operator begins when teleop/state says that the slave follows, or after this",
+    )  # fmt: skip
     device: DeviceParameters = field(default_factory=DeviceParameters)
     hand: HandParameters = field(default_factory=HandParameters)
     operator: OperatorParameters = field(default_factory=OperatorParameters)
@@ -88,35 +93,58 @@ class HapticMasterParameters:
 _PARAMETERS = [
     *((name, "f8") for name in ("resolution", "gimbal", "peak_force", "mass", "friction",
       "stiffness", "damping", "tremor", "frequency")),
-    ("center", "f8", (3,)), ("half", "f8", (3,)),
+    ("center", "f8", (3,)), ("half", "f8", (3,)), ("patience_ns", "i8"),
 ]  # fmt: skip
 _STATE = [
     *((name, "f8", (3,)) for name in ("position", "speed", "wanted", "phase", "wander", "reading",
       "rate", "turning")),
-    ("attitude", "f8", (4,)), ("next", "i8"),
+    ("attitude", "f8", (4,)), ("next", "i8"), ("next_noise", "i8"), ("has_begun", "i8"),
+    ("first_ns", "i8"),
 ]  # fmt: skip
-_DRAWN = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("noise", "f8", (6,)),
-          ("buttons", "f8", (3,))]  # fmt: skip
+_WANTED = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("buttons", "f8", (3,))]
+_IS_FOLLOWING = STATE["is_following"]
+
+
+@inner
+def _begins(p: Any, s: Any, row: Any) -> bool:
+    """Whether the operator moves the hand: since the slave first followed, or lost patience.
+
+    A state that is older than the first sample is about another master.
+    """
+    if s.first_ns == 0:
+        s.first_ns = row.now_ns
+    is_about_us = row.teleop_state_ns >= s.first_ns
+    if is_about_us and row.teleop_state[_IS_FOLLOWING] > 0.0:
+        s.has_begun = 1
+    if row.now_ns - s.first_ns >= p.patience_ns:
+        s.has_begun = 1
+    return s.has_begun > 0
 
 
 @kernel
-def haptic_master_step(p: Any, s: Any, handle: Any, drawn: Any, row: Any, dt: float) -> None:
+def haptic_master_step(
+    p: Any, s: Any, handle: Any, wanted: Any, noises: Any, row: Any, dt: float
+) -> None:
     """One tick: feel master_servo_cf, move, and write master_measured_cp, _cv, _cf and _buttons.
+
+    Until the slave follows the hand rests, as an operator's would: none of its motion is lost.
 
     Args:
         p: Parameter record.
         s: State record; written.
         handle: None for the Phantom, else as :func:`teleop_core.master.device.make_handle` gives.
-        drawn: What the operator wants and the noise in the coming ticks, record by record:
+        wanted: What the operator wants, now and in the coming ticks, record by record:
             ``wanted`` (3,) [m] in the master's base, ``attitude`` of the stylus, quaternion (4,),
-            ``noise``, standard normal numbers (6,) for tremor x, y, z and gimbal x, y, z, and
-            ``buttons`` (3,): clutch, fixture, mode.
+            and ``buttons`` (3,): clutch, fixture, mode.
+        noises: Standard normal numbers of the coming ticks (N, 6) for tremor x, y, z and gimbal
+            x, y, z.
         row: Signals.
         dt: Tick [s].
     """
-    now = drawn[s.next]
-    s.next += 1
-    force, noise = np.empty(3), now.noise
+    if _begins(p, s, row):
+        s.next += 1
+    now, noise, force = wanted[s.next], noises[s.next_noise], np.empty(3)
+    s.next_noise += 1
     command = row.master_servo_cf
     size = math.sqrt(command[0] ** 2 + command[1] ** 2 + command[2] ** 2)
     share = 1.0 if size <= p.peak_force else p.peak_force / size
@@ -153,7 +181,8 @@ class HapticMaster(RunningStage):
     def __init__(self, parameters: HapticMasterParameters, dt: float = DT) -> None:
         super().__init__(HAPTIC_MASTER, 0, dt)
         self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
-        self._drawn = records(_DRAWN, BLOCK)
+        # The first record of what is wanted is that of the present tick.
+        self._wanted, self._noises = records(_WANTED, BLOCK + 1), np.zeros((BLOCK, 6))
         self._fixed = parameters
         self.kernel = haptic_master_step
         self.retune(parameters)
@@ -168,16 +197,18 @@ class HapticMaster(RunningStage):
         self.ahead = min(self._operator.ahead, BLOCK)
         setting = Setting(wanted, phases, self._fixed.seed)
         self._motion = self._asked(self._operator.make, wanted.kind.parameters, setting)
-        self._tick, self._end = 0, 0
+        self._tick, self._end, self._end_of_noise = 0, 1, 0
         self._rest = np.empty(4)
         quaternion_from_rotation(rotation("x", REST_TILT), self._rest)
         rest = transform(rotation("x", REST_TILT), np.array(REST_POSITION))
         self.handle = make_handle(self._fixed.device, rest)
-        self.arguments = (self.parameters, self.state, self.handle, self._drawn)
+        self.arguments = (self.parameters, self.state, self.handle, self._wanted, self._noises)
         self._bound = None
         assign(self.state, 0)
         for name in ("position", "wanted"):
             self.state[name] = REST_POSITION
+        now = self._wanted[0]
+        now["wanted"], now["attitude"], now["buttons"] = REST_POSITION, self._rest, 0.0
         place, pose = self.state["position"], self.signals["master_measured_cp"]
         if self.handle is None:
             read_phantom(self.parameters, place, self._rest, np.zeros(3), pose)
@@ -193,22 +224,39 @@ class HapticMaster(RunningStage):
         p["mass"] = device.apparent_mass + hand.mass
         p["stiffness"], p["damping"] = hand.stiffness, hand.damping
         p["tremor"], p["frequency"] = hand.tremor_amplitude, hand.tremor_frequency
+        p["patience_ns"] = round(parameters.patience * 1e9)
         p["center"] = np.subtract(REST_POSITION, device.start)
         p["half"] = 0.5 * np.array(device.workspace)
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether the operator moves the hand yet."""
+        return bool(self.state["has_begun"])
+
     def prepare(self, ticks: int) -> None:
         """Draw what the operator wants in the next ticks, as far ahead as he can be asked."""
-        first = int(self.state["next"])
-        left = self._end - first
+        self._prepare_noise(ticks)
+        now = int(self.state["next"])
+        left = self._end - now  # with the record of the present tick
+        if left > ticks:
+            return
+        self._wanted[:left] = self._wanted[now : self._end]
+        self._end = max(ticks, min(left - 1 + self._operator.ahead, BLOCK)) + 1
+        self.state["next"] = 0
+        self._draw(self._wanted[left : self._end])
+
+    def _prepare_noise(self, ticks: int) -> None:
+        first = int(self.state["next_noise"])
+        left = self._end_of_noise - first
         if left >= ticks:
             return
-        self._drawn[:left] = self._drawn[first : self._end]
-        self._end = max(ticks, min(left + self._operator.ahead, BLOCK))
-        self.state["next"] = 0
-        self._draw(self._drawn[left : self._end])
+        self._noises[:left] = self._noises[first : self._end_of_noise]
+        self._end_of_noise = BLOCK
+        self.state["next_noise"] = 0
+        self._noises[left:] = self._rng.standard_normal((BLOCK - left, 6))
 
     def _draw(self, drawn: Any) -> None:
-        """Fill records with what the operator wants and the noise of the ticks that follow."""
+        """Fill records with what the operator wants in the ticks that follow."""
         count = len(drawn)
         times = np.arange(self._tick + 1, self._tick + count + 1, dtype=np.float64) * self.dt
         self._tick += count
@@ -217,7 +265,6 @@ class HapticMaster(RunningStage):
         attitudes = np.empty((count, 4))
         _turn_all(self._rest, np.ascontiguousarray(moves[:, 3:6]), attitudes)
         drawn["attitude"] = attitudes
-        drawn["noise"] = self._rng.standard_normal((count, 6))
         drawn["buttons"] = np.maximum(self._pressed(times), moves[:, 6:])
 
     def _moves(self, times: Array) -> Array:
@@ -275,9 +322,9 @@ def _turn_all(rest: Array, turns: Array, attitudes: Array) -> None:
 HAPTIC_MASTER = Stage(
     "haptic_master",
     HapticMasterParameters,
-    reads=(MASTER_SERVO_CF,),
+    reads=(MASTER_SERVO_CF, TELEOP_STATE),
     writes=(MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS),
-    late=(MASTER_SERVO_CF,),
+    late=(MASTER_SERVO_CF, TELEOP_STATE),
     make=HapticMaster,
     node="teleop_core.nodes.haptic_master:HapticMasterNode",
 )

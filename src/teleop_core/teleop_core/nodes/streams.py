@@ -21,9 +21,19 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
-from teleop_core.bags.messages import Layout, Refusal, Values, check, layout, read_values
+from teleop_core.bags.messages import (
+    Layout,
+    Refusal,
+    Values,
+    check,
+    layout,
+    read_numbers,
+    read_reports,
+    read_values,
+    report,
+)
 from teleop_core.geometry import Array
-from teleop_core.topics import Quality, Topic
+from teleop_core.topics import Kind, Quality, Topic
 
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""
@@ -147,8 +157,11 @@ class Input:
         self.topic, self._node, self._name = topic, node, name
         self.subscription: Subscription | None = Subscription(node, topic, name, _WAITING)
         self._is_new = False
-        self._joint_names, self._target = joint_names, target
-        self._layout = layout(topic, joint_names)
+        self._joint_names, self._target = topic.names(joint_names), target
+        is_report = topic.kind is Kind.REPORT
+        self._layout = None if is_report else layout(topic, joint_names)
+        if is_report:
+            read_reports(report(0, "", 0, "", {}))  # loads the message types, 60 ms
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, Values]] = deque()
         self.received, self.refused = 0, Counter[Refusal]()
@@ -183,7 +196,8 @@ class Input:
         """Next message of the subscription that can be read."""
         while self.subscription is not None and (taken := self.subscription.take()) is not None:
             self.received += 1
-            found = self._layout.decode_one(taken[0]) or self._read(taken[0])
+            known = self._layout.decode_one(taken[0]) if self._layout is not None else None
+            found = known or self._read(taken[0])
             if not isinstance(found, Refusal):
                 return found
             self.refused[found] += 1
@@ -202,7 +216,7 @@ class Input:
 
     def _accept(self, stamp_ns: int, values: Values) -> bool:
         now_ns, last_ns = time.monotonic_ns(), self.stamp_ns
-        may_repeat = self.topic.stamp.is_in_force
+        may_repeat = self.topic.stamp.is_in_force or self._layout is None
         if now_ns - self.arrival_ns > SILENCE_NS or (may_repeat and stamp_ns == 0):
             last_ns = None
         elif may_repeat and last_ns is not None:
@@ -216,7 +230,9 @@ class Input:
         return True
 
     def _read(self, data: bytes) -> tuple[int, Values] | Refusal:
-        """Stamp and values of a message with other bytes than ours."""
+        """Stamp and values of a message with other bytes than ours, or of a report."""
+        if self._layout is None:
+            return read_numbers(data, self.topic.columns)
         message = deserialize_message(data, message_type(self.topic.kind.ros_type))
         return read_values(self.topic.kind, message, self._joint_names)
 

@@ -1,18 +1,26 @@
 """Inverse kinematics as a stage: every slave pose becomes joint references, within joint speeds."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.geometry import Array, transform_from_pose
-from teleop_core.kernels import kernel
+from teleop_core.geometry import Array, rotation_vector_between, transform_from_pose
+from teleop_core.kernels import inner, kernel, records
 from teleop_core.parameters import parameter
 from teleop_core.robots import load_robot_set
+from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.signals import DT, copy
 from teleop_core.stage import RunningStage, Stage
-from teleop_core.topics import SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS
+from teleop_core.topics import (
+    SLAVE_REACH,
+    SLAVE_SERVO_CP,
+    SLAVE_SERVO_JP,
+    SLAVE_SETPOINT_JS,
+    Limit,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,77 +30,155 @@ class InverseKinematicsParameters(RobotParameters):
     speed_share: float = parameter(
         1.0, lower=0.01, upper=1.0, doc="share of the drives' speed limits that references may use"
     )
+    longest_pause: float = parameter(
+        0.3, unit="s", lower=0.002, upper=5.0,
+        doc="time between commands that joints may use, at most; a longer pause counts as this",
+    )  # fmt: skip
     feedback_timeout: float = parameter(
         0.1, unit="s", lower=0.002, upper=5.0,
-        doc="with an older slave setpoint, solutions start from the slave's joints again",
+        doc="with an older slave setpoint, solutions start from the slave's joints again; of slow "
+        "commands twice their period counts",
     )  # fmt: skip
 
 
 class Solver(NamedTuple):
     """Solver of one robot with room to work in: plain arrays, which robot kernels take."""
 
+    fk: Any
     ik: Any
-    limits: Array
+    limits: Array  # rows lower, upper, largest step
     geometry: Array
-    timeout: Array  # of the feedback (1,) [s]
     T: Array
+    reached: Array
     seed: Array  # the last answer (n,)
     q: Array
+    free: Array  # the answer if there were time enough
     residual: Array
 
 
+_STATUS, _LIMIT, _JOINT, _RESIDUAL, _CUT = 0, 1, 2, 3, 5
+_NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
+_SINGULAR, _SLOW = int(Limit.SINGULARITY), int(Limit.SPEED)
+_FOLLOWED, _NEAR_SINGULAR = int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR)
+# A step [rad or m] that no speed limit is: a path still, but one that has all the time it needs.
+_ANY_STEP = 1e6
+# A joint this close to its limit [rad or m] is at it.
+_AT = 1e-9
+
+
+@inner
+def _is_reached(status: int) -> bool:
+    return status in (_FOLLOWED, _NEAR_SINGULAR)
+
+
+@inner
+def _joint_at_limit(q: Array, limits: Array) -> int:
+    """First joint at an end of its range; -1 if none is."""
+    for i in range(q.shape[0]):
+        if q[i] <= limits[0, i] + _AT or q[i] >= limits[1, i] - _AT:
+            return i
+    return -1
+
+
+@inner
+def _explain(solver: Any, reach: Array) -> None:
+    """Write why the arm falls short, and by what the command lies beyond its reach.
+
+    The pose is solved again as if there were time enough. If that reaches it, the arm only lags.
+    """
+    T, q, free, limits = solver.T, solver.q, solver.free, solver.limits
+    copy(q, free)
+    status = _BEYOND
+    if math.isfinite(limits[2, 0]):
+        for i in range(q.shape[0]):
+            limits[2, i] = _ANY_STEP
+        status = solver.ik(T, solver.seed, limits, solver.geometry, free, solver.residual)
+    if _is_reached(status):
+        solver.fk(q, solver.geometry, solver.reached)
+        status = solver.ik(solver.reached, q, limits, solver.geometry, free, solver.residual)
+        reach[_LIMIT] = _SINGULAR if status == _NEAR_SINGULAR else _SLOW
+        return
+    reach[_JOINT] = _joint_at_limit(free, limits)
+    reach[_LIMIT] = _AT_JOINT if reach[_JOINT] >= 0.0 else _BEYOND
+    solver.fk(free, solver.geometry, solver.reached)
+    for i in range(3):
+        reach[_CUT + i] = solver.reached[i, 3] - T[i, 3]
+    rotation_vector_between(T, solver.reached, reach[_CUT + 3 : _CUT + 6])
+
+
 @kernel
-def inverse_kinematics_step(solver: Any, row: Any, dt: float) -> None:
-    """One slave pose: write slave_servo_jp, ik_status and ik_residual.
+def inverse_kinematics_step(p: Any, s: Any, solver: Any, row: Any, dt: float) -> None:
+    """One slave pose: write slave_servo_jp and slave_reach.
 
     The answer is the neighbour of the last one; while the slave does not follow, of the slave's
-    own setpoint, so that a restart never asks for another branch.
+    own setpoint, so that a restart never asks for another branch. Joints move as far as their
+    speed allows in the time since the last command, whatever the rate of commands.
     """
-    T, seed, q, residual = solver.T, solver.seed, solver.q, solver.residual
-    if row.slave_servo_cp_ns - row.slave_setpoint_js_ns > solver.timeout[0] * 1e9:
+    T, seed, q, limits = solver.T, solver.seed, solver.q, solver.limits
+    elapsed_ns = row.slave_servo_cp_ns - s.last_ns
+    if s.last_ns == 0 or elapsed_ns <= 0:
+        elapsed_ns = round(dt * 1e9)
+    elapsed_ns = min(elapsed_ns, p.longest_ns)
+    is_followed = s.last_ns - row.slave_setpoint_js_ns <= max(p.timeout_ns, 2 * elapsed_ns)
+    if row.slave_setpoint_js_ns == 0 or not is_followed:
         copy(row.slave_setpoint_js, seed)
+    s.last_ns = row.slave_servo_cp_ns
+    for i in range(q.shape[0]):
+        limits[2, i] = p.speed[i] * (elapsed_ns * 1e-9)
     transform_from_pose(row.slave_servo_cp, T)
-    status = solver.ik(T, seed, solver.limits, solver.geometry, q, residual)
+    reach = row.slave_reach
+    for i in range(reach.shape[0]):
+        reach[i] = 0.0
+    status = solver.ik(T, seed, limits, solver.geometry, q, solver.residual)
+    reach[_STATUS], reach[_LIMIT], reach[_JOINT] = status, _NONE, -1.0
     if status >= 0:
+        copy(solver.residual, reach[_RESIDUAL : _RESIDUAL + 2])
+        if not _is_reached(status):
+            _explain(solver, reach)
         copy(q, seed)
     copy(seed, row.slave_servo_jp)
-    copy(residual, row.ik_residual)
-    row.ik_status = status
 
 
 class InverseKinematics(RunningStage):
-    """Stage that turns slave poses into joint references; ``ik_status`` tells how it went."""
+    """Stage that turns slave poses into joint references; ``slave_reach`` tells how it went."""
 
     def __init__(self, parameters: InverseKinematicsParameters, dt: float = DT) -> None:
         self.robot = load_robot_set(parameters.robot, parameters.geometry)
         n = self.robot.n
         super().__init__(INVERSE_KINEMATICS, n, dt)
+        numbers = [("speed", "f8", (n,)), ("longest_ns", "i8"), ("timeout_ns", "i8")]
+        self.parameters, self.state = records(numbers)[0], records([("last_ns", "i8")])[0]
         self._solver = Solver(
-            self.robot.ik_pointer, self.robot.limits(dt).copy(), self.robot.geometry_row.copy(),
-            np.zeros(1), np.zeros((4, 4)), np.zeros(n), np.zeros(n), np.zeros(2),
+            self.robot.fk_pointer, self.robot.ik_pointer, self.robot.limits(dt).copy(),
+            self.robot.geometry_row.copy(), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(n),
+            np.zeros(n), np.zeros(n), np.zeros(2),
         )  # fmt: skip
-        self.kernel, self.arguments = inverse_kinematics_step, (self._solver,)
+        self.kernel = inverse_kinematics_step
+        self.arguments = (self.parameters, self.state, self._solver)
         self.retune(parameters)
         self.reset()
 
     def reset(self) -> None:
         """Start from home."""
         self._solver.seed[:] = self.robot.home
+        self.state["last_ns"] = 0
 
     def retune(self, parameters: InverseKinematicsParameters) -> None:
         """Take new parameters from the next pose on."""
-        self._solver.limits[2] = self.robot.limits(self.dt)[2] * parameters.speed_share
-        self._solver.timeout[0] = parameters.feedback_timeout
+        drives = self.robot.drives
+        limit = np.full(self.robot.n, np.inf) if drives is None else drives.speed_limit
+        self.parameters["speed"] = limit * parameters.speed_share
+        self.parameters["longest_ns"] = round(parameters.longest_pause * 1e9)
+        self.parameters["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
 
 
 INVERSE_KINEMATICS = Stage(
     "inverse_kinematics",
     InverseKinematicsParameters,
     reads=(SLAVE_SERVO_CP, SLAVE_SETPOINT_JS),
-    writes=(SLAVE_SERVO_JP,),
+    writes=(SLAVE_SERVO_JP, SLAVE_REACH),
     late=(SLAVE_SETPOINT_JS,),
     trigger=SLAVE_SERVO_CP,
     needs=(SLAVE_SETPOINT_JS,),
-    notes=(("ik_status", "i8"), ("ik_residual", "f8", (2,))),
     make=InverseKinematics,
 )

@@ -266,7 +266,7 @@ def _ring(ticks: int, link: Link, runners: Mapping[str, Runner]) -> Any:
 
 
 def _say_step(text: _Text, number: int, member: Member, count: int, *, is_compiled: bool) -> None:
-    """Call the kernel where there is something to answer; stamp and record what it wrote."""
+    """Call the kernel where there is something new to answer; stamp and record what it wrote."""
     stage, row = member.stage, f"r{number}"
     lines = []
     if is_compiled:
@@ -279,7 +279,8 @@ def _say_step(text: _Text, number: int, member: Member, count: int, *, is_compil
         lines.append(f"{row}.{topic.field}_ns = " + (f"{row}.{of}_ns" if of else "now_ns"))
     if stage.trigger is not None:
         trigger = f"{row}.{stage.trigger.field}_ns"
-        text.say(f"if {trigger} != 0:", *(f"    {line}" for line in lines))
+        lines.insert(0, f"{row}.answered_ns = {trigger}")
+        text.say(f"if {trigger} != {row}.answered_ns:", *(f"    {line}" for line in lines))
     else:
         text.say(*lines)
     prefix = f"{member.arm}_" if member.arm else ""
@@ -296,12 +297,12 @@ def _say_step(text: _Text, number: int, member: Member, count: int, *, is_compil
 
 
 def _caller(member: Member, runner: Runner, dt: float) -> Callable[[], None]:
-    """Call of a plain stage, which answers only when there is something to answer."""
+    """Call of a plain stage, which answers only what is new."""
     trigger = member.stage.trigger
     arguments, row, step = runner.arguments, runner.signals, runner.kernel
 
     def call() -> None:
-        if trigger is None or row[f"{trigger.field}_ns"] != 0:
+        if trigger is None or row[f"{trigger.field}_ns"] != row["answered_ns"]:
             step(*arguments, row, dt)
 
     return call

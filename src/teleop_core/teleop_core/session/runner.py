@@ -41,14 +41,14 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = _sile
     Raises:
         RecordingError: The directory exists, cannot be written, or the disk is full.
     """
-    ticks = session_ticks(configuration)
     session = VirtualTime(configuration)
+    ticks = session_ticks(configuration, session)
     return record_blocks(session, configuration, out, run_blocks(session, ticks), ticks, progress)
 
 
-def session_ticks(configuration: Configuration) -> int:
-    """Number of ticks in the configured duration, at least one."""
-    return max(1, round(configuration.groups[SESSION].duration * 1e9 / TICK_NS))
+def session_ticks(configuration: Configuration, session: VirtualTime) -> int:
+    """Ticks until the hand has moved for the configured duration; it waits for the arms first."""
+    return session.lead + max(1, round(configuration.groups[SESSION].duration * 1e9 / TICK_NS))
 
 
 def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
@@ -60,12 +60,13 @@ def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
 def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress = _silent) -> int:
     """Run the recorded masters through the graph again, in virtual time, and record it.
 
-    Ticks are 1 ms apart, from the first to the last recorded sample; a tick for which none was
-    recorded holds the one before it. For a recording of virtual time every tick has its own
-    sample, so the same configuration gives the same slave motion, bit for bit.
+    Ticks are 1 ms apart, from the first to the last recorded sample; each sample is answered once,
+    at the first tick that is not before it. For a recording of virtual time every tick has its own
+    sample, so the same configuration gives the same slave motion, bit for bit. Recordings that are
+    not ours begin with the time that the arms need to get ready.
 
     Args:
-        bag: Recording with master/measured_cp and master/buttons of every arm.
+        bag: Recording with master/measured_cp of every arm.
         configuration: What the samples run through.
         out: Directory of the new recording, made here.
         progress: As in :func:`simulate`.
@@ -84,29 +85,34 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
 def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]:
     """Rows of a replay, a block at a time, and the number of ticks; raises as :func:`replay`."""
     played = session.played_topics
-    needed = [t for t in played if t.kind in {Kind.POSE, Kind.BUTTONS}]
+    needed = [t for t in played if t.kind is Kind.POSE]
     bag.require(needed)
     recorded = [topic for topic in played if topic.name in bag.topics]
     series = bag.read_many(recorded)
     poses = series[needed[0].name]
-    stamps = stamps_of(int(poses.stamp_ns[0]), int(poses.stamp_ns[-1]))
+    first_ns, last_ns = int(poses.stamp_ns[0]), int(poses.stamp_ns[-1])
+    lead_ns = 0 if "configuration" in bag.metadata else session.lead * TICK_NS
+    later_ns = max(0, TICK_NS + lead_ns - first_ns)  # stamps are positive
+    stamps = stamps_of(first_ns + later_ns - lead_ns, last_ns + later_ns)
 
     def blocks() -> Iterator[Any]:
         for done in range(0, len(stamps), BLOCK):
             samples = session.rows(len(stamps[done : done + BLOCK]))
             samples["now_ns"] = stamps[done : done + BLOCK]
             for topic in recorded:
-                samples[f"{topic.field}_ns"] = samples["now_ns"]
-                _hold(series[topic.name], samples["now_ns"], samples[topic.field])
+                _hold(series[topic.name], later_ns, samples, topic.field)
             yield session.replay(samples)
 
     return blocks(), len(stamps)
 
 
-def _hold(series: Series, stamps_ns: NDArray[np.int64], values: Array) -> None:
-    """Write into ``values`` (N, width) the newest sample at each stamp; before the first: as is."""
-    at = np.searchsorted(series.stamp_ns, stamps_ns, side="right") - 1
-    values[at >= 0] = series.values[at[at >= 0]]
+def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
+    """Write the newest sample at each tick, and its stamp; before the first: as they are."""
+    stamps = series.stamp_ns + later_ns
+    at = np.searchsorted(stamps, samples["now_ns"], side="right") - 1
+    is_known = at >= 0
+    samples[field][is_known] = series.values[at[is_known]]
+    samples[f"{field}_ns"][is_known] = stamps[at[is_known]]
 
 
 def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
@@ -146,9 +152,10 @@ def record_blocks(
     """
     done = 0
     with open_writer(session, configuration, out) as writer:
-        reports = StateReports(session)
+        reports, is_new = StateReports(session), NewSamples()
         for block in blocks:
-            write_signals(writer, session.graph.streams, block)
+            log_ns = block["now_ns"]
+            writer.write_block({t: is_new.of(t, block, log_ns) for t in session.graph.streams})
             reports.write(writer, block)
             done += len(block)
             progress(done, ticks)
@@ -182,12 +189,28 @@ def describe(configuration: Configuration) -> dict[str, str]:
     return about | {"configuration": configuration.text()}
 
 
-def write_signals(writer: BagWriter, streams: Iterable[Topic], block: Any) -> None:
-    """Record some streams of a block of rows, each under its own stamp."""
-    log_ns = block["now_ns"]
-    writer.write_block(
-        {topic: (block[f"{topic.field}_ns"], block[topic.field], log_ns) for topic in streams}
-    )
+class NewSamples:
+    """Finder of the rows of a session that hold a message which those before did not hold.
+
+    A stage that answers a slow master writes one message per sample, not one per tick. What tells
+    the stamp in force is a message every tick.
+    """
+
+    def __init__(self) -> None:
+        self._last: dict[str, int] = {}
+
+    def of(
+        self, topic: Topic, block: Any, log_ns: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
+        """Stamps (N,), values (N, width) and log times (N,) of the messages in the next rows."""
+        stamps, values = block[f"{topic.field}_ns"], block[topic.field]
+        if topic.stamp.is_in_force:
+            return stamps, values, log_ns
+        is_new = np.diff(stamps, prepend=self._last.get(topic.name, 0)) != 0
+        self._last[topic.name] = int(stamps[-1])
+        if is_new.all():
+            return stamps, values, log_ns
+        return stamps[is_new], values[is_new], log_ns[is_new]
 
 
 def state_report(stamp_ns: int, state: Array, described: Mapping[str, str] | None = None) -> bytes:

@@ -69,6 +69,11 @@ class VirtualTime:
         return next((found for name in names if (found := joints_of(groups[name]))), ())
 
     @property
+    def lead(self) -> int:
+        """Ticks until all arms can follow, such as for the move to where they start."""
+        return max(int(getattr(stage, "lead", 0)) for stage in self.stages.values())
+
+    @property
     def source(self) -> str:
         """Generated source of the tick."""
         return self._tick.source

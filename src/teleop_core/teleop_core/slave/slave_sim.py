@@ -17,7 +17,9 @@ from teleop_core.robots import load_robot_set
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.signals import DT, copy
+from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way, begin_way
 from teleop_core.slave.joints import integrate
+from teleop_core.slave.trajectory import shortest_move_time
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
     SLAVE_MEASURED_CP,
@@ -34,6 +36,10 @@ class CommandStatus(IntEnum):
     FRESH = 0  # followed
     STALE = 1  # none came for longer than the command timeout: the last one is held
     REFUSED = 2  # too far from the one in force to be the same motion: the last one is held
+    MOVING = 3  # on the way to where the slave starts: nothing is followed yet
+
+
+INTERPOLATIONS = ("off", "linear", "minimum_jerk")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +72,17 @@ class SlaveSimParameters(RobotParameters):
         0.1, unit="s", lower=0.002, upper=5.0,
         doc="the last reference is held when no command came for longer than this",
     )  # fmt: skip
+    start: tuple[float, ...] = parameter(
+        (), unit="rad or m", fixed=True,
+        doc="joints to which the slave moves from home before it follows; empty: the robot's start",
+    )  # fmt: skip
+    start_speed: float = parameter(
+        0.5, lower=0.01, upper=1.0, fixed=True, doc="share of the speed limits used on that move"
+    )
+    interpolation: str = parameter(
+        "linear", choices=INTERPOLATIONS,
+        doc="way between commands that come slower than the ticks, which takes one period of them",
+    )  # fmt: skip
     gravity_compensation: str = parameter(
         "published", choices=("published", "all", "none"),
         doc="axes whose gravity is fed forward: those of the source (axis 2), all, none",
@@ -89,11 +106,21 @@ def _records(n: int) -> tuple[Any, Any]:
               "friction_speed", "compensated")  # fmt: skip
     parameters = [(name, "f8", (n,)) for name in joints]
     scalars = [(name, "f8") for name in ("filter_gain", "filter_zero", "filter_pole")]
-    counts = [(name, "i8") for name in ("is_filtered", "steps", "timeout_ns")]
-    state = [
-        (name, "f8", (n,)) for name in ("command", "filtered", "setpoint", "measured", "speed")
+    counts = [
+        (name, "i8")
+        for name in ("is_filtered", "steps", "timeout_ns", "interpolation", "start_ticks")
     ]
-    stamps = [(name, "i8") for name in ("command_stamp_ns", "arrival_ns", "seen_ns", "refused")]
+    parameters += [("home", "f8", (n,)), ("start", "f8", (n,))]
+    state = [
+        (name, "f8", (n,))
+        for name in ("command", "filtered", "setpoint", "measured", "speed", "target", *WAY_FIELDS)
+    ]
+    stamps = [
+        (name, "i8")
+        for name in (
+            "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "moved_ticks", "ticks", "span"
+        )
+    ]  # fmt: skip
     return records([*parameters, *scalars, *counts])[0], records([*state, *stamps])[0]
 
 
@@ -121,29 +148,49 @@ class Arm(NamedTuple):
 
 # Stamps this far ahead of the slave's clock are an error, not a clock that is a little ahead.
 _FUTURE_NS = 1_000_000_000
+# Commands that are further apart than this are no stream [ns].
+_SLOWEST_NS = 500_000_000
 
 
 @inner
-def _take_command(p: Any, s: Any, row: Any) -> int:
+def _move_to_start(p: Any, s: Any) -> None:
+    """Make a tick of the cubic move from home to where the slave starts."""
+    s.moved_ticks += 1
+    share = s.moved_ticks / p.start_ticks
+    share = share * share * (3.0 - 2.0 * share)
+    for i in range(p.home.shape[0]):
+        place = p.start[i] if s.moved_ticks == p.start_ticks else (
+            p.home[i] + share * (p.start[i] - p.home[i])
+        )  # fmt: skip
+        s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i] = place
+
+
+@inner
+def _take_command(p: Any, s: Any, row: Any, dt: float) -> int:
     """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
 
-    A jump is farther from the command in force than full speed reaches in the command timeout;
-    no stream within its timeout can be that far.
+    A jump is farther from the last command than full speed reaches in the command timeout, or in
+    the time since that command: no stream can be that far.
     """
     stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
+    if s.moved_ticks < p.start_ticks:
+        s.seen_ns = max(s.seen_ns, stamp)
+        return 3
     if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
         s.refused += 1
         return 2
     if stamp > s.seen_ns:
         s.seen_ns = stamp
-        far = p.timeout_ns * 1e-9
+        period_ns = 0
+        if s.command_stamp_ns != 0:
+            period_ns = min(stamp - s.command_stamp_ns, _SLOWEST_NS)
+        far = max(p.timeout_ns, period_ns) * 1e-9
         for i in range(s.command.shape[0]):
-            near = abs(row.slave_servo_jp[i] - s.command[i]) <= p.speed_limit[i] * far
+            near = abs(row.slave_servo_jp[i] - s.target[i]) <= p.speed_limit[i] * far
             if not near:  # NaN is not near either
                 s.refused += 1
                 return 2
-        for i in range(s.command.shape[0]):
-            s.command[i] = min(max(row.slave_servo_jp[i], p.lower[i]), p.upper[i])
+        begin_way(p, s, row.slave_servo_jp, period_ns, dt)
         s.command_stamp_ns, s.arrival_ns = stamp, now_ns
     return 1 if now_ns - s.arrival_ns > p.timeout_ns else 0
 
@@ -210,8 +257,12 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     """
     joints, n = arm.joints, arm.q.shape[0]
     copy(s.command, joints)
-    row.command_status = _take_command(p, s, row)
-    _advance_setpoint(p, s, joints, dt)
+    row.command_status = _take_command(p, s, row, dt)
+    if s.moved_ticks < p.start_ticks:
+        _move_to_start(p, s)
+    else:
+        advance_on_way(p, s)
+        _advance_setpoint(p, s, joints, dt)
     _measure(p, s, arm.q, dt)
     _control(p, s, arm, dt)
     for i in range(n):
@@ -233,8 +284,8 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
 class SlaveSim(RunningStage):
     """Stage that simulates the slave: control ticks of a continuous arm.
 
-    It starts at home, at rest and in balance: the control law holds the gravity that is not
-    compensated, if it can.
+    It is at home first, at rest and in balance: the control law holds the gravity that is not
+    compensated, if it can. From there it moves smoothly to where it starts, and follows then.
 
     Raises:
         ParameterError: The robot has no drives, or a list is not of its number of joints.
@@ -263,14 +314,16 @@ class SlaveSim(RunningStage):
             joints=np.zeros(n), T=np.zeros((4, 4)),
         )  # fmt: skip
         self.kernel, self.arguments = slave_step, (self.parameters, self.state, self.arm)
+        self._take_start(parameters)
         self.retune(parameters)
         self.reset()
 
     def reset(self) -> None:
         """Back to home, at rest, with no command in force."""
         s, home, arm = self.state, self.robot.home, self.arm
-        for name in ("command", "filtered", "setpoint"):
-            s[name] = home
+        for name in ("command", "filtered", "setpoint", "target", *WAY_FIELDS):
+            s[name] = home if name not in WAY_FIELDS else 0.0
+        s["moved_ticks"] = s["ticks"] = s["span"] = 0
         step = self.parameters["encoder_step"]
         s["measured"], s["speed"] = np.round(home / step) * step, 0.0
         s["command_stamp_ns"] = s["arrival_ns"] = s["seen_ns"] = s["refused"] = 0
@@ -310,6 +363,30 @@ class SlaveSim(RunningStage):
         p["filter_zero"], p["filter_pole"] = lag.zero, lag.pole
         p["steps"] = parameters.integration_steps
         p["timeout_ns"] = round(parameters.command_timeout * 1e9)
+        p["interpolation"] = INTERPOLATIONS.index(parameters.interpolation)
+
+    def _take_start(self, parameters: SlaveSimParameters) -> None:
+        """Plan the move from home to where the slave starts.
+
+        Raises:
+            ParameterError: The start is not of the robot's joints, or outside their limits.
+        """
+        robot, p = self.robot, self.parameters
+        assert robot.drives is not None
+        start = np.array(parameters.start or robot.start, dtype=np.float64)
+        if start.shape != robot.home.shape:
+            raise ParameterError("start", parameters.start, f"{robot.n} joints, or empty")
+        if not ((robot.lower <= start) & (start <= robot.upper)).all():
+            limits = f"{robot.lower.tolist()} to {robot.upper.tolist()}"
+            raise ParameterError("start", parameters.start, f"inside the limits, {limits}")
+        speed = robot.drives.speed_limit * parameters.start_speed
+        time = shortest_move_time(robot.home, start, speed)
+        p["home"], p["start"], p["start_ticks"] = robot.home, start, math.ceil(time / self.dt)
+
+    @property
+    def lead(self) -> int:
+        """Ticks of the move from home to where the slave starts; nothing is followed before."""
+        return int(self.parameters["start_ticks"])
 
     def _gains(self, parameters: SlaveSimParameters, viscous: Array) -> Array:
         table = self._law.gains(parameters.controller.kind.parameters, self.robot, viscous)

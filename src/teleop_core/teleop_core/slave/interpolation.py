@@ -1,0 +1,85 @@
+"""Interpolation: the way from command to command where they come slower than the ticks."""
+
+from typing import Any
+
+from teleop_core.geometry import Array
+from teleop_core.kernels import inner
+
+WAY_FIELDS = ("begin", "slope", "bend", "end_slope")
+"""Joints at the beginning of the way, their first and second slope there and their slope at its
+end, per way: state of :func:`begin_way`."""
+_LINEAR, _MINIMUM_JERK = 1, 2
+
+
+@inner
+def begin_way(p: Any, s: Any, command: Array, period_ns: int, dt: float) -> None:
+    """Go to a new command, over the period of commands if that is longer than a tick.
+
+    Args:
+        p: Parameters: ``lower`` and ``upper`` (n,), ``interpolation``, the place of its name in
+            :data:`~teleop_core.slave.slave_sim.INTERPOLATIONS`.
+        s: State: ``target``, ``command`` and :data:`WAY_FIELDS` (n,), ``ticks`` of the way done,
+            ``span`` in all; written.
+        command: New joints (n,) [rad or m], held inside their limits.
+        period_ns: Time since the last command [ns]; 0 for the first.
+        dt: Tick [s].
+    """
+    span = 1
+    if p.interpolation >= _LINEAR:
+        span = max(1, round(period_ns * 1e-9 / dt))
+    for i in range(command.shape[0]):
+        goal = min(max(command[i], p.lower[i]), p.upper[i])
+        if p.interpolation == _MINIMUM_JERK and s.span > 0:
+            slope, bend = _slopes(s, i)
+            longer = span / s.span
+            s.slope[i], s.bend[i] = slope * longer, bend * longer * longer
+            s.end_slope[i] = goal - s.target[i]
+        s.begin[i], s.target[i] = s.command[i], goal
+    s.ticks, s.span = 0, span
+
+
+@inner
+def _coefficients(s: Any, i: int) -> tuple[float, float, float, float, float]:
+    """Of the quintic in the share of the way, first to fifth power."""
+    rise, a, b, e = s.target[i] - s.begin[i], s.slope[i], s.bend[i], s.end_slope[i]
+    return (
+        a,
+        0.5 * b,
+        10.0 * rise - 6.0 * a - 4.0 * e - 1.5 * b,
+        -15.0 * rise + 8.0 * a + 7.0 * e + 1.5 * b,
+        6.0 * rise - 3.0 * a - 3.0 * e - 0.5 * b,
+    )
+
+
+@inner
+def _slopes(s: Any, i: int) -> tuple[float, float]:
+    """First and second slope of joint i where it is on its way; 0 if it waits at the end."""
+    if s.ticks > s.span:
+        return 0.0, 0.0
+    x = s.ticks / s.span
+    c1, c2, c3, c4, c5 = _coefficients(s, i)
+    first = c1 + x * (2.0 * c2 + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))
+    return first, 2.0 * c2 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5))
+
+
+@inner
+def advance_on_way(p: Any, s: Any) -> None:
+    """Move the command on by one tick; at the end of the way it is the newest command, exactly.
+
+    The polynomial of fifth degree with given position, speed and acceleration at its ends is the
+    way with least jerk.
+
+    Source:
+        Flash and Hogan 1985, eq. 3.
+    """
+    s.ticks += 1
+    x = s.ticks / s.span if s.ticks < s.span else 1.0
+    for i in range(s.command.shape[0]):
+        if x >= 1.0:
+            s.command[i] = s.target[i]
+        elif p.interpolation == _MINIMUM_JERK:
+            c1, c2, c3, c4, c5 = _coefficients(s, i)
+            way = x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5))))
+            s.command[i] = min(max(s.begin[i] + way, p.lower[i]), p.upper[i])
+        else:
+            s.command[i] = s.begin[i] + x * (s.target[i] - s.begin[i])
