@@ -101,7 +101,8 @@ _STATE = [
     ("attitude", "f8", (4,)), ("next", "i8"), ("next_noise", "i8"), ("has_begun", "i8"),
     ("first_ns", "i8"),
 ]  # fmt: skip
-_WANTED = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("buttons", "f8", (3,))]
+_WANTED = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("buttons", "f8", (3,)),
+           ("tremor", "f8", (3,))]  # fmt: skip
 _IS_FOLLOWING = STATE["is_following"]
 
 
@@ -135,7 +136,8 @@ def haptic_master_step(
         handle: None for the Phantom, else as :func:`teleop_core.master.device.make_handle` gives.
         wanted: What the operator wants, now and in the coming ticks, record by record:
             ``wanted`` (3,) [m] in the master's base, ``attitude`` of the stylus, quaternion (4,),
-            and ``buttons`` (3,): clutch, fixture, mode.
+            ``buttons`` (3,): clutch, fixture, mode, and ``tremor`` (3,) [m], which the tip makes
+            whatever friction and force are.
         noises: Standard normal numbers of the coming ticks (N, 6) for tremor x, y, z and gimbal
             x, y, z.
         row: Signals.
@@ -148,16 +150,18 @@ def haptic_master_step(
     command = row.master_servo_cf
     size = math.sqrt(command[0] ** 2 + command[1] ** 2 + command[2] ** 2)
     share = 1.0 if size <= p.peak_force else p.peak_force / size
-    tremor = np.empty(3)
+    tremor, place = np.empty(3), np.empty(3)
     tremble(p, s, noise, tremor, dt)
     for i in range(3):
         force[i] = share * command[i]
         tremor[i] += now.wanted[i]
     move_hand(p, s, tremor, force, dt)
+    for i in range(3):
+        place[i] = s.position[i] + now.tremor[i]
     if handle is None:
-        read_phantom(p, s.position, now.attitude, noise[3:6], row.master_measured_cp)
+        read_phantom(p, place, now.attitude, noise[3:6], row.master_measured_cp)
     else:
-        read_handle(handle, s.position, now.attitude, row.master_measured_cp)
+        read_handle(handle, place, now.attitude, row.master_measured_cp)
     measure_twist(s, row.master_measured_cp, row.master_measured_cv, dt)
     for i in range(3):
         row.master_measured_cf[i] = force[i]
@@ -209,6 +213,7 @@ class HapticMaster(RunningStage):
             self.state[name] = REST_POSITION
         now = self._wanted[0]
         now["wanted"], now["attitude"], now["buttons"] = REST_POSITION, self._rest, 0.0
+        now["tremor"] = 0.0
         place, pose = self.state["position"], self.signals["master_measured_cp"]
         if self.handle is None:
             read_phantom(self.parameters, place, self._rest, np.zeros(3), pose)
@@ -223,7 +228,9 @@ class HapticMaster(RunningStage):
         p["peak_force"], p["friction"] = device.peak_force, device.friction
         p["mass"] = device.apparent_mass + hand.mass
         p["stiffness"], p["damping"] = hand.stiffness, hand.damping
-        p["tremor"], p["frequency"] = hand.tremor_amplitude, hand.tremor_frequency
+        operator = OPERATORS.find(self._fixed.operator.kind.kind)
+        p["tremor"] = 0.0 if operator.trembles else hand.tremor_amplitude
+        p["frequency"] = hand.tremor_frequency
         p["patience_ns"] = round(parameters.patience * 1e9)
         p["center"] = np.subtract(REST_POSITION, device.start)
         p["half"] = 0.5 * np.array(device.workspace)
@@ -265,10 +272,11 @@ class HapticMaster(RunningStage):
         attitudes = np.empty((count, 4))
         _turn_all(self._rest, np.ascontiguousarray(moves[:, 3:6]), attitudes)
         drawn["attitude"] = attitudes
-        drawn["buttons"] = np.maximum(self._pressed(times), moves[:, 6:])
+        drawn["buttons"] = np.maximum(self._pressed(times), moves[:, 6:9])
+        drawn["tremor"] = moves[:, 9:]
 
     def _moves(self, times: Array) -> Array:
-        """Motion and buttons (N, 9) of the operator.
+        """Motion, buttons and tremor (N, 12) of the operator.
 
         Raises:
             PartError: What he answers has another shape, or is not finite.
@@ -278,13 +286,13 @@ class HapticMaster(RunningStage):
         if moves.dtype.kind not in "fiub":
             raise PartError("operator", name, f"one who answers numbers, not {moves.dtype}")
         moves = moves.astype(np.float64)
-        if moves.shape not in {(len(times), columns) for columns in (3, 6, 9)}:
+        if moves.shape not in {(len(times), columns) for columns in (3, 6, 9, 12)}:
             text = f"one who answers (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
             raise PartError("operator", name, text)
         if not np.isfinite(moves).all():
             bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]
             raise PartError("operator", name, f"one who answers finite numbers; at {bad:g} s not")
-        return np.pad(moves, ((0, 0), (0, 9 - moves.shape[1])))
+        return np.pad(moves, ((0, 0), (0, 12 - moves.shape[1])))
 
     def _asked(self, question: Callable[..., Any], *arguments: Any) -> Any:
         """Answer of the operator.

@@ -19,10 +19,11 @@ from teleop_core.registry import Registry
 __all__ = ["OPERATORS", "Motion", "Operator", "Setting", "following", "register_operator"]
 
 Motion = Callable[[Array], Array]
-"""Times (N,) since the start [s] to rows (N, 3), (N, 6) or (N, 9).
+"""Times (N,) since the start [s] to rows (N, 3), (N, 6), (N, 9) or (N, 12).
 
 Columns: position x, y, z [m] and rotation vector [rad] relative to the start, in the master's base;
-then the buttons clutch, fixture, mode (1 pressed). What is left out is zero.
+then the buttons clutch, fixture, mode (1 pressed); then tremor x, y, z [m], by which the tip is
+off whatever the device's friction is. What is left out is zero.
 """
 
 
@@ -49,12 +50,15 @@ class Operator:
         make: ``make(parameters, setting)`` gives the :data:`Motion` of one session.
         parameters: Its parameter group, beside those that all operators share.
         ahead: Ticks for which it can be asked at once: 1 for one who answers to what happens.
+        trembles: Whether its motion has all its tremor, so that ``hand.tremor_amplitude`` is not
+            added.
     """
 
     name: str
     make: Callable[[Any, Setting], Motion]
     parameters: type = NoParameters
     ahead: int = 1000
+    trembles: bool = False
 
 
 def following(name: str, times: object, rows: object) -> Operator:
@@ -117,6 +121,7 @@ OPERATORS: Registry[Operator] = Registry(
     {
         **{kind: f"teleop_core.operators.shapes:{kind.upper()}"
            for kind in ("random", "line", "circle", "points", "hold")},
+        "human": "teleop_core.operators.human:HUMAN",
         "bag": "teleop_core.operators.recorded:BAG",
         "file": "teleop_core.operators.recorded:FILE",
     },
