@@ -28,7 +28,7 @@ STREAMS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_MEASURED_JS, topics.MASTER_BUT
 def samples(count=60):
     """Stamps, and values per topic, of one recording."""
     rng = np.random.default_rng(5)
-    values = {topic: rng.normal(size=(count, topic.kind.width(3))).round(3) for topic in STREAMS}
+    values = {topic: rng.normal(size=(count, topic.width(3))).round(3) for topic in STREAMS}
     values[topics.MASTER_BUTTONS] = rng.integers(0, 2, (count, 3)).astype(float)
     return np.arange(count) * MS + 3, values
 

@@ -42,7 +42,7 @@ def block(rng, begin, count, chosen=topics.STREAMS):
     """Samples of one block; stamps lie a little before log times."""
     log_ns = np.arange(begin, begin + count) * MS + 10
     return {
-        topic: (log_ns - 10, rng.integers(-9, 9, (count, topic.kind.width(3))) * 0.5, log_ns)
+        topic: (log_ns - 10, rng.integers(-9, 9, (count, topic.width(3))) * 0.5, log_ns)
         if topic.kind is not topics.Kind.BUTTONS
         else (log_ns - 10, rng.integers(0, 2, (count, 3)).astype(float), log_ns)
         for topic in chosen

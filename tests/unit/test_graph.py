@@ -164,14 +164,14 @@ FORTH = Topic("test/forth", Kind.POSE, passed_on("test/back"))
 BACK = Topic("test/back", Kind.POSE, passed_on("test/forth"))
 CIRCLE = (stage("forth", (BACK,), (FORTH,)), stage("back", (FORTH,), (BACK,)))
 UNFED = stage(reads=(SLAVE_MEASURED_CP, UNWRITTEN))
-NOTED = stage(writes=(), notes=(("ik_status", "i8"),))
+NOTED = stage(writes=(), notes=(("command_status", "i8"),))
 BAD_GRAPHS = {
     "reader nobody writes for": ((*BASE, UNFED), "echo", "test/unwritten, which no stage writes"),
     "two stages of one name": ((*BASE, BASE[3]), "slave_sim", "two have this name"),
     "two writers of a topic": (
         (*BASE, stage("a"), stage("b")), "b", "the only one that writes test/echo; a does",
     ),
-    "two stages for one column": ((*BASE, NOTED), "echo", "inverse_kinematics uses"),
+    "two stages for one column": ((*BASE, NOTED), "echo", "slave_sim uses"),
     "stages that wait for each other": ((*BASE, *CIRCLE), "forth", "forth, back wait"),
 }  # fmt: skip
 

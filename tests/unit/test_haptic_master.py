@@ -8,8 +8,8 @@ from scipy.signal import periodogram
 from scipy.spatial.transform import Rotation
 
 from teleop_core.errors import ParameterError
+from teleop_core.kernels import records
 from teleop_core.master.haptic_master import (
-    HAPTIC_MASTER,
     REST_POSITION,
     REST_TILT,
     ButtonParameters,
@@ -22,7 +22,6 @@ from teleop_core.operators import OPERATORS, Setting, register_operator
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.shapes import PHASES
 from teleop_core.parameters import build
-from teleop_core.signals import make_signals
 
 RESOLUTION, NOISE, PEAK = 0.055e-3, 2e-3, 3.3
 REST = Rotation.from_euler("x", REST_TILT)
@@ -40,7 +39,7 @@ STILL = operator(kind="hold", rotation=0.0)
 def parameters(*, seed=1, device=None, hand=None, operator=STILL, buttons=None):
     return HapticMasterParameters(
         seed=seed, device=DeviceParameters(**(device or {})), hand=HandParameters(**(hand or {})),
-        operator=operator, buttons=ButtonParameters(**(buttons or {})),
+        operator=operator, buttons=ButtonParameters(**(buttons or {})), patience=0.0,
     )  # fmt: skip
 
 
@@ -54,7 +53,7 @@ def wanted_places(wanted, ticks, seed=1):
 
 def run(master, ticks, force=(0.0, 0.0, 0.0)):
     """Signals of the next ticks (ticks,) under a constant commanded force [N]."""
-    out = make_signals(HAPTIC_MASTER.ports, 0, count=ticks)
+    out = records(master.signals.dtype, ticks)
     for i in range(ticks):
         master.signals["master_servo_cf"][:3] = force
         master.step()

@@ -258,7 +258,7 @@ def test_hand_that_comes_back_after_a_pause_starts_from_where_the_slave_is():
     desk = Desk()
     desk.step()
     before = desk.step((5 * MM, 0, 0))
-    after = desk.step((40 * MM, 0, 0), rotation("z", 0.5), stamp_step_ns=200_000_000)
+    after = desk.step((40 * MM, 0, 0), rotation("z", 0.5), stamp_step_ns=400_000_000)
     assert np.array_equal(after, before)
     moved = desk.step((1 * MM, 0, 0))
     assert np.allclose(moved - before, (0, -1 * MM, 0), rtol=0, atol=ROUNDING)

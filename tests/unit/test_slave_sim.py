@@ -27,6 +27,7 @@ from teleop_core.slave.slave_sim import (
 
 ARM = load_robot("rcrt1")
 DRIVES = ARM.drives
+AT_HOME = tuple(ARM.home.tolist())
 COUNT = DRIVES.encoder_step
 # Well inside the limits and off the singularities.
 MIDDLE = np.array([0.1, 1.7, 0.36, 0.2, 0.5, 0.1])
@@ -43,7 +44,7 @@ class Bench:
     """A slave and the ticks that its commands come in."""
 
     def __init__(self, **values):
-        self.slave = SlaveSim(SlaveSimParameters(**values))
+        self.slave = SlaveSim(SlaveSimParameters(**{"start": AT_HOME} | values))
         self.row, self.now_ns = self.slave.signals, 0
 
     def tick(self, command=None, stamp_ns=None):
@@ -113,7 +114,7 @@ def test_default_steps_resolve_the_stiffest_friction_of_the_arm():
 
 
 def test_more_steps_change_the_path_of_the_arm_less_and_less():
-    slave, ends = SlaveSim(SlaveSimParameters()), []
+    slave, ends = SlaveSim(SlaveSimParameters(start=AT_HOME)), []
     effort = np.array([2.0, -3.0, 5.0, 0.05, 0.03, 0.02])
     for steps in (1, 2, 4, 8):
         q, dq = MIDDLE.copy(), np.array([1.0, -1.0, 0.02, 1.0, -1.0, 1.0])
@@ -400,7 +401,7 @@ def test_a_stamp_from_the_future_does_not_shut_out_the_commands_after_it():
     assert bench.slave.refused == 1
     goal = MIDDLE + 0.05 * DRIVES.speed_limit
     bench.tick(goal)
-    assert np.array_equal(bench.slave.state["command"], goal)
+    assert np.array_equal(bench.slave.state["target"], goal)
 
 
 def test_command_outside_the_limits_is_followed_up_to_them():

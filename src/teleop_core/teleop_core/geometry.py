@@ -66,6 +66,14 @@ def multiply_quaternions(a: Array, b: Array, product: Array) -> None:
 
 
 @kernel
+def invert_quaternion(quaternion: Array, inverse: Array) -> None:
+    """Write the quaternion of the rotation back into ``inverse`` (may be the same)."""
+    inverse[0] = quaternion[0]
+    for i in range(1, 4):
+        inverse[i] = -quaternion[i]
+
+
+@kernel
 def rotate_by_vector(quaternion: Array, rx: float, ry: float, rz: float, rotated: Array) -> None:
     """Write ``quaternion`` turned by a rotation vector [rad] in its own frame into ``rotated``."""
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
@@ -135,9 +143,23 @@ def rotation_vector_between(a: Array, b: Array, vector: Array) -> None:
 @kernel
 def turn_between(a: Array, b: Array, vector: Array) -> None:
     """Write the rotation vector (3,) [rad], in the base, that turns quaternion a to b."""
-    inverse, turn = np.empty(4), np.empty(4)
-    inverse[0], inverse[1], inverse[2], inverse[3] = a[0], -a[1], -a[2], -a[3]
-    multiply_quaternions(b, inverse, turn)
+    turn = np.empty(4)
+    invert_quaternion(a, turn)
+    multiply_quaternions(b, turn, turn)
+    _vector_of(turn, vector)
+
+
+@kernel
+def turn_within(a: Array, b: Array, vector: Array) -> None:
+    """Write the rotation vector (3,) [rad], in the frame of a, that turns quaternion a to b."""
+    turn = np.empty(4)
+    invert_quaternion(a, turn)
+    multiply_quaternions(turn, b, turn)
+    _vector_of(turn, vector)
+
+
+@inner
+def _vector_of(turn: Array, vector: Array) -> None:
     sign = -1.0 if turn[0] < 0.0 else 1.0
     sine = math.sqrt(turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3])
     scale = 2.0 * sign

@@ -11,7 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.geometry import Array, multiply_quaternions, turn_between, turn_by
+from teleop_core.geometry import (
+    Array,
+    invert_quaternion,
+    multiply_quaternions,
+    rotate_by_vector,
+    turn_between,
+    turn_by,
+    turn_within,
+)
 from teleop_core.kernels import inner
 from teleop_core.parameters import parameter
 from teleop_core.topics import SLAVE_REACH, Limit
@@ -33,8 +41,9 @@ LIMIT_FIELDS = [
     # What was cut off all commands so far, which of them was answered last, how many were sent.
     ("moved", "f8", (3,)), ("turned", "f8", (4,)), ("answered_ns", "i8"), ("sent", "i8"),
     ("limit", "i8"), ("joint", "i8"), ("until_ns", "i8"),
-    # Where the hand met the limit, which way is out, and how far beyond it is: place [m], turn
-    # [rad]. The hand stands against the limit while a depth is positive.
+    # Where the hand met the limit, which way is out, and how far beyond it is: place [m] in the
+    # slave's axes, turn [rad] in those of the tool. The hand stands against the limit while a
+    # depth is positive.
     ("anchor", "f8", (3,)), ("out", "f8", (3,)), ("depth", "f8"),
     ("turn_anchor", "f8", (4,)), ("turn_out", "f8", (3,)), ("turn_depth", "f8"),
 ]  # fmt: skip
@@ -138,10 +147,12 @@ def _turn_back(s: Any, entry: Any, reach: Array) -> None:
         return
     if s.turn_depth <= 0.0:
         s.turn_depth = min(length, _MOST_TURN)
+    before = np.empty(4)
+    for i in range(4):
+        before[i], s.turned[i] = s.command[3 + i], wanted[i]
     turn_by(cut, s.command[3:7])
     align(s)
-    for i in range(4):
-        s.turned[i] = wanted[i]
+    turn_within(before, s.command[3:7], cut)
     for i in range(3):
         s.turn_out[i] = -cut[i] / length
     _anchor_turn(s)
@@ -151,21 +162,16 @@ def _turn_back(s: Any, entry: Any, reach: Array) -> None:
 def align(s: Any) -> None:
     """Let the hand's present orientation mean that of the command."""
     inverse = np.empty(4)
-    inverse[0] = s.tool[0]
-    for i in range(1, 4):
-        inverse[i] = -s.tool[i]
-    multiply_quaternions(inverse, s.command[3:7], s.alignment)
+    invert_quaternion(s.tool, inverse)
+    multiply_quaternions(s.command[3:7], inverse, s.alignment)
 
 
 @inner
 def _anchor_turn(s: Any) -> None:
     """Put the anchor where the hand's orientation is, less the depth."""
-    back = np.empty(3)
-    for i in range(3):
-        back[i] = -s.turn_depth * s.turn_out[i]
-    for i in range(4):
-        s.turn_anchor[i] = s.tool[i]
-    turn_by(back, s.turn_anchor)
+    x, y, z = s.turn_out[0], s.turn_out[1], s.turn_out[2]
+    back = -s.turn_depth
+    rotate_by_vector(s.tool, back * x, back * y, back * z, s.turn_anchor)
 
 
 @inner
@@ -187,7 +193,7 @@ def measure_depth(s: Any, most: float, now_ns: int) -> None:
                 s.anchor[i] = s.hand[i] - most * s.out[i]
     if s.turn_depth > 0.0:
         turn = np.empty(3)
-        turn_between(s.turn_anchor, s.tool, turn)
+        turn_within(s.turn_anchor, s.tool, turn)
         s.turn_depth = turn[0] * s.turn_out[0] + turn[1] * s.turn_out[1] + turn[2] * s.turn_out[2]
         if s.turn_depth > _MOST_TURN:
             s.turn_depth = _MOST_TURN

@@ -12,9 +12,9 @@ from teleop_core.geometry import (
     Array,
     multiply_quaternions,
     quaternion_from_rotation,
+    rotate_by_vector,
     rotation,
-    turn_between,
-    turn_by,
+    turn_within,
 )
 from teleop_core.kernels import inner, kernel, records
 from teleop_core.mapping.limits import (
@@ -204,11 +204,10 @@ def _move(p: Any, s: Any, gain: float, position: Array, turn: Array) -> None:
     for i in range(3):
         s.command[i] += gain * step[i]
     if p.rotation_gain == 1.0:
-        multiply_quaternions(s.tool, s.alignment, s.command[3:7])
+        multiply_quaternions(s.alignment, s.tool, s.command[3:7])
     else:
-        for i in range(3):
-            turn[i] *= p.rotation_gain
-        turn_by(turn, s.command[3:7])
+        x, y, z = turn[0] * p.rotation_gain, turn[1] * p.rotation_gain, turn[2] * p.rotation_gain
+        rotate_by_vector(s.command[3:7], x, y, z, s.command[3:7])
         align(s)
     # One Newton step keeps the product of many unit quaternions a unit quaternion.
     square = 0.0
@@ -285,7 +284,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     gain = p.gain[s.is_fine]
     tool, turn = np.empty(4), np.empty(3)
     mapped_orientation(p, pose[3:7], tool)
-    turn_between(s.tool, tool, turn)
+    turn_within(s.tool, tool, turn)
     for i in range(4):
         s.tool[i] = tool[i]
     to_slave_axes(p, pose, s.hand)

@@ -14,6 +14,7 @@ from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 from teleop_core.geometry import Array
 from teleop_core.graph import RECORDER_NAME, Member
+from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION, Layer, parse_layer
 from teleop_core.session.virtual import BLOCK, VirtualTime, stamps_of
@@ -123,7 +124,18 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     """
     text = bag.metadata.get("configuration")
     layer = parse_layer(yaml.safe_load(text), f"{bag.path}: configuration") if text else {}
+    _begin_at_home(layer)
     return layer, bag.metadata.get("scenario", "")
+
+
+def _begin_at_home(layer: Layer) -> None:
+    """Let slaves of versions that knew no other start begin where they did, at home."""
+    for name, values in layer.items():
+        is_old = name.rpartition("/")[2] == "slave_sim" and "start" not in values
+        if is_old and isinstance(robot := values.get("robot"), str):
+            geometry = values.get("geometry", ())
+            settings = geometry if isinstance(geometry, tuple | list) else ()
+            values["start"] = tuple(load_robot_set(robot, map(str, settings)).home.tolist())
 
 
 def record_blocks(
