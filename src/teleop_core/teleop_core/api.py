@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.memory import MemoryBag, Message
-from teleop_core.bags.reader import Bag
 from teleop_core.bags.series import Series
 from teleop_core.controllers import CONTROLLERS, Controller
 from teleop_core.errors import ParameterError, TeleopError
@@ -223,7 +222,9 @@ def replay(
     Raises:
         TeleopError: A topic or file is missing, or a value is wrong.
     """
-    bag = recording.bag if isinstance(recording, Recording) else Bag(recording)
+    from teleop_core.exchange import as_master_bag
+
+    bag = as_master_bag(recording.bag if isinstance(recording, Recording) else recording)
     layer, scenario = recorded_configuration(bag)
     named = {name.replace("__", "."): value for name, value in parameters.items()}
     changes = [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]

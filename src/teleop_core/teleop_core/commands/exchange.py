@@ -1,0 +1,144 @@
+"""Commands that exchange recordings with others: ``teleop import`` and ``teleop export``."""
+
+import argparse
+import re
+from pathlib import Path
+from typing import Any
+
+from teleop_core.commands.arguments import command, out_argument
+from teleop_core.exchange.options import BUTTONS, LENGTHS, TIMES_NS
+
+_IMPORT = """\
+Make a recording of a hand's motion from a file of others: CSV, TSV or blanks (also .gz), Parquet,
+rosbag2 (MCAP, db3), ROS 1 .bag. Columns go by name or, counted from 1, by number; 4-12 stands for
+nine of them. What is not said is guessed from the names, and told.
+"""
+_EXAMPLES = """\
+examples:
+  teleop import hand.csv --out bags/hand
+  teleop import hand.csv --out bags/hand --time t --time-unit ms --position px py pz --unit mm
+  teleop import mocap.txt --out bags/mocap --rate 100 --position 1-3 --matrix 4-12
+  teleop import tool.csv --out bags/tool --euler ZYX yaw pitch roll --angles deg --axes +y -x +z
+  teleop import user.bag --out bags/user --topic /MTMR/measured_cp --buttons clutch=0,mode=2
+then:
+  teleop replay bags/hand --out bags/hand_replayed
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the commands."""
+    _add_import(commands)
+
+
+def _add_import(commands: Any) -> None:
+    parser = command(commands, "import", _import, "make a recording of a file of others")
+    parser.description, parser.epilog = _IMPORT, _EXAMPLES
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    # `--axes +y -x +z`: -x is a value; argparse lets only what looks like a number be one.
+    parser._negative_number_matcher = re.compile(r"-([xyz]|\d+|\d*\.\d+)$")
+    parser.add_argument("file", type=Path, metavar="FILE", help="file or directory to import")
+    out_argument(parser)
+    _time(parser.add_argument_group("time"))
+    _place(parser.add_argument_group("position and orientation"))
+    _buttons(parser.add_argument_group("buttons"))
+    _changes(parser.add_argument_group("axes and place"))
+    _damage(parser.add_argument_group("what is damaged"))
+    bags = parser.add_argument_group("recordings of ROS")
+    bags.add_argument("--topic", metavar="TOPIC", help="topic of the poses, if there are several")
+    bags.add_argument("--frame", metavar="NAME", help="child frame, for a topic of transforms")
+    bags.add_argument(
+        "--stamps", choices=("header", "log"), help="times of the messages (default: header)"
+    )
+
+
+def _time(group: Any) -> None:
+    group.add_argument(
+        "--time", nargs="+", metavar="COL", help="column of the time, or seconds and nanoseconds"
+    )
+    group.add_argument("--rate", type=float, metavar="HZ", help="samples per second, without time")
+    group.add_argument(
+        "--time-unit", choices=("auto", *TIMES_NS), help="unit of the time (default: guessed)"
+    )
+
+
+def _place(group: Any) -> None:
+    group.add_argument("--position", nargs="+", metavar="COL", help="columns of x, y, z")
+    group.add_argument(
+        "--unit", choices=("auto", *LENGTHS), help="of the position (default: by the names, else m)"
+    )
+    group.add_argument("--quaternion", nargs="+", metavar="COL", help="four columns")
+    group.add_argument(
+        "--quaternion-order", choices=("wxyz", "xyzw"), help="of its columns (default: wxyz)"
+    )
+    group.add_argument("--matrix", nargs="+", metavar="COL", help="nine columns of a rotation")
+    group.add_argument(
+        "--matrix-order", choices=("row", "column"), help="row by row (default) or column by column"
+    )
+    group.add_argument(
+        "--euler", nargs="+", metavar="COL",
+        help="order and three columns: xyz about fixed axes, XYZ about axes that turn along",
+    )  # fmt: skip
+    group.add_argument("--rotation-vector", nargs="+", metavar="COL", help="three columns")
+    group.add_argument(
+        "--forward", nargs="+", metavar="COL", help="three columns: direction of the tool's z axis"
+    )
+    group.add_argument(
+        "--angles", choices=("auto", "rad", "deg"), help="of --euler and --rotation-vector"
+    )
+    group.add_argument(
+        "--orientation", choices=("auto", "none"), help="none: constant, nothing is guessed"
+    )
+
+
+def _buttons(group: Any) -> None:
+    for button in BUTTONS:
+        group.add_argument(f"--{button}", metavar="COL", help=f"column of the {button} button")
+    group.add_argument(
+        "--threshold", type=float, metavar="X", help="pressed above it (default: 0.5)"
+    )
+    group.add_argument("--buttons-topic", metavar="TOPIC", help="topic of Joy messages in a bag")
+    group.add_argument(
+        "--buttons", metavar="MAP", help="buttons of the Joy, such as clutch=0,mode=2; or none"
+    )
+
+
+def _changes(group: Any) -> None:
+    group.add_argument(
+        "--axes", nargs="+", metavar="AXIS",
+        help="the master's x, y, z as axes of the file, such as +y -x +z",
+    )  # fmt: skip
+    group.add_argument("--scale", type=float, metavar="X", help="multiplies positions (default: 1)")
+    group.add_argument(
+        "--center", choices=("keep", "mean", "middle", "start"),
+        help="what comes to zero: mean, middle of the range, start (default: keep)",
+    )  # fmt: skip
+
+
+def _damage(group: Any) -> None:
+    group.add_argument("--skip", type=int, metavar="N", help="lines to leave out at the beginning")
+    group.add_argument(
+        "--missing", choices=("drop", "interpolate"), help="rows with NaN (default: drop)"
+    )
+    group.add_argument(
+        "--missing-time", type=float, metavar="S", help="interpolate at most so long (default: 0.1)"
+    )
+    group.add_argument(
+        "--backwards", choices=("auto", "refuse", "drop", "sort"),
+        help="rows whose time goes back (default: drop up to 1 %%, refuse more)",
+    )  # fmt: skip
+    group.add_argument(
+        "--gap", type=float, metavar="N", help="tell gaps longer than N periods (default: 5)"
+    )
+
+
+def _import(arguments: argparse.Namespace) -> int:
+    from teleop_core.exchange import ImportOptions, import_recording
+
+    given = vars(arguments)
+    names = ImportOptions.__dataclass_fields__
+    changes = {name: given[name] for name in names if given.get(name) is not None}
+    report = import_recording(arguments.file, arguments.out, **changes)
+    print(report)
+    print(f"{arguments.out}: {report.duration:.1f} s imported; next: "
+          f"teleop replay {arguments.out} --out {arguments.out}_replayed")  # fmt: skip
+    return 0

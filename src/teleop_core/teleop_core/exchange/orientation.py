@@ -1,0 +1,203 @@
+"""Orientation: attitudes in any notation as unit quaternions w, x, y, z, block by block.
+
+What cannot be a rotation becomes NaN and is counted as strange, what is missing stays NaN.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.geometry import Array, multiply_quaternions
+from teleop_core.kernels import kernel
+
+TOLERANCE = 0.1
+"""How far a quaternion's length, or a matrix from being a rotation, may be off."""
+_MISSING = 1e-6  # shorter quaternions and directions mean that nothing was measured
+_AXES = {"x": 1, "y": 2, "z": 3}
+
+
+@dataclass
+class Attitudes:
+    """Rows of one notation, one block after the other.
+
+    Attributes:
+        kind: ``quaternion``, ``matrix``, ``euler``, ``rotation_vector``, ``forward`` or ``none``.
+        order: ``wxyz`` or ``xyzw``; ``row`` or ``column``; or the order of Euler angles.
+        degrees: Whether angles are in degrees.
+        strange: How many rows cannot be rotations.
+        mirrored: How many of these are mirrors.
+    """
+
+    kind: str
+    order: str = ""
+    degrees: bool = False
+    strange: int = 0
+    mirrored: int = 0
+    _last: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+
+    @property
+    def width(self) -> int:
+        """Numbers in a row."""
+        return {"quaternion": 4, "matrix": 9, "none": 0}.get(self.kind, 3)
+
+    def quaternions(self, rows: Array) -> Array:
+        """Unit quaternions (N, 4) of the next rows (N, width); NaN where there is none."""
+        if self.kind == "none":
+            return np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))
+        if self.kind == "quaternion":
+            turned = rows[:, [3, 0, 1, 2]] if self.order == "xyzw" else rows
+            return self._unit(turned)
+        if self.kind == "matrix":
+            matrices = rows.reshape(-1, 3, 3)
+            return self._of_matrices(
+                matrices.transpose(0, 2, 1) if self.order == "column" else matrices
+            )
+        if self.kind == "forward":
+            return self._of_directions(rows)
+        angles = np.radians(rows) if self.degrees else rows
+        if self.kind == "euler":
+            return from_euler(self.order, angles)
+        return from_rotation_vectors(angles)
+
+    def _unit(self, quaternions: Array) -> Array:
+        lengths = np.linalg.norm(quaternions, axis=1)
+        missing = lengths < _MISSING
+        strange = np.abs(lengths - 1.0) > TOLERANCE
+        self.strange += int((strange & ~missing).sum())
+        lengths[strange | missing] = math.nan
+        unit: Array = quaternions / lengths[:, None]
+        return unit
+
+    def _of_matrices(self, matrices: Array) -> Array:
+        squares = np.einsum("nij,nkj->nik", matrices, matrices)
+        missing = np.abs(matrices).max(axis=(1, 2), initial=0.0) < _MISSING
+        off = np.abs(squares - np.eye(3)).max(axis=(1, 2), initial=0.0) > TOLERANCE
+        mirror = np.linalg.det(matrices) < 0.0
+        self.strange += int(((off | mirror) & ~missing).sum())
+        self.mirrored += int((mirror & ~off).sum())
+        quaternions = from_matrices(matrices)
+        quaternions[off | mirror | missing] = math.nan
+        return quaternions
+
+    def _of_directions(self, directions: Array) -> Array:
+        """By parallel transport: from each direction to the next by the shortest turn."""
+        lengths = np.linalg.norm(directions, axis=1)
+        lengths[lengths < _MISSING] = math.nan
+        quaternions = np.empty((len(directions), 4))
+        transport(directions / lengths[:, None], self._last, quaternions)
+        return quaternions
+
+
+@kernel
+def transport(directions: Array, last: Array, quaternions: Array) -> None:
+    """Write the quaternions (N, 4) of directions (N, 3) that turn along by the shortest way.
+
+    Args:
+        directions: Unit vectors; rows with NaN give NaN.
+        last: The last direction and quaternion (7,); written.
+        quaternions: Written.
+
+    Source:
+        Hanson and Ma 1995, Parallel transport approach to curve framing, section 3.
+    """
+    turn = np.empty(4)
+    for i in range(directions.shape[0]):
+        ax, ay, az = last[0], last[1], last[2]
+        bx, by, bz = directions[i, 0], directions[i, 1], directions[i, 2]
+        if not math.isfinite(bx + by + bz):
+            for j in range(4):
+                quaternions[i, j] = math.nan
+            continue
+        w = 1.0 + ax * bx + ay * by + az * bz
+        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        if w < 1e-12:  # straight back: about any axis at right angles
+            w = 0.0
+            if abs(ax) < 0.9:
+                x, y, z = 0.0, az, -ay
+            else:
+                x, y, z = -az, 0.0, ax
+        scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+        turn[0], turn[1], turn[2], turn[3] = w * scale, x * scale, y * scale, z * scale
+        multiply_quaternions(turn, last[3:7], last[3:7])
+        last[0], last[1], last[2] = bx, by, bz
+        size = 0.0
+        for j in range(4):
+            size += last[3 + j] * last[3 + j]
+        for j in range(4):
+            last[3 + j] /= math.sqrt(size)
+            quaternions[i, j] = last[3 + j]
+
+
+def from_matrices(matrices: Array) -> Array:
+    """Unit quaternions (N, 4) of rotation matrices (N, 3, 3), which may be off by rounding.
+
+    The largest component is computed first (Shepperd 1978).
+    """
+    d = np.diagonal(matrices, axis1=1, axis2=2)
+    trace = d.sum(axis=1)
+    squares = np.column_stack((trace, d))  # largest where that component is the largest
+    largest = np.argmax(squares, axis=1)
+    r = matrices
+    candidates = np.empty((4, len(matrices), 4))
+    wx, wy, wz = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
+    xy, xz, yz = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
+    x, y, z = d.T
+    candidates[0] = np.column_stack((1.0 + trace, wx, wy, wz))
+    candidates[1] = np.column_stack((wx, 1.0 + x - y - z, xy, xz))
+    candidates[2] = np.column_stack((wy, xy, 1.0 - x + y - z, yz))
+    candidates[3] = np.column_stack((wz, xz, yz, 1.0 - x - y + z))
+    chosen = candidates[largest, np.arange(len(matrices))]
+    with np.errstate(invalid="ignore"):
+        unit: Array = chosen / np.linalg.norm(chosen, axis=1)[:, None]
+    return unit
+
+
+def from_rotation_vectors(vectors: Array) -> Array:
+    """Unit quaternions (N, 4) of rotation vectors (N, 3) [rad]."""
+    half = 0.5 * np.linalg.norm(vectors, axis=1)
+    share = 0.5 * np.sinc(half / math.pi)
+    return np.column_stack((np.cos(half), share[:, None] * vectors))
+
+
+def from_euler(order: str, angles: Array) -> Array:
+    """Unit quaternions (N, 4) of Euler angles (N, 3) [rad].
+
+    Args:
+        order: Three axes in the order of the columns; small letters turn about fixed axes, capital
+            ones about the axes that turn along.
+        angles: Rows.
+    """
+    out: Array = np.tile([1.0, 0.0, 0.0, 0.0], (len(angles), 1))
+    for axis, angle in zip(order, angles.T, strict=True):
+        turn = np.zeros((len(angles), 4))
+        turn[:, 0], turn[:, _AXES[axis.lower()]] = np.cos(0.5 * angle), np.sin(0.5 * angle)
+        out = products(out, turn) if order.isupper() else products(turn, out)
+    return out
+
+
+def products(a: Array, b: Array) -> Array:
+    """Quaternions (N, 4) of rotations ``b`` followed by ``a``, each (N, 4) or (4,)."""
+    aw, ax, ay, az = np.moveaxis(a, -1, 0)
+    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    return np.stack(
+        (
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ),
+        axis=-1,
+    )
+
+
+def continuous(quaternions: Array, last: Array | None) -> Array:
+    """The same rotations (N, 4) with signs that never jump, from ``last`` on."""
+    if not len(quaternions):
+        return quaternions
+    first = quaternions[:1] if last is None else last[None]
+    before = np.concatenate((first, quaternions[:-1]))
+    flips: NDArray[np.float64] = np.where((quaternions * before).sum(axis=1) < 0.0, -1.0, 1.0)
+    signed: Array = quaternions * np.cumprod(flips)[:, None]
+    return signed
