@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from teleop_core.kernels import kernel
     from teleop_core.operators import Operator, following, register_operator
     from teleop_core.parameters import NoParameters, parameter
+    from teleop_core.planning.reach import Reach, reach
     from teleop_core.recording import Recording, Stream, open_recording
     from teleop_core.robots import (
         Robot,
@@ -73,6 +74,7 @@ _PLACES = {
     "kernels": ("kernel",),
     "operators": ("Operator", "following", "register_operator"),
     "parameters": ("NoParameters", "parameter"),
+    "planning.reach": ("Reach", "reach"),
     "recording": ("Recording", "Stream", "open_recording"),
     "robots": ("Robot", "list_robots", "load_robot", "register_robot", "robot_from_table"),
     "robots.parameters": ("RobotParameters",),
@@ -94,6 +96,7 @@ __all__ = [
     "Operator",
     "ParameterError",
     "PartError",
+    "Reach",
     "Recording",
     "RecordingError",
     "Robot",
@@ -115,6 +118,7 @@ __all__ = [
     "load_robot",
     "open_recording",
     "parameter",
+    "reach",
     "register_controller",
     "register_fixture",
     "register_metric",

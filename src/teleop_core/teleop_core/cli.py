@@ -9,7 +9,7 @@ import warnings
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.commands import exchange
+from teleop_core.commands import exchange, reach
 from teleop_core.commands.arguments import (
     command,
     configured,
@@ -92,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     for add in (_add_sim, _add_live, _add_replay, _add_play, _add_evaluate, _add_lookups):
         add(commands)
     exchange.add(commands)
+    reach.add(commands)
     return parser
 
 

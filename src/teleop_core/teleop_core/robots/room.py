@@ -126,6 +126,23 @@ def start_posture(robot: Robot) -> Array:
     return np.asarray(good[int(away.argmin())])
 
 
+def roomy_postures(robot: Robot, count: int) -> Array:
+    """Postures with room all around, the start first, then those looked at with the most room.
+
+    Args:
+        robot: The arm.
+        count: How many are wanted, at most.
+
+    Returns:
+        (k, n) [rad, m], k at least 1: those from which the tip can go nowhere are left out.
+    """
+    spread = samples(robot)
+    steps = np.minimum(*_steps(robot, spread))
+    order = np.argsort(-steps, kind="stable")
+    wide = spread[order[steps[order] > 0.0]]
+    return np.vstack((robot.start, wide[: count - 1]))
+
+
 def _steps(robot: Robot, postures: Array) -> tuple[Array, Array]:
     """Steps (N,) that every posture has in its worst direction: of moving, of turning; or inf."""
     mask = np.array(robot.task_mask)

@@ -1,0 +1,87 @@
+"""Asked path: what the hand of a recording did, sample by sample."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.bags.reader import Bag
+from teleop_core.errors import RecordingError
+from teleop_core.geometry import Array
+from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+
+STRETCHES = 10
+"""Stretches of a long path that stand for the whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class AskedPath:
+    """Motion of a hand.
+
+    Attributes:
+        name: What it is called in tables.
+        stamp_ns: Stamps (N,) [ns], rising.
+        poses: Poses (N, 7) of the master: position [m], quaternion w, x, y, z.
+        buttons: Clutch, fixture, mode (N, 3): 1 pressed.
+    """
+
+    name: str
+    stamp_ns: NDArray[np.int64]
+    poses: Array
+    buttons: Array
+
+    def __len__(self) -> int:
+        return len(self.stamp_ns)
+
+    @property
+    def time(self) -> Array:
+        """Times (N,) [s] since the first sample."""
+        return np.asarray((self.stamp_ns - self.stamp_ns[0]) * 1e-9, dtype=np.float64)
+
+    def limited(self, count: int) -> "AskedPath":
+        """The same path with about ``count`` samples at most, evenly spread over the time."""
+        return self if len(self) <= count else self.excerpt(count / self.time[-1], 2 * count)
+
+    def excerpt(self, rate: float, count: int) -> "AskedPath":
+        """Fewer samples of the same motion.
+
+        At most ``rate`` samples a second are kept, and all at which a button changes. Of a path
+        that has more than ``count`` of these, ten stretches are, with the times between them.
+
+        Args:
+            rate: Samples per second.
+            count: Most samples, but for those of buttons.
+        """
+        slots = np.floor(self.time * rate)
+        is_kept = np.append(True, np.diff(slots) > 0.0)
+        changes = np.flatnonzero((np.diff(self.buttons, axis=0) != 0.0).any(axis=1))
+        is_kept[changes] = is_kept[changes + 1] = True
+        kept = np.flatnonzero(is_kept)
+        if len(kept) > count:
+            begins = np.linspace(0, len(kept) - count // STRETCHES, STRETCHES).astype(np.int64)
+            kept = kept[np.concatenate([b + np.arange(count // STRETCHES) for b in begins])]
+        return AskedPath(self.name, self.stamp_ns[kept], self.poses[kept], self.buttons[kept])
+
+
+def asked_path(bag: Bag) -> AskedPath:
+    """What the hand of a recording did.
+
+    Args:
+        bag: Recording with ``master/measured_cp`` and, if it has them, ``master/buttons``.
+
+    Raises:
+        RecordingError: It has no such pose, or fewer than two at different times.
+    """
+    bag.require((MASTER_MEASURED_CP,))
+    series = bag.read(MASTER_MEASURED_CP)
+    stamps, first = np.unique(series.stamp_ns, return_index=True)
+    if len(stamps) < 2:
+        raise RecordingError(bag.path, "holds no motion: fewer than two poses of the master")
+    poses = np.ascontiguousarray(series.values[first])
+    buttons = np.zeros((len(stamps), 3))
+    if MASTER_BUTTONS.name in bag.topics and bag.topics[MASTER_BUTTONS.name].count:
+        pressed = bag.read(MASTER_BUTTONS)
+        at = np.searchsorted(pressed.stamp_ns, stamps, side="right") - 1
+        buttons[at >= 0] = pressed.values[at[at >= 0]]
+    later_ns = max(0, 1 - int(stamps[0]))  # stamps of sessions are positive
+    return AskedPath(bag.path.name, stamps + later_ns, poses, buttons)

@@ -1,0 +1,72 @@
+"""Placement: where a slave starts, and how the hand's motion is turned and scaled for it."""
+
+from dataclasses import dataclass
+
+import yaml
+
+from teleop_core.mapping.motion_scaling import MotionScalingParameters
+
+Setting = float | list[float] | list[str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placement:
+    """How a slave is put to a hand's motion.
+
+    Attributes:
+        start: Joints (n,) [rad, m] from which the slave follows: ``slave_sim.start``.
+        axes: The slave's x, y, z as axes of the master: ``motion_scaling.axes``.
+        coarse_gain: Slave motion per hand motion in coarse mode.
+        fine_gain: The same in fine mode.
+        rotation_gain: Share of the stylus' turn that the tool makes.
+    """
+
+    start: tuple[float, ...]
+    axes: tuple[str, ...]
+    coarse_gain: float
+    fine_gain: float
+    rotation_gain: float
+
+    @staticmethod
+    def of(parameters: MotionScalingParameters, start: tuple[float, ...]) -> "Placement":
+        """Placement that parameters of motion scaling and a start make."""
+        return Placement(
+            start=start,
+            axes=parameters.axes,
+            coarse_gain=parameters.coarse_gain,
+            fine_gain=parameters.fine_gain,
+            rotation_gain=parameters.rotation_gain,
+        )
+
+    def settings(self, arm: str = "") -> dict[str, Setting]:
+        """Parameters by name, as ``settings=`` of sessions takes them.
+
+        Args:
+            arm: Namespace of the arm that they are for; empty for the default one.
+        """
+        prefix = f"{arm}/" if arm else ""
+        return {
+            f"{prefix}slave_sim.start": list(self.start),
+            f"{prefix}motion_scaling.axes": list(self.axes),
+            f"{prefix}motion_scaling.coarse_gain": self.coarse_gain,
+            f"{prefix}motion_scaling.fine_gain": self.fine_gain,
+            f"{prefix}motion_scaling.rotation_gain": self.rotation_gain,
+        }
+
+    def texts(self, arm: str = "") -> list[str]:
+        """The same as ``key=value`` for ``--set``; no value holds blanks."""
+        return [f"{name}={_text(value)}" for name, value in self.settings(arm).items()]
+
+    def parameter_file(self, arm: str = "") -> str:
+        """The same as a ROS 2 parameter file, which ``--config`` takes."""
+        stages: dict[str, dict[str, dict[str, Setting]]] = {}
+        for name, value in self.settings(arm).items():
+            stage, _, parameter = name.partition(".")
+            stages.setdefault(stage, {"ros__parameters": {}})["ros__parameters"][parameter] = value
+        return yaml.safe_dump(stages, sort_keys=False, default_flow_style=None)
+
+
+def _text(value: Setting) -> str:
+    if not isinstance(value, list):
+        return f"{value:.6g}"
+    return "[" + ",".join(v if isinstance(v, str) else f"{v:.6g}" for v in value) + "]"
