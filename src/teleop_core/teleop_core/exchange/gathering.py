@@ -1,5 +1,6 @@
 """Gathering: one pass over a source, its rows spooled, its times and what is missing kept."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -10,8 +11,10 @@ from teleop_core.errors import RecordingError
 from teleop_core.exchange.options import LENGTHS, ImportOptions
 from teleop_core.exchange.source import Presses, Source
 from teleop_core.exchange.spool import Spool
-from teleop_core.exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, nanoseconds
+from teleop_core.exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, joined_ns
 
+SAMPLE = 1000
+"""Times of a block, and blocks, from which the unit is guessed."""
 MOST_STRANGE = 0.01
 """Share of rows whose orientation may be none before the file is refused."""
 _NO_TIME = np.iinfo(np.int64).min
@@ -125,32 +128,30 @@ def _stamps(
     if parts.logs and options.stamps == "log":
         told.append("stamps: time of recording")
         return np.concatenate(parts.logs), usable, True
-    raw = _joined(parts.times)
-    has_time = np.isfinite(raw)
-    if not has_time.any():
+    known = [part[np.isfinite(part)] for part in parts.times]
+    first = next((float(part[0]) for part in known if len(part)), math.nan)
+    if math.isnan(first):
         raise RecordingError(source.path, "the column of the time holds no numbers")
-    if is_constant(raw[has_time]):
+    if all((part == first).all() for part in known) and len(usable) > 1:
         if not parts.logs:
-            value = raw[has_time][0]
-            reason = f"the time is {value:g} in every row; choose another --time, or give --rate HZ"
+            reason = f"the time is {first:g} in every row; choose another --time, or give --rate HZ"
             raise RecordingError(source.path, reason)
-        told.append(f"header stamps are all {raw[has_time][0] / SECOND_NS:g} s: "
+        told.append(f"header stamps are all {first / SECOND_NS:g} s: "
                     "the time of recording is taken")  # fmt: skip
         return np.concatenate(parts.logs), usable, True
     unit = source.time_unit
     if unit == "auto":
-        unit, reason = guessed_unit(raw[has_time])
+        unit, reason = guessed_unit(_few(known))
         told.append(f"times in {unit}" + (f" ({reason})" if reason else ""))
-    stamps = np.full(len(raw), _NO_TIME)
-    stamps[has_time] = nanoseconds(raw[has_time], unit)
-    return stamps, usable & has_time, False
+    del known
+    stamps = joined_ns(parts.times, unit, _NO_TIME)
+    usable &= stamps != _NO_TIME
+    return stamps, usable, False
 
 
-def _joined(parts: list[NDArray[np.float64] | Stamps]) -> NDArray[np.float64] | Stamps:
-    """All times; whole numbers if all blocks have such."""
-    if all(part.dtype.kind == "i" for part in parts):
-        return np.concatenate(parts, dtype=np.int64)
-    return np.concatenate(parts, dtype=np.float64)
+def _few(parts: list[NDArray[np.float64] | Stamps]) -> NDArray[np.float64]:
+    """Some of the times, in order."""
+    return np.concatenate([part[:SAMPLE] for part in parts[:SAMPLE]], dtype=np.float64)
 
 
 def bridge(gathered: Gathered, longest_ns: int) -> int:

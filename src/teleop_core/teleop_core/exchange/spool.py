@@ -35,7 +35,7 @@ class Spool:
         data = self._file.read((end - begin) * self._size)
         return np.frombuffer(data, np.float64).reshape(-1, self.width).copy()
 
-    def chosen(self, numbers: NDArray[np.int64]) -> Array:
+    def chosen(self, numbers: NDArray[np.int32] | NDArray[np.int64]) -> Array:
         """Rows of these numbers, in their order."""
         if not len(numbers):
             return np.empty((0, self.width))

@@ -99,7 +99,8 @@ class ParquetTable:
     def __init__(self, path: Path) -> None:
         self.path, self.is_named, self.bad_rows = path, True, 0
         try:
-            self._file = pq.ParquetFile(path)
+            # Read as it is asked for: a file may be one single group of rows.
+            self._file = pq.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20)
         except (pa.ArrowInvalid, OSError) as error:
             raise RecordingError(path, f"is no sound Parquet file: {first_line(error)}") from error
         self._first = self._head()

@@ -110,7 +110,7 @@ class TextTable:
         form = self._form
         names = [f"c{i}" for i in range(form.width)]
         read = pc.ReadOptions(
-            column_names=names, skip_rows=form.head, encoding=self._encoding, block_size=1 << 22
+            column_names=names, skip_rows=form.head, encoding=self._encoding, block_size=1 << 20
         )
         parse = pc.ParseOptions(delimiter=form.separator, invalid_row_handler=self._bad_row)
         wanted = list(dict.fromkeys(names[column] for column in columns))

@@ -51,6 +51,20 @@ def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
     return Unit(best, f"that makes {rate:.4g} Hz")
 
 
+def joined_ns(parts: list[NDArray[np.float64] | Stamps], unit: str, without: int) -> Stamps:
+    """Times of all blocks [ns], with a number for those that are none; empties the list."""
+    out = np.empty(sum(map(len, parts)), np.int64)
+    end = len(out)
+    while parts:
+        raw = parts.pop()
+        begin = end - len(raw)
+        known = np.isfinite(raw)
+        out[begin:end] = nanoseconds(np.where(known, raw, 0), unit)
+        out[begin:end][~known] = without
+        end = begin
+    return out
+
+
 def nanoseconds(raw: NDArray[np.float64] | Stamps, unit: str) -> Stamps:
     """Times in nanoseconds; whole numbers keep all digits."""
     if raw.dtype.kind == "i":
@@ -71,7 +85,7 @@ class Order:
         backwards: How many had a time before that of an earlier row.
     """
 
-    rows: Stamps
+    rows: NDArray[np.int32]
     doubled: int
     backwards: int
 
@@ -83,14 +97,16 @@ def ordered(stamps: Stamps, *, is_sorted: bool = False) -> Order:
         stamps: Times (N,) [ns] in the order of the file.
         is_sorted: Whether rows that go back are sorted in.
     """
-    newest = np.maximum.accumulate(stamps) if len(stamps) else stamps
+    if (stamps[1:] > stamps[:-1]).all():
+        return Order(np.arange(len(stamps), dtype=np.int32), 0, 0)
+    newest = np.maximum.accumulate(stamps)
     back = np.zeros(len(stamps), np.bool_)
     back[1:] = stamps[1:] < newest[:-1]
     rows = np.argsort(stamps, kind="stable") if is_sorted else np.flatnonzero(~back)
     rising = stamps[rows]
     first = np.ones(len(rows), np.bool_)
     first[1:] = rising[1:] > rising[:-1]
-    return Order(rows[first], int((~first).sum()), int(back.sum()))
+    return Order(rows[first].astype(np.int32), int((~first).sum()), int(back.sum()))
 
 
 def gaps(stamps: Stamps, periods: float) -> tuple[tuple[float, float], ...]:
