@@ -10,7 +10,7 @@ from teleop_core.evaluation.accumulators import Distribution, Moments
 from teleop_core.evaluation.pairing import NONE, latest, same_stamp, same_tick
 from teleop_core.evaluation.pose_errors import pose_errors
 from teleop_core.evaluation.published import COARSE, FINE, published_for
-from teleop_core.evaluation.traces import BUCKETS, PATH_POINTS, Envelope, Thinned
+from teleop_core.evaluation.traces import BUCKETS, SAMPLES, Envelope, spacing_s
 from teleop_core.geometry import rotations_from_quaternions
 from teleop_core.robots import load_robot
 
@@ -284,45 +284,46 @@ def test_another_robot_is_not_held_against_the_published_figures():
 # -- drawing ---------------------------------------------------------------------------------------
 
 
-def test_envelope_keeps_every_peak():
-    rng = np.random.default_rng(8)
-    times = np.arange(100_000) * MS
-    values = rng.normal(size=(100_000, 2))
-    values[43_210, 0], values[98_765, 1] = 50.0, -60.0
+def test_envelope_of_ten_minutes_is_the_recording():
+    times = np.arange(600_000) * MS
+    values = np.random.default_rng(8).normal(size=(600_000, 2)).astype(np.float32)
     envelope = Envelope(0, int(times[-1]), 2)
-    for part in np.array_split(np.arange(100_000), 9):
+    for part in np.array_split(np.arange(600_000), 9):
+        envelope.add(times[part], values[part])
+    seconds, line = envelope.line()
+    assert (line == values).all()
+    assert np.allclose(seconds, np.arange(600_000) * 1e-3, rtol=0, atol=1e-9)
+
+
+def test_envelope_of_a_longer_recording_keeps_every_peak():
+    count = SAMPLES + 100_000
+    rng = np.random.default_rng(8)
+    times = np.arange(count) * MS
+    values = rng.normal(size=(count, 2))
+    values[43_210, 0], values[count - 10, 1] = 50.0, -60.0
+    envelope = Envelope(0, int(times[-1]), 2)
+    for part in np.array_split(np.arange(count), 9):
         envelope.add(times[part], values[part])
     seconds, line = envelope.line()
     assert len(line) <= 2 * BUCKETS
     assert (np.diff(seconds) > 0).all()
     assert line[:, 0].max() == 50.0
     assert line[:, 1].min() == -60.0
-    assert abs(seconds[line[:, 0].argmax()] - 43.21) <= 100.0 / BUCKETS
-
-
-def test_envelope_of_a_short_recording_is_the_recording():
-    times = np.array([0, 500, 1000]) * MS
-    envelope = Envelope(0, 1000 * MS, 1)
-    envelope.add(times, np.array([[1.0], [3.0], [2.0]]))
-    _, line = envelope.line()
-    assert line.ravel().tolist() == [1.0, 1.0, 3.0, 3.0, 2.0, 2.0]
+    length = count * 1e-3
+    assert abs(seconds[line[:, 0].argmax()] - 43.21) <= spacing_s(count, length)
+    assert np.isclose(spacing_s(count, length), length / BUCKETS)
 
 
 def test_envelope_leaves_a_hole_where_one_column_has_no_numbers():
-    times = np.arange(4) * 500 * MS
-    envelope = Envelope(0, 1500 * MS, 2)
-    values = np.array([[1.0, 5.0], [2.0, np.nan], [3.0, 6.0], [np.nan, np.nan]])
-    envelope.add(times, values)
-    _, line = envelope.line()
-    assert np.array_equal(line[::2, 1], [5.0, np.nan, 6.0], equal_nan=True)
-    assert line[::2, 0].tolist() == [1.0, 2.0, 3.0]
-
-
-def test_thinning_takes_every_nth_row_wherever_it_is_cut():
-    rows = np.arange(3 * PATH_POINTS, dtype=float)[:, None]
-    whole, parts = Thinned(len(rows)), Thinned(len(rows))
-    whole.add(rows)
-    for part in np.array_split(rows, 13):
-        parts.add(part)
-    assert (whole.rows() == parts.rows()).all()
-    assert (whole.rows()[:, 0] == np.arange(0, 3 * PATH_POINTS, 3)).all()
+    count = SAMPLES + 4
+    values = np.random.default_rng(5).normal(size=(count, 2))
+    values[1000:2000, 1] = np.nan
+    times = np.arange(count) * MS
+    for samples in (slice(0, 5000), slice(None)):  # as they are, and in stretches
+        envelope = Envelope(0, int(times[samples][-1]), 2)
+        envelope.add(times[samples], values[samples])
+        seconds, line = envelope.line()
+        is_hole = (seconds > 1.01) & (seconds < 1.99)
+        assert np.isnan(line[is_hole, 1]).all()
+        assert np.isfinite(line[is_hole, 0]).all()
+        assert np.isfinite(line[(seconds < 0.99) | (seconds > 2.01)]).all()

@@ -5,22 +5,25 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from teleop_core.geometry import Array
+Numbers = NDArray[np.floating[Any]]
 
 COMMAND, REFERENCE, MEASURED, FIXTURE = "#8a94a0", "#9ed0fb", "#c2370a", "#2b8a3e"
 # Three curves that must be told apart, also without seeing red or green (Okabe and Ito 2008).
 FIRST, SECOND, THIRD = "#0072b2", "#009e73", "#cc79a7"
 DARK = "#343a40"
 DRAWN_FIXTURES = 4
+SURROUNDING = "#ced4da"
+_TIME = "time"
 
 
 @dataclass(frozen=True, eq=False)
 class Figure:
     """A plot: what it is, one sentence on what one sees, and plotly.js' traces and layout.
 
-    Arrays among the traces stand as they are; the page encodes them. Without traces it is a line of
-    text.
+    Arrays among the traces stand as they are, with every sample; the page packs them, and draws as
+    many points as there are pixels. Without traces it is a line of text.
     """
 
     title: str
@@ -31,7 +34,7 @@ class Figure:
 
 
 def line(
-    x: Array, y: Array, name: str, color: str, width: float, unit: str = "mm"
+    x: Numbers, y: Numbers, name: str, color: str, width: float, unit: str = "mm"
 ) -> dict[str, Any]:
     """Trace of a line in a plane; ``unit`` is that of y."""
     return {
@@ -41,8 +44,40 @@ def line(
 
 
 def time_axis() -> dict[str, Any]:
-    """Axis of time from the start of the recording."""
-    return {"title": {"text": "time [s]"}}
+    """Axis of time from the start of the recording.
+
+    A page links all axes that are made here: they show the same time, zoom down to single samples,
+    and have bands where the slave was held back. The mark is plotly.js' ``uirevision``.
+    """
+    return {"title": {"text": "time [s]"}, "uirevision": _TIME}
+
+
+def is_against_time(figure: Figure) -> bool:
+    """Whether a plot has an axis of :func:`time_axis`."""
+    axes = (axis for name, axis in figure.layout.items() if name.startswith("xaxis"))
+    return any(isinstance(axis, dict) and axis.get("uirevision") == _TIME for axis in axes)
+
+
+def along(
+    trace: dict[str, Any],
+    times: Numbers,
+    during: Sequence[tuple[float, float]] | None = None,
+    *,
+    colored: bool = False,
+    whole: bool = False,
+) -> dict[str, Any]:
+    """A trace of a path of which a page shows the part within its visible time.
+
+    Args:
+        trace: Line in a plane or in space.
+        times: Time of each of its points, shape (N,), [s].
+        during: Begin and end of the stretches [s] in which it is drawn at all; None for always.
+        colored: Whether its colour tells the time; in space only.
+        whole: Whether all of it stays, as what surrounds the visible part.
+    """  # fmt: skip
+    stretches = None if during is None else [list(stretch) for stretch in during]
+    meta = {"path": True, "during": stretches, "colored": colored, "whole": whole}
+    return {**trace, "customdata": times, "meta": meta}
 
 
 def axis_suffix(row: int) -> str:
@@ -63,7 +98,7 @@ def stacked_axes(names: Sequence[str], unit: str) -> dict[str, Any]:
     return layout
 
 
-def span(values: Array) -> list[float] | None:
+def span(values: Numbers) -> list[float] | None:
     """Range of an axis that shows all values with a margin; None without any."""
     finite = values[np.isfinite(values)]
     if not len(finite):

@@ -1,59 +1,69 @@
 """Page: scores and plots of recordings as one self-contained HTML file."""
 
-import base64
 import json
 from collections.abc import Sequence
+from hashlib import blake2b
 from html import escape
 from typing import Any
 
 import numpy as np
-from plotly.offline import get_plotlyjs
+from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
-from teleop_core.evaluation.figure import Figure
+from teleop_core.evaluation.bands import Band
+from teleop_core.evaluation.figure import Figure, is_against_time
 from teleop_core.evaluation.html_table import html_table
-from teleop_core.evaluation.page_template import PAGE, POLICY, SCRIPT, STYLE
+from teleop_core.evaluation.packing import deflated, pack
+from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
+from teleop_core.evaluation.preview import preview
 from teleop_core.evaluation.published import SOURCE
 from teleop_core.evaluation.score import Score, facts
 from teleop_core.evaluation.scoring import Study
+from teleop_core.evaluation.traces import spacing_s
+
+_BITS = 38_000_000
+"""Room for the curves of a recording: with plotly.js and previews a page stays below 10 MB."""
 
 
 def report_page(studies: Sequence[Study]) -> str:
     """HTML page with the summary of all recordings and the plots of each.
 
-    It works offline and asks for nothing: plotly.js is inside, once. Texts from recordings are
-    escaped.
+    It works offline and asks for nothing: plotly.js is inside, once. All plots against time of a
+    recording show the same time, down to single samples. Texts from recordings are escaped.
     """
-    sections, drawn, arrays = [], [], _Arrays()
+    sections, drawn, arrays = [], [], _Arrays(len(studies))
     for number, study in enumerate(studies):
         plots = study.figures()
         places = [f"plot-{number}-{i}" for i in range(len(plots))]
-        sections.append(_section(f"recording-{number}", study, plots, places))
+        sections.append(_section(number, study, plots, places))
         for place, plot in zip(places, plots, strict=True):
             if not plot.traces:
                 continue
             traces = [arrays.named(trace) for trace in plot.traces]
             layout = {**plot.layout, "height": plot.height}
-            drawn.append({"id": place, "traces": traces, "layout": layout})
-    data = json.dumps({"arrays": arrays.texts, "figures": drawn}, allow_nan=False)
+            drawn.append({"id": place, "recording": number, "traces": traces, "layout": layout})
+    recordings = [_recording(study) for study in studies]
+    found = {"recordings": recordings, "arrays": arrays.packed(), "figures": drawn}
+    data = json.dumps(found, allow_nan=False)
     scores = [study.score for study in studies]
+    table = f'<div class="card table">{html_table(scores)}</div>'
     return PAGE.format(
         policy=POLICY,
         title=escape("Teleoperation: " + ", ".join(score.session.title for score in scores)),
-        style=STYLE,
-        body="\n".join(
-            (_header(scores), f'<div class="card">{html_table(scores)}</div>', *sections)
-        ),
+        style=style(),
+        body="\n".join((_header(scores), table, *sections)),
         data=data.replace("<", "\\u003c"),  # nothing inside can end the script element
-        plotly=get_plotlyjs().replace("</script", "<\\/script"),
-        script=SCRIPT,
+        plotly=deflated(get_plotlyjs().encode()),
+        library=f"plotly.js {get_plotlyjs_version()}",
+        script=script(),
     )
 
 
 class _Arrays:
-    """Arrays of a page, each encoded once."""
+    """Arrays of a page, each packed once."""
 
-    def __init__(self) -> None:
-        self.texts: list[str] = []
+    def __init__(self, recordings: int) -> None:
+        self._bits = _BITS * recordings
+        self._arrays: list[np.ndarray[Any, Any]] = []
         self._places: dict[bytes, int] = {}
 
     def named(self, trace: dict[str, Any]) -> dict[str, Any]:
@@ -63,12 +73,38 @@ class _Arrays:
             for key, value in trace.items()
         }
 
+    def packed(self) -> list[dict[str, Any]]:
+        """All arrays, as fine as the page has room."""
+        count = sum(len(array) for array in self._arrays)
+        return [vars(pack(array, self._bits / max(count, 1))) for array in self._arrays]
+
     def _place(self, array: "np.ndarray[Any, Any]") -> int:
-        data = array.astype("<f4").tobytes()
-        if data not in self._places:
-            self._places[data] = len(self.texts)
-            self.texts.append(base64.b64encode(data).decode("ascii"))
-        return self._places[data]
+        data = np.ascontiguousarray(array).data
+        name = blake2b(data, person=array.dtype.str.encode()).digest()
+        if name not in self._places:
+            self._places[name] = len(self._arrays)
+            self._arrays.append(array)
+        return self._places[name]
+
+
+def _recording(study: Study) -> dict[str, Any]:
+    """What all plots of a recording share."""
+    bands = [
+        {
+            "cause": band.cause,
+            "color": band.color,
+            "stretches": np.round(band.stretches, 6).tolist(),
+        }
+        for band in study.bands
+    ]
+    duration_s = study.score.session.duration_s
+    return {"duration": duration_s, "bands": bands, "kept": _kept_s(study.score)}
+
+
+def _kept_s(score: Score) -> float:
+    """Time [s] of which the page keeps extremes only; 0 where it keeps all samples."""
+    samples = max((topic.count for topic in score.topics.values()), default=0)
+    return spacing_s(samples, score.session.duration_s)
 
 
 def _header(scores: Sequence[Score]) -> str:
@@ -84,21 +120,35 @@ def _header(scores: Sequence[Score]) -> str:
     )
 
 
-def _section(anchor: str, study: Study, plots: list[Figure], places: list[str]) -> str:
+def _section(number: int, study: Study, plots: list[Figure], places: list[str]) -> str:
     session = study.score.session
-    cards = map(_card, plots, places)
-    told = escape(" · ".join(facts(session)))
-    head = f'<h2 id="{anchor}">{escape(session.place)}</h2><p class="facts">{told}'
-    return "\n".join((f"<section>{head}</p>", *cards, "</section>"))
+    cards = [_card(plot, place, study.bands) for plot, place in zip(plots, places, strict=True)]
+    told = list(facts(session))
+    if kept_s := _kept_s(study.score):
+        told.append(f"plots hold the smallest and largest value of each {kept_s * 1e3:.3g} ms")
+    head = f'<h2 id="recording-{number}">{escape(session.place)}</h2>'
+    head += f'<p class="facts">{escape(" · ".join(told))}</p>{_legend(study.bands)}'
+    if any(map(is_against_time, plots)):
+        head += TIMES.format(place=f"times-{number}", duration=f"{session.duration_s:.1f}")
+    return "\n".join((f"<section>{head}", *cards, "</section>"))
 
 
-def _card(plot: Figure, place: str) -> str:
-    """Place of a plot, or its text if there is nothing to draw."""
+def _legend(bands: Sequence[Band]) -> str:
+    """What the bands mean, and their share of the time."""
+    entries = "".join(
+        f'<span><i style="background:{escape(band.color)}"></i>{escape(band.cause)} '
+        f"{100.0 * band.share:.1f} %</span>"
+        for band in bands
+    )
+    return f'<p class="bands">{entries}</p>' if entries else ""
+
+
+def _card(plot: Figure, place: str, bands: Sequence[Band]) -> str:
+    """Place of a plot with its sketch, or its text if there is nothing to draw."""
     title, sentence = escape(plot.title), escape(plot.sentence)
     if not plot.traces:
         return f'<p class="facts">{title}: {sentence}</p>'
     return (
-        f'<figure class="card" style="margin-inline:0"><h3>{title}</h3>'
-        f"<figcaption>{sentence}</figcaption>"
-        f'<div id="{place}" style="height:{plot.height}px"></div></figure>'
+        f'<figure class="card"><h3>{title}</h3><figcaption>{sentence}</figcaption>'
+        f'<div id="{place}" class="plot">{preview(plot, bands)}</div></figure>'
     )

@@ -9,6 +9,7 @@ import numpy as np
 from teleop_core.bags.arms import arm_names, of_arm
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import EvaluationError, PartError, RecordingError
+from teleop_core.evaluation.bands import Band, bands_of
 from teleop_core.evaluation.context import Accumulator, Context
 from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.gains import Gains
@@ -27,10 +28,11 @@ REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
 
 
 class Study(NamedTuple):
-    """A score, and the metrics that a page asks for what it draws."""
+    """A score, the metrics that a page asks for what it draws, and when the slave was held back."""
 
     score: Score
     metrics: tuple[Metric, ...]
+    bands: tuple[Band, ...]
 
     def figures(self) -> list[Figure]:
         """Plots in the order of the metrics.
@@ -82,7 +84,7 @@ def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = ()) -> Stud
             f"{bag.path}: no {SLAVE_MEASURED_CP.name}{f' of arm {arm}' * bool(arm)} has a valid "
             f"{SLAVE_SETPOINT_CP.name} of the same tick; they must be recorded together"
         )
-    return Study(score, tuple(metrics))
+    return Study(score, tuple(metrics), bands_of(context))
 
 
 def studies(bag: Bag, further: Sequence[type[Metric]] = ()) -> list[Study]:

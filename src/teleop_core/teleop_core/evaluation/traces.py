@@ -1,35 +1,86 @@
-"""Traces: what a page draws of a recording, thinned while it is read."""
+"""Traces: the curves that a page draws of a recording, kept while it is read."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.geometry import Array
 
-BUCKETS = 1500
-"""Stretches of time with a smallest and a largest value each: about one per pixel."""
-PATH_POINTS = 5000
-"""Points of a path in space."""
+SAMPLES = 660_000
+"""Samples that are kept of a stream as they are: eleven minutes at 1 kHz."""
+BUCKETS = SAMPLES // 2
+"""Stretches of a longer recording, with a smallest and a largest value each."""
 _SECOND_NS = 1e9
+Rows = NDArray[np.float32]
+
+
+def spacing_s(samples: int, duration_s: float) -> float:
+    """Time [s] of which a page keeps the smallest and largest value; 0 where it keeps all samples.
+
+    Args:
+        samples: Samples of the stream in the recording.
+        duration_s: Length of the recording, [s].
+    """
+    return duration_s / BUCKETS if samples > SAMPLES else 0.0
 
 
 class Envelope:
-    """Smallest and largest value of each column per stretch of time, so that peaks survive.
+    """Columns against time: every sample, as long as there are no more than :data:`SAMPLES`.
+
+    Of a longer recording it keeps the smallest and largest value of each column in each of
+    :data:`BUCKETS` stretches of time, so that peaks survive and memory does not grow.
 
     Args:
-        start_ns: Where the first stretch begins, [ns].
-        end_ns: Where the last one ends, [ns].
+        start_ns: Where the recording begins, [ns].
+        end_ns: Where it ends, [ns].
         columns: Number of columns.
     """
 
     def __init__(self, start_ns: int, end_ns: int, columns: int) -> None:
-        self._start_ns, self._length_ns = start_ns, max(1, end_ns - start_ns + 1)
-        self._lowest = np.full((BUCKETS, columns), np.inf)
-        self._highest = np.full((BUCKETS, columns), -np.inf)
+        self._start_ns, self._end_ns, self._columns = start_ns, end_ns, columns
+        self._parts: list[tuple[Integers, Rows]] = []
+        self._count = 0
+        self._buckets: _Buckets | None = None
 
     def add(self, time_ns: Integers, values: Array) -> None:
         """Take samples: times (N,) in order [ns], values (N, columns); NaN is left out."""
         if not len(time_ns):
             return
+        rows = values.astype(np.float32)
+        if self._buckets is not None:
+            self._buckets.add(time_ns, rows)
+            return
+        self._parts.append((time_ns.copy(), rows))
+        self._count += len(time_ns)
+        if self._count > SAMPLES:
+            self._buckets = _Buckets(self._start_ns, self._end_ns, self._columns)
+            for part in self._parts:
+                self._buckets.add(*part)
+            self._parts.clear()
+
+    def line(self) -> tuple[Array, Array]:
+        """Times (M,) [s] from the start and values (M, columns), through all samples or extremes.
+
+        Each stretch of a long recording gives two points, in the order in which the line rises or
+        falls there.
+        """
+        if self._buckets is not None:
+            return self._buckets.line()
+        if not self._parts:
+            return np.empty(0), np.empty((0, self._columns))
+        times, rows = (np.concatenate(column) for column in zip(*self._parts, strict=True))
+        return (times - self._start_ns) / _SECOND_NS, rows
+
+
+class _Buckets:
+    """Smallest and largest value of each column per stretch of time."""
+
+    def __init__(self, start_ns: int, end_ns: int, columns: int) -> None:
+        self._start_ns, self._length_ns = start_ns, max(1, end_ns - start_ns + 1)
+        self._lowest = np.full((BUCKETS, columns), np.inf, np.float32)
+        self._highest = np.full((BUCKETS, columns), -np.inf, np.float32)
+
+    def add(self, time_ns: Integers, values: Rows) -> None:
         elapsed = (time_ns - self._start_ns) / self._length_ns
         bucket = np.clip((elapsed * BUCKETS).astype(np.int64), 0, BUCKETS - 1)
         begins = np.flatnonzero(np.diff(bucket, prepend=-1))
@@ -39,15 +90,9 @@ class Envelope:
         self._highest[at] = np.fmax(self._highest[at], high)
 
     def line(self) -> tuple[Array, Array]:
-        """Times (M,) [s] from the start and values (M, columns) of lines through all extremes.
-
-        Each stretch gives two points, in the order in which the line rises or falls there.
-        """
         width = self._length_ns / BUCKETS / _SECOND_NS
         is_full = np.isfinite(self._lowest).any(axis=1)
         low, high = self._lowest[is_full], self._highest[is_full]
-        if not len(low):
-            return np.empty(0), np.empty((0, low.shape[1]))
         is_known = np.isfinite(low)
         middle = np.where(is_known, 0.5 * (low + np.where(is_known, high, 0.0)), 0.0)
         low, high = np.where(is_known, low, np.nan), np.where(is_known, high, np.nan)
@@ -55,21 +100,3 @@ class Envelope:
         pairs: Array = np.stack((np.where(rises, low, high), np.where(rises, high, low)), axis=1)
         times = (np.flatnonzero(is_full)[:, None] + np.array([0.25, 0.75])) * width
         return times.ravel(), pairs.reshape(-1, low.shape[1])
-
-
-class Thinned:
-    """Every n-th row of a stream, at most :data:`PATH_POINTS` of the expected number."""
-
-    def __init__(self, expected: int) -> None:
-        self.every = max(1, -(-expected // PATH_POINTS))
-        self._seen = 0
-        self._parts: list[Array] = []
-
-    def add(self, rows: Array) -> None:
-        """Take rows, shape (N, columns)."""
-        self._parts.append(rows[-self._seen % self.every :: self.every].astype(np.float32))
-        self._seen += len(rows)
-
-    def rows(self) -> Array:
-        """Rows that were kept, shape (M, columns)."""
-        return np.concatenate(self._parts) if self._parts else np.empty((0, 0))

@@ -1,17 +1,21 @@
 """Path: where the tip went, in space, per plane and against time; drawn only."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.density import is_long, time_spent
 from teleop_core.evaluation.figure import (
     COMMAND,
     DRAWN_FIXTURES,
     FIXTURE,
     MEASURED,
     REFERENCE,
+    SURROUNDING,
     Figure,
+    Numbers,
+    along,
     axis_suffix,
     line,
     span,
@@ -23,14 +27,35 @@ from teleop_core.evaluation.metrics.position_error import PositionErrorMetric
 from teleop_core.evaluation.outlines import Outline, kinds_of, largest, outlines_of
 from teleop_core.evaluation.plain import Values
 from teleop_core.evaluation.rows import Row, number
-from teleop_core.evaluation.traces import Envelope, Thinned
+from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.tracking import TRACKED, tracked
 from teleop_core.evaluation.windows import Window
-from teleop_core.geometry import Array
-from teleop_core.topics import SLAVE_MEASURED_CP
+from teleop_core.signals import STATE
 
 _PLANES = ((0, 1), (0, 2), (1, 2))
-_CAMERA = {"eye": {"x": 1.25, "y": -1.52, "z": 0.76}, "center": {"x": 0, "y": 0, "z": -0.1}}
+_TIME_BAR = {
+    "title": {"text": "measured, time [s]", "side": "top"}, "orientation": "h", "thickness": 8,
+    "len": 0.5, "y": 0.0, "yanchor": "bottom",
+}  # fmt: skip
+_CAMERA = {"eye": {"x": 1.4, "y": -1.7, "z": 0.85}, "center": {"x": 0, "y": 0, "z": -0.1}}
+
+
+class _Path(NamedTuple):
+    """Where reference and tip were: times (N,) [s], points (N, 3) [mm], and when they are drawn."""
+
+    times: Numbers
+    reference: Numbers
+    measured: Numbers
+    during: list[tuple[float, float]] | None
+
+    @property
+    def shown(self) -> Numbers:
+        """Measured points of the time that is drawn, NaN elsewhere, shape (N, 3)."""
+        if self.during is None:
+            return self.measured
+        ends = np.array(self.during).ravel()
+        is_shown = np.searchsorted(ends, self.times, side="right") % 2 == 1
+        return np.where(is_shown[:, None], self.measured, np.nan)
 
 
 class PathMetric(Metric):
@@ -45,8 +70,6 @@ class PathMetric(Metric):
         self._fixture = context.shared(FixtureMetric)
         # x, y, z of command, setpoint and measured, [mm].
         self._position = Envelope(context.bag.start_ns, context.bag.end_ns, columns=9)
-        # Setpoint x, y, z and measured x, y, z [mm], and whether a fixture was on.
-        self._path = Thinned(context.expected(SLAVE_MEASURED_CP))
 
     def add(self, window: Window) -> None:
         """Take one window."""
@@ -54,8 +77,6 @@ class PathMetric(Metric):
         poses = (found.commands, found.setpoints, found.poses)
         rows = np.concatenate([pose[:, :3] for pose in poses], axis=1) * 1e3
         self._position.add(found.log_ns, rows)
-        is_on = window.states(SLAVE_MEASURED_CP).column("is_fixture_on")[:, None]
-        self._path.add(np.concatenate((rows[:, 3:], is_on), axis=1))
 
     def values(self) -> Values:
         """Nothing: it only draws."""
@@ -68,19 +89,18 @@ class PathMetric(Metric):
     def figures(self) -> list[Figure]:
         """Paths in space and per plane, and positions against time."""
         outlines = outlines_of(self._context)
-        reference, measured = self._paths()
+        path = self._path(outlines)
         return [
-            _in_space(reference, measured, outlines, self._sentence(outlines)),
-            _in_planes(reference, measured, outlines),
+            _in_space(path, outlines, self._sentence(outlines)),
+            _in_planes(path, outlines),
             self._against_time(outlines),
         ]
 
-    def _paths(self) -> tuple[Array, Array]:
-        """Setpoint and measured points (N, 3) [mm] with a fixture on, or all if none ever was."""
-        rows = self._path.rows()
-        if rows[:, 6].any():
-            rows = np.where(rows[:, 6:] > 0.0, rows, np.nan)
-        return rows[:, :3], rows[:, 3:6]
+    def _path(self, outlines: list[Outline]) -> _Path:
+        """All of it, to be drawn with a fixture on, or always if none ever was."""
+        times, values = self._position.line()
+        during = [(outline.begin_s, outline.end_s) for outline in outlines]
+        return _Path(times, values[:, 3:6], values[:, 6:], _in_a_row(during) or None)
 
     def _sentence(self, outlines: list[Outline]) -> str:
         largest_mm = number(self._error.values().max)
@@ -98,12 +118,9 @@ class PathMetric(Metric):
 
     def _against_time(self, outlines: list[Outline]) -> Figure:
         times, values = self._position.line()
-        begin, end = self._interesting(outlines)
-        is_shown = (times >= begin) & (times <= end)
         layout, shapes, traces = stacked_axes("xyz", "mm"), [], []
         for row in range(3):
             suffix = axis_suffix(row)
-            layout[f"yaxis{suffix}"]["range"] = span(values[is_shown][:, [row + 3, row + 6]])
             traces += [
                 {**trace, "yaxis": f"y{suffix}", "showlegend": row == 0}
                 for trace in (
@@ -115,34 +132,57 @@ class PathMetric(Metric):
             for outline in outlines[:DRAWN_FIXTURES]:
                 shapes += outline.wall_lines(row, suffix)
         layout |= {"shapes": shapes, "hovermode": "x unified"}
-        layout["xaxis"]["range"] = [begin, end]
+        layout["xaxis"]["range"] = self._interesting(outlines)
         sentence = (
             "The reference is the command after the low-pass and lags behind it; the tip stays "
             f"within {number(self._error.values().max)} mm of the reference."
         )
         if outlines:
             sentence += f" Dashed: where the {kinds_of(outlines)} ends."
-            sentence += " Double-click to see the whole recording."
+        sentence += " Drag to zoom, all plots follow; double-click to see the whole recording."
         return Figure("Position against time", sentence, traces, layout, 640)
 
-    def _interesting(self, outlines: list[Outline]) -> tuple[float, float]:
-        """Time [s] that is shown first: with a fixture on, or all if none ever was."""
-        if not outlines:
-            bag = self._context.bag
-            return 0.0, (bag.end_ns - bag.start_ns) / 1e9
-        return outlines[0].begin_s, outlines[-1].end_s
+    def _interesting(self, outlines: list[Outline]) -> list[float]:
+        """Time [s] that is shown first: with a fixture on, or else from when the slave follows."""
+        bag, history = self._context.bag, self._context.history
+        if outlines:
+            return [outlines[0].begin_s, outlines[-1].end_s]
+        follows = history.stamp_ns[history.rows[:, STATE["is_following"]] > 0.0]
+        begin_ns = max(bag.start_ns, int(follows[0])) if len(follows) else bag.start_ns
+        return [(begin_ns - bag.start_ns) * 1e-9, (bag.end_ns - bag.start_ns) * 1e-9]
+
+
+def _in_a_row(stretches: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Stretches of time in order, those that touch as one."""
+    found: list[tuple[float, float]] = []
+    for begin, end in stretches:
+        if found and begin <= found[-1][1]:
+            found[-1] = found[-1][0], max(end, found[-1][1])
+        else:
+            found.append((begin, end))
+    return found
 
 
 def _size(outline: Outline) -> str:
     return " × ".join(f"{side:.3g}" for side in outline.size)
 
 
-def _in_space(reference: Array, measured: Array, outlines: list[Outline], sentence: str) -> Figure:
+def _in_space(path: _Path, outlines: list[Outline], sentence: str) -> Figure:
     """Paths of reference and tip in 3-D, with the fixture."""
+    whole = _line3(path.measured, "whole path", SURROUNDING, 1)
+    reference, measured = (
+        _line3(points, name, color, 4)
+        for points, name, color in (
+            (path.reference, "reference", REFERENCE), (path.measured, "measured", MEASURED)
+        )
+    )  # fmt: skip
+    measured |= {"showlegend": False}  # its colours are told by the bar
+    measured["line"] |= {"colorscale": "Viridis", "showscale": True, "colorbar": _TIME_BAR}
     traces = [
+        {**along(whole, path.times, path.during, whole=True), "opacity": 0.5, "hoverinfo": "skip"},
         # Both lines at once would hide each other in turns.
-        {**_line3(reference, "reference", REFERENCE, 4), "visible": "legendonly"},
-        _line3(measured, "measured", MEASURED, 4),
+        {**along(reference, path.times, path.during), "visible": "legendonly"},
+        along(measured, path.times, path.during, colored=True),
     ]
     named: set[str] = set()
     for outline in largest(outlines):
@@ -150,12 +190,12 @@ def _in_space(reference: Array, measured: Array, outlines: list[Outline], senten
         traces.append(_line3(outline.points, outline.kind, FIXTURE, 3, hidden=is_known))
         named.add(outline.kind)
     axes = {f"{axis}axis": {"title": {"text": f"{axis} [mm]"}} for axis in "xyz"}
-    scene = {**axes, "aspectmode": "data", "camera": _CAMERA}
+    scene = {**axes, "domain": {"y": [0.12, 1.0]}, "aspectmode": "data", "camera": _CAMERA}
     return Figure("Path in space", sentence, traces, {"scene": scene}, 560)
 
 
 def _line3(
-    points: Array, name: str, color: str, width: int, *, hidden: bool = False
+    points: Numbers, name: str, color: str, width: int, *, hidden: bool = False
 ) -> dict[str, Any]:
     x, y, z = points.T
     return {
@@ -166,40 +206,78 @@ def _line3(
     }  # fmt: skip
 
 
-def _in_planes(reference: Array, measured: Array, outlines: list[Outline]) -> Figure:
-    """The same along each axis."""
-    shown = [(o.points, o.kind, FIXTURE, 2.0) for o in largest(outlines)]
-    lines = [
-        (reference, "reference", REFERENCE, 6.0), (measured, "measured", MEASURED, 1.6), *shown
-    ]  # fmt: skip
-    every = np.concatenate([points for points, *_ in lines])
-    ranges = [span(every[:, axis]) for axis in range(3)]
+def _in_planes(path: _Path, outlines: list[Outline]) -> Figure:
+    """The same along each axis; behind it all of the path, or where it spent its time."""
+    shown = path.shown
+    fixtures = largest(outlines)
+    every = np.concatenate([shown, path.reference[np.isfinite(shown[:, 0])],
+                            *(outline.points for outline in fixtures)])  # fmt: skip
+    ranges = [span(every[:, axis]) or [0.0, 1.0] for axis in range(3)]
     traces: list[dict[str, Any]] = []
     layout: dict[str, Any] = {"grid": {"rows": 1, "columns": 3, "pattern": "independent"}}
-    for plot, (across, up) in enumerate(_PLANES, start=1):
+    is_dense = is_long(shown)
+    for plot, (across, up) in enumerate(_PLANES):
+        place = {"xaxis": f"x{axis_suffix(plot)}", "yaxis": f"y{axis_suffix(plot)}"}
+        drawn = [_surroundings(path, shown, across, up, (ranges[across], ranges[up]), is_dense)]
+        drawn += _plane_lines(path, across, up)
+        drawn += [
+            line(outline.points[:, across], outline.points[:, up], outline.kind, FIXTURE, 2.0)
+            for outline in fixtures
+        ]
         named: set[str] = set()
-        for points, name, color, width in lines:
-            has_entry = plot == 1 and name not in named
-            place = {"xaxis": f"x{plot}", "yaxis": f"y{plot}", "showlegend": has_entry}
-            traces.append({**line(points[:, across], points[:, up], name, color, width), **place})
-            named.add(name)
+        for trace in drawn:
+            traces.append(
+                {**trace, **place, "showlegend": plot == 0 and trace["name"] not in named}
+            )
+            named.add(trace["name"])
         layout |= _plane_axes(plot, "xyz"[across], "xyz"[up], ranges[across], ranges[up])
     sentence = (
-        f"The same path seen along each axis{f', in the {kinds_of(outlines)}' * bool(shown)}."
+        f"The same path seen along each axis{f', in the {kinds_of(outlines)}' * bool(fixtures)}."
+        f"{' Dark: where it spent more time.' * is_dense}"
     )
     return Figure("Path per plane", sentence, traces, layout, 420)
+
+
+def _plane_lines(path: _Path, across: int, up: int) -> list[dict[str, Any]]:
+    """Reference and tip seen along an axis."""
+    lines = (
+        (path.reference, "reference", REFERENCE, 6.0), (path.measured, "measured", MEASURED, 1.6)
+    )  # fmt: skip
+    return [
+        along(line(points[:, across], points[:, up], name, color, width), path.times, path.during)
+        for points, name, color, width in lines
+    ]
+
+
+def _surroundings(
+    path: _Path,
+    shown: Numbers,
+    across: int,
+    up: int,
+    ranges: tuple[list[float], list[float]],
+    is_dense: bool,
+) -> dict[str, Any]:
+    """What stays behind the visible part of a path: all of it, or the time it spent anywhere."""
+    if is_dense:
+        duration_s = float(path.times[-1] - path.times[0])
+        sample_s = duration_s / max(1, len(path.times) - 1)
+        return time_spent(shown[:, across], shown[:, up], ranges, sample_s)
+    points = path.measured
+    whole = line(points[:, across], points[:, up], "whole path", SURROUNDING, 1.0)
+    return {**along(whole, path.times, path.during, whole=True), "hoverinfo": "skip"}  # fmt: skip
 
 
 def _plane_axes(
     plot: int, across: str, up: str, width: list[float] | None, height: list[float] | None
 ) -> dict[str, Any]:
     """Two axes of the same scale."""
+    suffix = axis_suffix(plot)
     return {
-        f"xaxis{plot}": {
+        f"xaxis{suffix}": {
             "title": {"text": f"{across} [mm]"}, "constrain": "domain", "range": width,
         },
-        f"yaxis{plot}": {
+        f"yaxis{suffix}": {
             "title": {"text": f"{up} [mm]"}, "constrain": "domain", "range": height,
-            "scaleanchor": f"x{plot}",
+            "scaleanchor": f"x{suffix}",
         },
     }  # fmt: skip

@@ -1,0 +1,138 @@
+"""Headless: a Chromium without a screen, driven through its debugging pipe."""
+
+import base64
+import json
+import os
+import subprocess
+from itertools import count
+
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
+    "--no-first-run", "--disable-background-networking", "--disable-component-update",
+    "--disable-sync", "--disable-extensions", "--hide-scrollbars",
+    "--host-resolver-rules=MAP * ~NOTFOUND", "--remote-debugging-pipe",
+)  # fmt: skip
+
+
+class Headless:
+    """One tab; everything it says on the console is in ``said``."""
+
+    def __init__(self, browser, folder, width=1200, height=900):
+        (read_here, write_there), (read_there, write_here) = os.pipe(), os.pipe()
+
+        def connect():  # Chromium reads descriptor 3 and writes descriptor 4
+            one, other = os.dup(read_there), os.dup(write_there)
+            os.dup2(one, 3)
+            os.dup2(other, 4)
+
+        command = [browser, *FLAGS, f"--user-data-dir={folder / 'profile'}", "about:blank"]
+        self._process = subprocess.Popen(  # its two descriptors have fixed numbers
+            command,
+            preexec_fn=connect,  # noqa: PLW1509
+            close_fds=False,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(read_there)
+        os.close(write_there)
+        self._in, self._out = os.fdopen(read_here, "rb"), os.fdopen(write_here, "wb")
+        self._numbers, self._session, self.said = count(1), None, []
+        targets = self.call("Target.getTargets")["targetInfos"]
+        page = next(target["targetId"] for target in targets if target["type"] == "page")
+        attached = self.call("Target.attachToTarget", targetId=page, flatten=True)
+        self._session = attached["sessionId"]
+        for domain in ("Page", "Runtime"):
+            self.call(f"{domain}.enable")
+        self.resize(width, height)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self._session = None
+        self.call("Browser.close")
+        self._process.wait(30)
+        self._in.close()
+        self._out.close()
+
+    def call(self, method, **parameters):
+        """Answer to a command of the DevTools protocol."""
+        number = next(self._numbers)
+        message = {"id": number, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        self._out.write(json.dumps(message).encode() + b"\0")
+        self._out.flush()
+        while True:
+            answer = json.loads(self._read())
+            if answer.get("id") == number:
+                assert "error" not in answer, f"{method}: {answer['error']}"
+                return answer["result"]
+            self._note(answer)
+
+    def _read(self):
+        data = bytearray()
+        while (byte := self._in.read(1)) != b"\0":
+            assert byte, "the browser has gone"
+            data += byte
+        return data
+
+    def _note(self, event):
+        if event.get("method") == "Runtime.exceptionThrown":
+            details = event["params"]["exceptionDetails"]
+            self.said.append(details.get("exception", {}).get("description", details["text"]))
+        if event.get("method") == "Runtime.consoleAPICalled":
+            texts = [str(a.get("value", a.get("description"))) for a in event["params"]["args"]]
+            self.said.append(" ".join(texts))
+
+    def resize(self, width, height):
+        """Size of the window, [px]."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
+                  deviceScaleFactor=1, mobile=False)  # fmt: skip
+
+    def value(self, script):
+        """Value of an expression in the page; promises are waited for."""
+        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True,
+                           awaitPromise=True)  # fmt: skip
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def open(self, file):
+        """Open a report page and wait until it has drawn everything."""
+        self.call("Page.navigate", url=file.as_uri())
+        self.until(
+            "document.body && (document.body.dataset.finished || document.body.dataset.errors)"
+        )
+
+    def until(self, condition):
+        """Wait until an expression is true."""
+        self.value(
+            "new Promise((done) => { const look = () => "
+            f"({condition}) ? done(true) : setTimeout(look, 20); look(); }})"
+        )
+
+    def settled(self):
+        """Wait until no plot is behind the visible time."""
+        self.until("[...document.querySelectorAll('.times')].every((bar) => !bar.dataset.busy)")
+
+    def mouse(self, kind, x, y, clicks=1):
+        """Move, press or release the left button, in pixels of the window."""
+        button = "none" if kind == "mouseMoved" else "left"
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button,
+                  buttons=int(kind != "mouseReleased"), clickCount=clicks)  # fmt: skip
+
+    def drag(self, begin, end):
+        """Drag from one point to another."""
+        self.mouse("mouseMoved", *begin)
+        self.mouse("mousePressed", *begin)
+        for share in (0.3, 0.7, 1.0):
+            point = [a + share * (b - a) for a, b in zip(begin, end, strict=True)]
+            self.mouse("mouseMoved", *point)
+        self.mouse("mouseReleased", *end)
+
+    def picture(self, file, clip=None):
+        """Screenshot of the page, or of a part of it: left, top, width and height [px]."""
+        size = self.call("Page.getLayoutMetrics")["cssContentSize"]
+        left, top, width, height = clip or (0, 0, size["width"], size["height"])
+        part = {"x": left, "y": top, "width": width, "height": height, "scale": 1}
+        shot = self.call("Page.captureScreenshot", captureBeyondViewport=True, clip=part)
+        file.write_bytes(base64.b64decode(shot["data"]))
