@@ -1,0 +1,183 @@
+"""Motion figures: all numbers of :mod:`~teleop_core.evaluation.motion` of one motion at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.errors import ShapeError
+from teleop_core.evaluation.motion import (
+    IDLE_SPEED,
+    RATE,
+    cut,
+    frequency_holding,
+    log_dimensionless_jerk,
+    median,
+    reversals,
+    share_between,
+    sparc,
+    submovements,
+    turn_rates,
+    velocities,
+    velocity_spectrum,
+)
+from teleop_core.evaluation.motion_samples import MotionSamples, TremorWindows
+from teleop_core.geometry import Array
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class MotionFigures:
+    """How something moved; None where there is too little motion to say.
+
+    Attributes:
+        time_s: Time that was looked at, [s].
+        path_mm: Way, [mm].
+        speed_median_mm_s: Median speed, [mm/s].
+        speed_p95_mm_s: Speed that is exceeded for 5 % of the time, [mm/s].
+        acceleration_p95_m_s2: The same of the acceleration, [m/s²].
+        idle_share: Share of the time below 5 mm/s.
+        submovements: Peaks of speed that stand at least 10 mm/s above the valleys beside them.
+        peaks_per_s: Such peaks per second, [1/s].
+        reversals: Turning points of x, y and z with at least 2 mm on both sides.
+        frequency_50_hz: Half of the power of velocity is below, [Hz].
+        frequency_95_hz: 95 % of it are below, [Hz].
+        power_1_3: Share of it in 1 to 3 Hz.
+        sparc: Spectral arc length of speed, median of windows of 5 s.
+        ldlj: Log dimensionless jerk, median of windows of 5 s.
+        tremor_um: Root mean square of the motion in 8 to 12 Hz over three axes, [µm]; None for
+            recordings below 60 Hz.
+        tremor_at_rest_um: The same of the seconds in which the whole motion is less than 1 mm.
+        turn_median_deg_s: Median angular speed, [deg/s].
+        turn_p95_deg_s: Angular speed that is exceeded for 5 % of the time, [deg/s].
+    """
+
+    time_s: float
+    path_mm: float
+    speed_median_mm_s: float | None = None
+    speed_p95_mm_s: float | None = None
+    acceleration_p95_m_s2: float | None = None
+    idle_share: float | None = None
+    submovements: int = 0
+    peaks_per_s: float | None = None
+    reversals: int = 0
+    frequency_50_hz: float | None = None
+    frequency_95_hz: float | None = None
+    power_1_3: float | None = None
+    sparc: float | None = None
+    ldlj: float | None = None
+    tremor_um: float | None = None
+    tremor_at_rest_um: float | None = None
+    turn_median_deg_s: float | None = None
+    turn_p95_deg_s: float | None = None
+
+
+NAMES = tuple(field.name for field in fields(MotionFigures))
+"""Names of all figures, in their order."""
+
+
+def motion_figures(times: Array, position: Array, attitude: Array | None = None) -> MotionFigures:
+    """Figures of a recorded motion of any rate.
+
+    Args:
+        times: Rising times (N,) [s].
+        position: Places (N, 3) [m]; rows that are not finite are left out.
+        attitude: Unit quaternions (N, 4), w first; without them there are no turns.
+
+    Raises:
+        ShapeError: An array has another shape.
+    """
+    count = len(times)
+    if position.shape != (count, 3):
+        raise ShapeError("position", expected=(count, 3), received=position.shape)
+    if attitude is not None and attitude.shape != (count, 4):
+        raise ShapeError("attitude", expected=(count, 4), received=attitude.shape)
+    turned = np.tile((1.0, 0.0, 0.0, 0.0), (count, 1)) if attitude is None else attitude
+    samples = MotionSamples()
+    samples.add(times, np.hstack((position, turned)))
+    found = Kinematics(samples)
+    return found.figures(found.everything)
+
+
+class Kinematics:
+    """Velocities of the samples of a motion, from which figures of any part of it are taken.
+
+    Attributes:
+        times: Times of the samples at 30 Hz, shape (N,), [s].
+        position: Places, shape (N, 3), [m].
+        speed: Magnitudes of the velocity, shape (N,), [m/s].
+    """
+
+    def __init__(self, samples: MotionSamples) -> None:
+        self.times, rows = samples.rows()
+        self.position = rows[:, :3]
+        self._tremor: TremorWindows = samples.tremor
+        count = len(rows)
+        self._velocity, self._acceleration = np.zeros((count, 3)), np.zeros((count, 3))
+        self._turning = np.zeros(count)
+        self._ends = np.flatnonzero(np.diff(self.times) > 1.5 / RATE) + 1
+        for part in self._parts(self.everything):
+            self._velocity[part] = velocities(self.position[part])
+            self._acceleration[part] = velocities(self._velocity[part])
+            if part.stop - part.start > 1:
+                self._turning[part.start + 1 : part.stop] = turn_rates(rows[part, 3:7])
+        self.speed = np.linalg.norm(self._velocity, axis=1)
+
+    @property
+    def everything(self) -> Mask:
+        """Mask (N,) of all samples."""
+        return np.ones(len(self.times), np.bool_)
+
+    def _parts(self, mask: Mask) -> list[slice]:
+        """Stretches of samples of the mask, without gaps."""
+        edges = np.union1d(np.flatnonzero(np.diff(mask)) + 1, self._ends)
+        ends = [0, *edges.tolist(), len(mask)]
+        return [slice(a, b) for a, b in pairwise(ends) if b > a and mask[a]]
+
+    def spectrum(self, mask: Mask) -> tuple[Array, Array]:
+        """Frequencies [Hz] and power density of the velocity [m²/s] of a part of the motion."""
+        return velocity_spectrum(self._velocity[part] for part in self._parts(mask))
+
+    def figures(self, mask: Mask) -> MotionFigures:
+        """Figures of the samples of a mask (N,)."""
+        parts, speed = self._parts(mask), self.speed[mask]
+        time = len(speed) / RATE
+        if not len(speed):
+            return MotionFigures(0.0, 0.0)
+        windows = [slice(part.start + one.start, part.start + one.stop)
+                   for part in parts for one in cut(part.stop - part.start)]  # fmt: skip
+        peaks = sum(len(submovements(self.speed[part])) for part in parts)
+        frequency, density = self.spectrum(mask)
+        acceleration = np.linalg.norm(self._acceleration[mask], axis=1)
+        turning = np.degrees(self._turning[mask])
+        tremor, at_rest = self._tremor.between(self._times_of(parts))
+        return MotionFigures(
+            time_s=time,
+            path_mm=float(speed.sum() / RATE * 1e3),
+            speed_median_mm_s=float(np.median(speed) * 1e3),
+            speed_p95_mm_s=float(np.quantile(speed, 0.95) * 1e3),
+            acceleration_p95_m_s2=float(np.quantile(acceleration, 0.95)),
+            idle_share=float(np.mean(speed < IDLE_SPEED)),
+            submovements=peaks,
+            peaks_per_s=peaks / time,
+            reversals=sum(reversals(self.position[part]) for part in parts),
+            frequency_50_hz=frequency_holding(0.5, frequency, density),
+            frequency_95_hz=frequency_holding(0.95, frequency, density),
+            power_1_3=share_between(1.0, 3.0, frequency, density),
+            sparc=median([sparc(self.speed[one], RATE) for one in windows]),
+            ldlj=median([log_dimensionless_jerk(self._velocity[one], RATE) for one in windows]),
+            tremor_um=_micrometres(tremor),
+            tremor_at_rest_um=_micrometres(at_rest),
+            turn_median_deg_s=float(np.median(turning)),
+            turn_p95_deg_s=float(np.quantile(turning, 0.95)),
+        )
+
+    def _times_of(self, parts: Sequence[slice]) -> list[tuple[float, float]]:
+        return [(float(self.times[part.start]), float(self.times[part.stop - 1])) for part in parts]
+
+
+def _micrometres(mean_square: float | None) -> float | None:
+    return None if mean_square is None else float(np.sqrt(mean_square) * 1e6)
