@@ -30,6 +30,13 @@ class InverseKinematicsParameters(RobotParameters):
     speed_share: float = parameter(
         1.0, lower=0.01, upper=1.0, doc="share of the drives' speed limits that references may use"
     )
+    position_tolerance: float = parameter(
+        1e-3, unit="m", lower=0.0, upper=1.0,
+        doc="an arm that lags behind by less than this, for want of speed, still follows",
+    )  # fmt: skip
+    rotation_tolerance: float = parameter(
+        math.radians(1.0), unit="rad", lower=0.0, upper=1.0, doc="the same for its orientation"
+    )
     longest_pause: float = parameter(
         0.3, unit="s", lower=0.002, upper=5.0,
         doc="time between commands that joints may use, at most; a longer pause counts as this",
@@ -81,10 +88,11 @@ def _joint_at_limit(q: Array, limits: Array) -> int:
 
 
 @inner
-def _explain(solver: Any, reach: Array) -> None:
+def _explain(p: Any, solver: Any, reach: Array) -> None:
     """Write why the arm falls short, and by what the command lies beyond its reach.
 
-    The pose is solved again as if there were time enough. If that reaches it, the arm only lags.
+    The pose is solved again as if there were time enough. If that reaches it, the arm only lags,
+    which is told where it does by more than the tolerance.
     """
     T, q, free, limits = solver.T, solver.q, solver.free, solver.limits
     copy(q, free)
@@ -96,7 +104,9 @@ def _explain(solver: Any, reach: Array) -> None:
     if _is_reached(status):
         solver.fk(q, solver.geometry, solver.reached)
         status = solver.ik(solver.reached, q, limits, solver.geometry, free, solver.residual)
-        reach[_LIMIT] = _SINGULAR if status == _NEAR_SINGULAR else _SLOW
+        is_near = reach[_RESIDUAL] <= p.tolerance[0] and reach[_RESIDUAL + 1] <= p.tolerance[1]
+        if not is_near:
+            reach[_LIMIT] = _SINGULAR if status == _NEAR_SINGULAR else _SLOW
         return
     reach[_JOINT] = _joint_at_limit(free, limits)
     reach[_LIMIT] = _AT_JOINT if reach[_JOINT] >= 0.0 else _BEYOND
@@ -134,7 +144,7 @@ def inverse_kinematics_step(p: Any, s: Any, solver: Any, row: Any, dt: float) ->
     if status >= 0:
         copy(solver.residual, reach[_RESIDUAL : _RESIDUAL + 2])
         if not _is_reached(status):
-            _explain(solver, reach)
+            _explain(p, solver, reach)
         copy(q, seed)
     copy(seed, row.slave_servo_jp)
 
@@ -146,7 +156,8 @@ class InverseKinematics(RunningStage):
         self.robot = load_robot_set(parameters.robot, parameters.geometry)
         n = self.robot.n
         super().__init__(INVERSE_KINEMATICS, n, dt)
-        numbers = [("speed", "f8", (n,)), ("longest_ns", "i8"), ("timeout_ns", "i8")]
+        numbers = [("speed", "f8", (n,)), ("longest_ns", "i8"), ("timeout_ns", "i8"),
+                   ("tolerance", "f8", (2,))]  # fmt: skip
         self.parameters, self.state = records(numbers)[0], records([("last_ns", "i8")])[0]
         self._solver = Solver(
             self.robot.fk_pointer, self.robot.ik_pointer, self.robot.limits(dt).copy(),
@@ -168,6 +179,8 @@ class InverseKinematics(RunningStage):
         drives = self.robot.drives
         limit = np.full(self.robot.n, np.inf) if drives is None else drives.speed_limit
         self.parameters["speed"] = limit * parameters.speed_share
+        p = parameters
+        self.parameters["tolerance"] = p.position_tolerance, p.rotation_tolerance
         self.parameters["longest_ns"] = round(parameters.longest_pause * 1e9)
         self.parameters["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
 
