@@ -36,6 +36,7 @@ from teleop_core.session.layers import (
     scenario_file,
     setting,
 )
+from teleop_core.session.length import as_long_as_followed
 from teleop_core.session.runner import (
     NewSamples,
     StateReports,
@@ -125,10 +126,11 @@ def configuration(
     layers: list[Layer] = [load_file(config_folder() / "teleop.yaml")]
     if scenario is not None:
         layers.append(load_file(scenario_file(scenario)))
-    layers += [load_file(Path(file)) for file in files]
-    layers += [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
-    layers += [parse_setting(text) for text in texts]
-    return Configuration.from_layers(layers, scenario or "")
+    given = [load_file(Path(file)) for file in files]
+    given += [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
+    given += [parse_setting(text) for text in texts]
+    made = Configuration.from_layers([*layers, *given], scenario or "")
+    return as_long_as_followed(made, given)
 
 
 def run(

@@ -134,6 +134,6 @@ def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
         topic = MASTER_BUTTONS.of_arm(arm)
         at, pressed = presses
         found[topic] = Series(at, at, pressed.astype(np.float64), (), topic.frame_id)
-    notes = "; ".join([*motion.told, *motion.losses()])
-    warnings.warn(f"{path.name}: {notes}", stacklevel=4)
+    if notes := [*motion.told, *motion.losses()]:
+        warnings.warn(f"{path.name}: {'; '.join(notes)}", stacklevel=4)
     return found

@@ -199,7 +199,7 @@ class HapticMaster(RunningStage):
         phases = self._rng.uniform(0.0, 2.0 * math.pi, PHASES)
         self._operator = OPERATORS.find(wanted.kind.kind)
         self.ahead = min(self._operator.ahead, BLOCK)
-        setting = Setting(wanted, phases, self._fixed.seed)
+        setting = Setting(wanted, phases, self._fixed.seed, self._fixed.device)
         self._motion = self._asked(self._operator.make, wanted.kind.parameters, setting)
         self._tick, self._end, self._end_of_noise = 0, 1, 0
         self._rest = np.empty(4)

@@ -34,11 +34,13 @@ class Setting(NamedTuple):
         common: The whole group ``haptic_master.operator``.
         phases: Random phases (6, 4) [rad] of the session's seed, the same for every operator.
         seed: Seed of the session, for more random numbers.
+        device: The group ``haptic_master.device``; None if it is not known.
     """
 
     common: Any
     phases: Array
     seed: int
+    device: Any = None
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,10 @@ class Operator:
         ahead: Ticks for which it can be asked at once: 1 for one who answers to what happens.
         trembles: Whether its motion has all its tremor, so that ``hand.tremor_amplitude`` is not
             added.
+        approaches: Whether it begins with a smooth move to ``operator.center`` that takes
+            ``operator.approach_time``.
+        length: ``length(parameters, setting)`` says how long its motion lasts [s], which a session
+            then does too if its duration is not given; None for a motion without end.
     """
 
     name: str
@@ -59,6 +65,8 @@ class Operator:
     parameters: type = NoParameters
     ahead: int = 1000
     trembles: bool = False
+    approaches: bool = False
+    length: Callable[[Any, Setting], float] | None = None
 
 
 def following(name: str, times: object, rows: object) -> Operator:

@@ -40,6 +40,10 @@ class OperatorParameters:
         doc="points: x, y, z of each stop relative to the centre, one after the other",
     )  # fmt: skip
     bag: str = parameter("", fixed=True, doc="bag: recording whose master/measured_cp is followed")
+    longest_gap: float = parameter(
+        0.1, unit="s", lower=0.0, upper=60.0, fixed=True,
+        doc="bag, file: over longer gaps between samples the hand waits, but not below 5 periods",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         if self.kind.kind == "points" and (not self.points or len(self.points) % 3):

@@ -1,0 +1,46 @@
+"""Length of a session: that of the recordings which its hands follow, if nothing else is said."""
+
+from collections.abc import Iterable
+from dataclasses import fields, replace
+
+import numpy as np
+
+from teleop_core.operators import OPERATORS, Setting
+from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.operators.shapes import PHASES
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.layers import SESSION, Layer, SessionParameters
+
+
+def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configuration:
+    """The same session, as long as the recordings that its operators follow.
+
+    Args:
+        made: The session.
+        given: What was said of it beside defaults and scenario; a duration there holds.
+
+    Raises:
+        TeleopError: A recording cannot be read.
+    """
+    if any("duration" in layer.get(SESSION, {}) for layer in given):
+        return made
+    lengths = [length for name in made.groups if (length := _length(made, name)) is not None]
+    if not lengths:
+        return made
+    bounds = next(f for f in fields(SessionParameters) if f.name == "duration").metadata
+    duration = float(np.clip(max(lengths), bounds["lower"], bounds["upper"]))
+    session = replace(made.groups[SESSION], duration=duration)
+    return replace(made, groups=made.groups | {SESSION: session})
+
+
+def _length(made: Configuration, name: str) -> float | None:
+    """How long the motion of a stage's operator lasts [s]; None without one, or without end."""
+    group = made.groups[name]
+    operator = getattr(group, "operator", None)
+    if not isinstance(operator, OperatorParameters):
+        return None
+    part = OPERATORS.find(operator.kind.kind)
+    if part.length is None:
+        return None
+    setting = Setting(operator, np.zeros(PHASES), group.seed)
+    return part.length(operator.kind.parameters, setting)
