@@ -26,11 +26,11 @@ def pose_rows(count, position=(0.4, 0.0, -0.18), angles=(0.0, 66.6, 0.0)):
 
 
 def state(stamp_ns, described=None, **values):
-    """Message of teleop/state with everything else zero, but gain 1.
+    """Message of teleop/state with everything else zero, but gain 1, of a slave that follows.
 
     ``described`` holds further names and texts, such as the kind of the fixture.
     """
-    texts = {name: repr(float(values.get(name, name == "gain"))) for name in STATE_FIELDS}
+    texts = {name: repr(float(values.get(name, name in {"gain", "is_following"}))) for name in STATE_FIELDS}
     return report(stamp_ns, "teleop", 0, "FOLLOWING", texts | (described or {}))
 
 

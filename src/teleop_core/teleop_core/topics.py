@@ -26,6 +26,24 @@ class Limit(IntEnum):
     SPEED = 4  # joints would have to move faster than they can
 
 
+def limit_text(limit: int, joint: int, joint_names: tuple[str, ...] = ()) -> str:
+    """What holds the slave back, in words.
+
+    Args:
+        limit: Value of :class:`Limit`.
+        joint: Index of the joint at its limit; negative if none is.
+        joint_names: Names of the joints; without them they are counted from 1.
+    """
+    if limit == Limit.JOINT and joint >= 0:
+        name = joint_names[joint] if joint < len(joint_names) else str(joint + 1)
+        return f"joint {name} is at its limit"
+    return {
+        Limit.NONE: "nothing", Limit.JOINT: "a joint is at its limit",
+        Limit.WORKSPACE: "out of reach", Limit.SINGULARITY: "a singularity",
+        Limit.SPEED: "faster than its joints",
+    }[Limit(limit)]  # fmt: skip
+
+
 class Kind(Enum):
     """What the values of a topic are; the value is the message's ROS type.
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teleop_core.bags import ros_types
 from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values, discover
@@ -31,6 +32,13 @@ class Series:
 
     def __len__(self) -> int:
         return len(self.stamp_ns)
+
+    def only(self, is_kept: NDArray[np.bool_]) -> "Series":
+        """Some of the messages; ``is_kept`` has the shape (N,)."""
+        if is_kept.all():
+            return self
+        stamps, logs, values = self.stamp_ns[is_kept], self.log_ns[is_kept], self.values[is_kept]
+        return Series(stamps, logs, values, self.names, self.frame_id)
 
 
 def kind_of(name: str, ros_type: str) -> Kind | None:

@@ -81,6 +81,8 @@ METRICS: Registry[type[Metric]] = Registry(
     {
         "samples": f"{_FOLDER}.samples:SamplesMetric",
         "path": f"{_FOLDER}.path:PathMetric",
+        "reach": f"{_FOLDER}.reach:ReachMetric",
+        "asked_error_mm": f"{_FOLDER}.asked_error:AskedErrorMetric",
         "position_error_mm": f"{_FOLDER}.position_error:PositionErrorMetric",
         "orientation_error_deg": f"{_FOLDER}.orientation_error:OrientationErrorMetric",
         "command_error_mm": f"{_FOLDER}.command_error:CommandErrorMetric",
@@ -88,6 +90,7 @@ METRICS: Registry[type[Metric]] = Registry(
             f"{_FOLDER}.orientation_error:CommandOrientationErrorMetric",
         "fixture": f"{_FOLDER}.fixture:FixtureMetric",
         "force_n": f"{_FOLDER}.force:ForceMetric",
+        "motion": f"{_FOLDER}.motion:MotionMetric",
         "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
         "ticks": f"{_FOLDER}.ticks:TicksMetric",
         "nodes": f"{_FOLDER}.nodes:NodesMetric",

@@ -10,6 +10,7 @@ from teleop_core.evaluation.metric import Key
 from teleop_core.evaluation.metrics.fixture import FixtureScore
 from teleop_core.evaluation.metrics.nodes import Counts
 from teleop_core.evaluation.metrics.orientation_error import OrientationError
+from teleop_core.evaluation.metrics.reach import ReachScore
 from teleop_core.evaluation.metrics.samples import Samples
 from teleop_core.evaluation.metrics.ticks import Ticks
 from teleop_core.evaluation.metrics.topics import TopicScore
@@ -169,6 +170,16 @@ class Score:
     def samples(self) -> Samples:
         """How many slave poses were scored."""
         return self.record("samples", Samples)
+
+    @property
+    def reach(self) -> ReachScore:
+        """For how much of the time the slave followed, and why not for all of it."""
+        return self.record("reach", ReachScore)
+
+    @property
+    def asked_error_mm(self) -> Spread:
+        """Distance of the slave's tip from where the hand would have brought it, [mm]."""
+        return self.record("asked_error_mm", Spread)
 
     @property
     def position_error_mm(self) -> Spread:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ from teleop_core.evaluation.context import Accumulator, Context
 from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import Metric
+from teleop_core.evaluation.metrics.reach import COMPARABLE, ReachScore
+from teleop_core.evaluation.metrics.reach import GROUP as REACH_GROUP
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.plain import Plain, leaves, plain
 from teleop_core.evaluation.registry import all_metrics
@@ -78,7 +81,7 @@ def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = ()) -> Stud
     view.require(REQUIRED)
     context, metrics = _run(view, arm or arm_names(bag)[0], makers)
     results = tuple(_result(context, metric) for metric in metrics)
-    score = Score(_session(context), results)
+    score = Score(_session(context), _compared(results))
     if not score.samples.scored:
         raise EvaluationError(
             f"{bag.path}: no {SLAVE_MEASURED_CP.name}{f' of arm {arm}' * bool(arm)} has a valid "
@@ -142,6 +145,34 @@ def _result(context: Context, metric: Metric) -> Result:
         _insist(metric, rows, Row)
         tree = _checked(metric, plain(values))
         return Result(metric.name, values, tree if metric.keys else None, tuple(rows))
+
+
+def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
+    """Results whose published figures have marks only if the slave followed nearly all the time.
+
+    Otherwise the rows say so in words: what it tracked well is not what it was asked for.
+    """
+    reach = next(
+        (result.values for result in results if isinstance(result.values, ReachScore)), None
+    )
+    share = reach.followed_share if reach is not None else None
+    if share is not None and share >= COMPARABLE:
+        return results
+    told = "not known" if share is None else f"{100.0 * share:.0f} % < {100.0 * COMPARABLE:.0f} %"
+    note = Row(REACH_GROUP, "published figures: followed", "", told)
+    found = []
+    for result in results:
+        rows = tuple(replace(entry, is_met=None) for entry in result.rows)
+        has_marks = any(entry.is_met is not None for entry in result.rows)
+        found.append(replace(result, rows=rows if has_marks else result.rows))
+    if all(old is new or old.rows == new.rows for old, new in zip(results, found, strict=True)):
+        return results  # there was nothing to compare
+    return tuple(
+        replace(result, rows=(*result.rows, note))
+        if isinstance(result.values, ReachScore)
+        else result
+        for result in found
+    )
 
 
 def _insist(metric: Metric, found: object, kind: type[object]) -> None:

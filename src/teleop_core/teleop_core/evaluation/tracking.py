@@ -51,6 +51,10 @@ def _track(window: Window) -> Tracked:
     measured, setpoint = window.samples(SLAVE_MEASURED_CP), window.around(SLAVE_SETPOINT_CP)
     command, all_measured = window.around(SLAVE_SERVO_CP), window.around(SLAVE_MEASURED_CP)
     partner = same_tick(all_measured.log_ns, setpoint.log_ns)[window.own(SLAVE_MEASURED_CP)]
+    # Until a command is in force, as on the way to where it starts, the slave follows nobody.
+    is_led = partner == NONE
+    is_led[~is_led] = setpoint.stamp_ns[partner[~is_led]] != 0
+    measured, partner = measured.only(is_led), partner[is_led]
     poses, setpoints = measured.values, _rows(setpoint, partner)
     commands = _rows(command, latest(measured.stamp_ns, command.stamp_ns))
     return Tracked(

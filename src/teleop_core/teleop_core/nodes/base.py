@@ -346,6 +346,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         concerns += self.ports.concerns()
         if is_active:
             concerns += self.concerns()
+            concerns += getattr(self.stage, "concerns", list)()
         elif self._word == "failed":
             concerns.append("failed; see its log")
         rate = self._reporter.rate(self.counts.ticks)

@@ -12,7 +12,7 @@ from teleop_core.parameters import parameter
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.parameters import RobotParameters
-from teleop_core.signals import DT, copy
+from teleop_core.signals import DT, assign, copy
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
     SLAVE_REACH,
@@ -20,6 +20,7 @@ from teleop_core.topics import (
     SLAVE_SERVO_JP,
     SLAVE_SETPOINT_JS,
     Limit,
+    limit_text,
 )
 
 
@@ -67,6 +68,7 @@ _STATUS, _LIMIT, _JOINT, _RESIDUAL, _CUT = 0, 1, 2, 3, 5
 _NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
 _SINGULAR, _SLOW = int(Limit.SINGULARITY), int(Limit.SPEED)
 _FOLLOWED, _NEAR_SINGULAR = int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR)
+_STATE = [(name, "i8") for name in ("last_ns", "asked", "limited", "limit", "joint")]
 # A step [rad or m] that no speed limit is: a path still, but one that has all the time it needs.
 _ANY_STEP = 1e6
 # A joint this close to its limit [rad or m] is at it.
@@ -146,6 +148,10 @@ def inverse_kinematics_step(p: Any, s: Any, solver: Any, row: Any, dt: float) ->
         if not _is_reached(status):
             _explain(p, solver, reach)
         copy(q, seed)
+    s.asked += 1
+    if reach[_LIMIT] != _NONE:
+        s.limited += 1
+        s.limit, s.joint = int(reach[_LIMIT]), int(reach[_JOINT])
     copy(seed, row.slave_servo_jp)
 
 
@@ -158,7 +164,7 @@ class InverseKinematics(RunningStage):
         super().__init__(INVERSE_KINEMATICS, n, dt)
         numbers = [("speed", "f8", (n,)), ("longest_ns", "i8"), ("timeout_ns", "i8"),
                    ("tolerance", "f8", (2,))]  # fmt: skip
-        self.parameters, self.state = records(numbers)[0], records([("last_ns", "i8")])[0]
+        self.parameters, self.state = records(numbers)[0], records(_STATE)[0]
         self._solver = Solver(
             self.robot.fk_pointer, self.robot.ik_pointer, self.robot.limits(dt).copy(),
             self.robot.geometry_row.copy(), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(n),
@@ -172,7 +178,18 @@ class InverseKinematics(RunningStage):
     def reset(self) -> None:
         """Start from home."""
         self._solver.seed[:] = self.robot.home
-        self.state["last_ns"] = 0
+        assign(self.state, 0)
+        self._told = 0, 0
+
+    def concerns(self) -> list[str]:
+        """What kept the slave from following since this was last asked, in words."""
+        asked, limited = int(self.state["asked"]), int(self.state["limited"])
+        share = (limited - self._told[1]) / max(asked - self._told[0], 1)
+        self._told = asked, limited
+        if share <= 0.0:
+            return []
+        why = limit_text(int(self.state["limit"]), int(self.state["joint"]), self.robot.joint_names)
+        return [f"the slave cannot follow {share:.0%} of the commands: {why}"]
 
     def retune(self, parameters: InverseKinematicsParameters) -> None:
         """Take new parameters from the next pose on."""

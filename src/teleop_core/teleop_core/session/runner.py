@@ -19,7 +19,7 @@ from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION, Layer, parse_layer
 from teleop_core.session.virtual import BLOCK, VirtualTime, stamps_of
 from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import Kind, Topic
+from teleop_core.topics import Kind, Topic, limit_text
 
 Progress = Callable[[int, int], None]
 
@@ -240,13 +240,15 @@ def state_report(stamp_ns: int, state: Array, described: Mapping[str, str] | Non
 
 
 def state_text(state: Array, fixture: str = "box") -> str:
-    """State in words: CLUTCHED or FOLLOWING or ALIGNING, mode and fixture."""
+    """State in words: CLUTCHED or FOLLOWING or ALIGNING, mode, fixture, limit."""
     named = dict(zip(STATE_FIELDS, state, strict=True))
     doing = "CLUTCHED" if named["is_clutched"] else "FOLLOWING"
     if not named["is_following"]:
         doing = "ALIGNING"
     mode = "fine" if named["is_fine"] else "coarse"
-    return f"{doing} {mode}{f', {fixture} on' if named['is_fixture_on'] else ''}"
+    text = f"{doing} {mode}{f', {fixture} on' if named['is_fixture_on'] else ''}"
+    limit, joint = int(named["limit"]), int(named["limited_joint"])
+    return f"{text}, held back: {limit_text(limit, joint)}" if limit else text
 
 
 class ReportWriter(Protocol):

@@ -1,0 +1,134 @@
+"""Reach: for how much of the time the slave could do what the hand asked for, and why not."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.evaluation.accumulators import Moments, Spread
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
+from teleop_core.evaluation.rows import MISSING, Row, row, spread_rows
+from teleop_core.evaluation.state_history import StateHistory
+from teleop_core.evaluation.windows import Window
+from teleop_core.geometry import Array
+from teleop_core.signals import STATE
+from teleop_core.topics import SLAVE_REACH, Limit
+
+GROUP = "slave follows the hand"
+COMPARABLE = 0.99
+"""Least share of the time followed with which published figures are compared."""
+_RESIDUAL = SLAVE_REACH.columns.index("position_residual")
+_CAUSES = (Limit.JOINT, Limit.WORKSPACE, Limit.SINGULARITY, Limit.SPEED)
+
+
+@dataclass(frozen=True)
+class ReachScore:
+    """How far the slave followed, since it first did; None without what says so.
+
+    Attributes:
+        followed_share: Share of the time in which nothing held the slave back, 0 to 1.
+        longest_s: Longest stretch of time in which it did not follow, [s].
+        joint_share: Share of the time against the end of a joint.
+        workspace_share: Share beyond all joint vectors.
+        singularity_share: Share in which it lagged near a singularity.
+        speed_share: Share in which it lagged because joints were too slow.
+        aligning_share: Share in which master or slave were silent and it was aligned anew.
+        residual_mm: Distance that inverse kinematics left to the command, [mm].
+        residual_deg: Angle that it left, [deg].
+    """
+
+    followed_share: float | None
+    longest_s: float | None
+    joint_share: float | None
+    workspace_share: float | None
+    singularity_share: float | None
+    speed_share: float | None
+    aligning_share: float | None
+    residual_mm: Spread
+    residual_deg: Spread
+
+
+class ReachMetric(Metric):
+    """Shares of time by teleop/state, residuals by slave/reach."""
+
+    name = "reach"
+    keys = (
+        Key("reach.followed_share", "1",
+            "share of the time since the slave first followed in which no limit held it back and "
+            "it was not aligned anew; clutched time counts as followed"),
+        Key("reach.longest_s", "s", "longest stretch in which it did not follow"),
+        Key("reach.joint_share|workspace_share|singularity_share|speed_share|aligning_share", "1",
+            "share of that time against the end of a joint, beyond the workspace, too slow near a "
+            "singularity, too slow, and while master or slave were silent"),
+        Key("reach.residual_mm.rms|sd|max", "mm",
+            f"what inverse kinematics left of each command: {SPREAD_MEANING}"),
+        Key("reach.residual_deg.rms|sd|max", "deg", f"the same for angles: {SPREAD_MEANING}"),
+    )  # fmt: skip
+    topics = (SLAVE_REACH,)
+
+    def __init__(self, context: Context) -> None:
+        self._history, self._end_ns = context.history, context.bag.end_ns
+        self._distance, self._angle = Moments(), Moments()
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        follows = window.states(SLAVE_REACH).column("is_following") > 0.0
+        left = window.samples(SLAVE_REACH).values[follows, _RESIDUAL : _RESIDUAL + 2]
+        self._distance.add(left[:, 0] * 1e3)
+        self._angle.add(np.degrees(left[:, 1]))
+
+    def values(self) -> ReachScore:
+        """Score of everything so far."""
+        shares, longest_s = _shares(self._history, self._end_ns)
+        return ReachScore(
+            shares.get(Limit.NONE), longest_s, *(shares.get(cause) for cause in _CAUSES),
+            shares.get("aligning"), self._distance.spread(), self._angle.spread(),
+        )  # fmt: skip
+
+    def rows(self) -> list[Row]:
+        """Shares in percent, the longest stretch, residuals, and whether figures compare."""
+        score = self.values()
+        causes = (score.joint_share, score.workspace_share, score.singularity_share,
+                  score.speed_share)  # fmt: skip
+        rows = [
+            Row(GROUP, "followed, time", "%", _percent(score.followed_share)),
+            row(GROUP, "not followed, longest", "s", score.longest_s),
+            Row(GROUP, "joint/workspace/singularity/speed", "%", "/".join(map(_percent, causes))),
+            Row(GROUP, "aligned anew, time", "%", _percent(score.aligning_share)),
+            *spread_rows(GROUP, "IK residual", "mm", score.residual_mm),
+            row(GROUP, "IK residual, angle, max", "deg", score.residual_deg.max),
+        ]
+        return [entry for entry in rows if "S.D." not in entry.label]
+
+
+def _percent(share: float | None) -> str:
+    return MISSING if share is None else f"{100.0 * share:.1f}"
+
+
+def _shares(history: StateHistory, end_ns: int) -> tuple[dict[Limit | str, float], float | None]:
+    """Share of the time in each cause, none among them, and the longest stretch [s] off."""
+    follows = history.rows[:, STATE["is_following"]] > 0.0
+    limits = history.rows[:, STATE["limit"]]
+    if not follows.any() or np.isnan(limits).any():
+        return {}, None
+    first = int(np.argmax(follows))
+    stamps = np.append(history.stamp_ns[first:], max(end_ns, int(history.stamp_ns[-1])))
+    spans = np.diff(stamps) * 1e-9
+    follows, limits = follows[first:], limits[first:]
+    total = float(spans.sum())
+    if total <= 0.0:
+        return {}, None
+    found: dict[Limit | str, float] = {
+        cause: float(spans[follows & (limits == cause)].sum()) / total
+        for cause in (Limit.NONE, *_CAUSES)
+    }
+    found["aligning"] = float(spans[~follows].sum()) / total
+    return found, _longest(spans, ~follows | (limits > 0.0))
+
+
+def _longest(spans: Array, is_off: NDArray[np.bool_]) -> float:
+    """Longest sum of neighbouring spans that are off; 0 if none is."""
+    stretch = np.cumsum(np.diff(is_off, prepend=~is_off[:1]) != 0)
+    sums = np.bincount(stretch, weights=np.where(is_off, spans, 0.0))
+    return float(sums.max())
