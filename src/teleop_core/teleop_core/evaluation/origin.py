@@ -1,7 +1,7 @@
 """Origin: what a recording says of the session it was made in: its graph, and how axes map."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import yaml
@@ -16,6 +16,7 @@ from teleop_core.mapping.motion_scaling import (
     MotionScalingParameters,
     axis_map,
 )
+from teleop_core.master.haptic_master import HAPTIC_MASTER
 from teleop_core.parameters import build
 from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer
 from teleop_core.stage import STAGES
@@ -31,10 +32,12 @@ class Origin:
     Attributes:
         graph: What ran; the built-in stages where nothing is known or a stage is not installed.
         axes: Rotation (3, 3) from the master's base to the slave's axes.
+        operator: What is stored of ``haptic_master.operator``, by names below it.
     """
 
     graph: Graph
     axes: Array
+    operator: Mapping[str, object] = field(default_factory=dict)
 
     @cached_property
     def chain(self) -> tuple[tuple[str, Topic], ...]:
@@ -63,7 +66,7 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
         arm: Name of the arm.
     """
     layer = _layer(bag)
-    return Origin(_graph(layer), _axes(layer, arm))
+    return Origin(_graph(layer), _axes(layer, arm), _operator(layer, arm))
 
 
 def _layer(bag: Bag) -> Layer:
@@ -87,6 +90,13 @@ def _graph(layer: Layer) -> Graph:
         return build_graph(session.arms, session.stages, session.delays)
     except TeleopError:
         return build_graph()
+
+
+def _operator(layer: Layer, arm: str) -> Mapping[str, object]:
+    """What is said of the operator of the arm, or of all arms."""
+    name, prefix = HAPTIC_MASTER.name, "operator."
+    said = layer.get(name, {}) | layer.get(f"{arm}/{name}", {})
+    return {k.removeprefix(prefix): v for k, v in said.items() if k.startswith(prefix)}
 
 
 def _axes(layer: Layer, arm: str) -> Array:

@@ -31,11 +31,11 @@ class HumanParameters:
     """How the hand reaches, errs, corrects, rests and trembles."""
 
     reach: float = parameter(
-        0.016, unit="m", lower=1e-3, upper=0.3, fixed=True,
+        0.017, unit="m", lower=1e-3, upper=0.3, fixed=True,
         doc="median distance from target to target, within the region of operator.size",
     )  # fmt: skip
     reach_spread: float = parameter(
-        0.6, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm"
+        0.5, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm"
     )
     turn: float = parameter(
         0.3, lower=0.0, upper=2.0, fixed=True,
@@ -49,26 +49,26 @@ class HumanParameters:
         doc="distance from the target at which no correction is made",
     )  # fmt: skip
     movement_time: float = parameter(
-        0.065, unit="s", lower=0.05, upper=2.0, fixed=True,
+        0.06, unit="s", lower=0.05, upper=2.0, fixed=True,
         doc="duration of a submovement of no difficulty",
     )  # fmt: skip
     time_per_bit: float = parameter(
-        0.165, unit="s", lower=0.0, upper=2.0, fixed=True,
+        0.16, unit="s", lower=0.0, upper=2.0, fixed=True,
         doc="what each bit of difficulty adds to the duration of a submovement",
     )  # fmt: skip
     time_spread: float = parameter(
-        0.19, lower=0.0, upper=1.0, fixed=True, doc="standard deviation of its logarithm"
+        0.23, lower=0.0, upper=1.0, fixed=True, doc="standard deviation of its logarithm"
     )
     shortfall: float = parameter(
         0.05, lower=0.0, upper=0.5, fixed=True,
         doc="share of the distance that a first submovement aims short by",
     )  # fmt: skip
     noise_along: float = parameter(
-        0.024, unit="s", lower=0.0, upper=0.2, fixed=True,
+        0.023, unit="s", lower=0.0, upper=0.2, fixed=True,
         doc="standard deviation of a submovement's end along its way, per mean speed",
     )  # fmt: skip
     noise_across: float = parameter(
-        0.022, unit="s", lower=0.0, upper=0.2, fixed=True, doc="the same across its way"
+        0.021, unit="s", lower=0.0, upper=0.2, fixed=True, doc="the same across its way"
     )
     reaction_time: float = parameter(
         0.22, unit="s", lower=0.05, upper=1.0, fixed=True,
@@ -78,16 +78,16 @@ class HumanParameters:
         3, lower=0, upper=10, fixed=True, doc="largest number of corrections of a reach"
     )
     dwell_time: float = parameter(
-        0.075, unit="s", lower=0.01, upper=10.0, fixed=True, doc="median rest at a target"
+        0.07, unit="s", lower=0.01, upper=10.0, fixed=True, doc="median rest at a target"
     )
     dwell_spread: float = parameter(
-        0.5, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm"
+        0.46, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm"
     )
     passing: float = parameter(
         0.33, lower=0.0, upper=1.0, fixed=True, doc="share of targets at which the hand rests not"
     )
     overlap: float = parameter(
-        0.16, lower=0.0, upper=0.5, fixed=True,
+        0.19, lower=0.0, upper=0.5, fixed=True,
         doc="share of the last submovement into which the next reach begins at such a target",
     )  # fmt: skip
     tremor: float = parameter(
@@ -129,14 +129,11 @@ def submovements(
     room = np.array([0.5 * side for side in region.size] + [region.rotation] * 3)
     place, time = np.zeros(6), 0.0
     while True:
-        last = None
         target = _next_target(p, room, place, rng)
         for last in _reach(p, target, place, time, rng):
             place = place + last.step
             yield last
-        if last is None:  # there is nowhere to go
-            time += _spread(p.dwell_time, p.dwell_spread, rng)
-        elif rng.random() < p.passing:
+        if rng.random() < p.passing:
             time = last.end - p.overlap * last.duration
         else:
             time = last.end + _spread(p.dwell_time, p.dwell_spread, rng)
@@ -162,7 +159,7 @@ def _next_target(p: HumanParameters, room: Array, place: Array, rng: np.random.G
 def _reach(
     p: HumanParameters, target: Array, place: Array, time: float, rng: np.random.Generator
 ) -> Iterator[Submovement]:
-    """First submovement to a target and its corrections.
+    """First submovement to a target, which may be a turn alone, and its corrections.
 
     The duration is that of Fitts (1954) in MacKenzie's (1992, eq. 3) form. The end is off by as
     much as the submovement is fast (Schmidt et al. 1979; Meyer et al. 1988), as noise that grows
@@ -172,7 +169,7 @@ def _reach(
         way = target - place
         distance = float(np.linalg.norm(way[:3]))
         is_first = number == 0
-        if distance <= (0.0 if is_first else p.tolerance):
+        if distance <= p.tolerance and not is_first:
             return
         bits = math.log2(distance / p.width + 1.0)
         duration = _spread(p.movement_time + p.time_per_bit * bits, p.time_spread, rng)
@@ -274,4 +271,4 @@ def _human(p: HumanParameters, setting: Setting) -> Motion:
     return motion
 
 
-HUMAN = Operator("human", _human, HumanParameters, trembles=True)
+HUMAN = Operator("human", _human, HumanParameters, trembles=True, approaches=True)

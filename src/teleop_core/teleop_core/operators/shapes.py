@@ -94,7 +94,7 @@ def _operator(name: str, shape: Shape, *, grows: bool = True) -> Operator:
     def make(parameters: object, setting: Setting) -> Motion:
         return smooth(setting.common, setting.phases, shape, grows=grows)
 
-    return Operator(name, make)
+    return Operator(name, make, approaches=True)
 
 
 RANDOM = _operator("random", _random)
