@@ -8,7 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from teleop_core.evaluation.published import SOURCE, published_for
-from teleop_core.evaluation.rows import Row
+from teleop_core.evaluation.rows import MISSING, Row
 from teleop_core.evaluation.score import Score, Session
 from teleop_core.evaluation.summary import side_by_side
 
@@ -61,7 +61,9 @@ def heading(session: Session) -> str:
 
 
 def _cell(row: Row) -> str:
-    if row.is_met is None:
+    if row.is_met is None and (not row.published or row.value == MISSING):
         return escape(row.value)
+    if row.is_met is None:
+        return f"{escape(row.value):>6} [dim]≤{escape(row.published)}[/dim]"
     mark = f"[green]{MET}[/green]" if row.is_met else f"[red]{NOT_MET}[/red]"
     return f"{escape(row.value):>6}{mark} [dim]≤{escape(row.published)}[/dim]"

@@ -50,7 +50,7 @@ class Window:
         series = self.series.get(topic.name)
         if series is None:
             none = np.empty(0, np.int64)
-            return Series(none, none, np.empty((0, topic.kind.width(0))))
+            return Series(none, none, np.empty((0, topic.width(0))))
         return series
 
     def states(self, topic: Topic) -> States:

@@ -82,9 +82,16 @@ class ReachMetric(Metric):
         """Score of everything so far."""
         shares, longest_s = _shares(self._history, self._end_ns)
         return ReachScore(
-            shares.get(Limit.NONE), longest_s, *(shares.get(cause) for cause in _CAUSES),
-            shares.get("aligning"), self._distance.spread(), self._angle.spread(),
-        )  # fmt: skip
+            followed_share=shares.get(Limit.NONE),
+            longest_s=longest_s,
+            joint_share=shares.get(Limit.JOINT),
+            workspace_share=shares.get(Limit.WORKSPACE),
+            singularity_share=shares.get(Limit.SINGULARITY),
+            speed_share=shares.get(Limit.SPEED),
+            aligning_share=shares.get("aligning"),
+            residual_mm=self._distance.spread(),
+            residual_deg=self._angle.spread(),
+        )
 
     def rows(self) -> list[Row]:
         """Shares in percent, the longest stretch, residuals, and whether figures compare."""
