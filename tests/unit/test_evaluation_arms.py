@@ -40,7 +40,7 @@ def state(gain):
 
 def write(path, offsets, metadata=METADATA, lost=()):
     """A recording of arms whose tips are so far [m] from their references."""
-    stamps = np.arange(COUNT) * TICK_NS
+    stamps = np.arange(1, COUNT + 1) * TICK_NS
     rest = np.tile([0.4, 0, 0, 1, 0, 0, 0], (COUNT, 1))
     rows = {}
     for arm, offset in offsets.items():

@@ -93,7 +93,7 @@ def added():
 def path(tmp_path_factory):
     """A recording of a tip on x = t³ [m], its reference 1 mm beside it."""
     out = tmp_path_factory.mktemp("bags") / "cubic"
-    stamps = np.arange(COUNT) * TICK_NS
+    stamps = np.arange(1, COUNT + 1) * TICK_NS
     poses = np.tile([0.0, 0, 0, 1, 0, 0, 0], (COUNT, 1))
     poses[:, 0] = (np.arange(COUNT) * 1e-3) ** 3
     beside = poses + np.array([0, 1e-3, 0, 0, 0, 0, 0])
@@ -175,7 +175,7 @@ def test_metric_gets_each_sample_once_and_shares_what_others_compute(bag):
             return {}
 
     evaluate(bag, further=[Count])
-    assert seen == list(range(0, COUNT * TICK_NS, TICK_NS))
+    assert seen == list(range(TICK_NS, (COUNT + 1) * TICK_NS, TICK_NS))
 
 
 def test_topic_that_was_not_recorded_has_no_samples(bag):

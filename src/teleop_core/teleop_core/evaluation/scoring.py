@@ -22,6 +22,7 @@ from teleop_core.evaluation.plain import Plain, leaves, plain
 from teleop_core.evaluation.registry import all_metrics
 from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Result, Score, Session
+from teleop_core.evaluation.span import Seconds, Span, span_of
 from teleop_core.evaluation.state_history import StateHistory, read_history
 from teleop_core.evaluation.windows import DisorderError, Window, whole, windows
 from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
@@ -52,60 +53,80 @@ class Study(NamedTuple):
         return found
 
 
-def evaluate(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = ()) -> Score:
+def evaluate(
+    bag: Bag,
+    arm: str = "",
+    further: Sequence[type[Metric]] = (),
+    span: Seconds | None = None,
+) -> Score:
     """Score of one arm of a recording.
 
     Args:
         bag: The recording.
         arm: Name of the arm; empty for the default one.
         further: Metrics beside those of the registry.
+        span: Begin and end [s] of what is scored, since the first message; None for all of it.
+            Counts of messages, and what nodes reported, are of the whole recording.
 
     Raises:
+        ParameterError: The span is empty or lies beyond the recording.
         PartError: An added metric is no metric, or does not keep to its keys.
         EvaluationError: Nothing in the recording can be compared, or a metric fails.
         RecordingError: It lacks one of :data:`REQUIRED`, or is damaged.
         UnknownNameError: It has no such arm.
     """
-    return study(bag, arm, further).score
+    return study(bag, arm, further, span).score
 
 
-def scores(bag: Bag, further: Sequence[type[Metric]] = ()) -> list[Score]:
+def scores(
+    bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None
+) -> list[Score]:
     """Scores of all arms of a recording, the default arm first; as :func:`evaluate`."""
-    return [found.score for found in studies(bag, further)]
+    return [found.score for found in studies(bag, further, span)]
 
 
-def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = ()) -> Study:
+def study(
+    bag: Bag,
+    arm: str = "",
+    further: Sequence[type[Metric]] = (),
+    span: Seconds | None = None,
+) -> Study:
     """Score of one arm with its metrics; raises as :func:`evaluate`."""
     makers = all_metrics(further)
     view = of_arm(bag, arm)
     view.require(REQUIRED)
-    context, metrics = _run(view, arm or arm_names(bag)[0], makers)
+    context, metrics = _run(view, arm or arm_names(bag)[0], makers, span_of(bag, span))
     results = tuple(_result(context, metric) for metric in metrics)
     score = Score(_session(context), _compared(results))
     if not score.samples.scored:
+        whose = f" of arm {arm}" * bool(arm) + " in the span" * (span is not None)
         raise EvaluationError(
-            f"{bag.path}: no {SLAVE_MEASURED_CP.name}{f' of arm {arm}' * bool(arm)} has a valid "
+            f"{bag.path}: no {SLAVE_MEASURED_CP.name}{whose} has a valid "
             f"{SLAVE_SETPOINT_CP.name} of the same tick; they must be recorded together"
         )
     return Study(score, tuple(metrics), bands_of(context))
 
 
-def studies(bag: Bag, further: Sequence[type[Metric]] = ()) -> list[Study]:
+def studies(
+    bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None
+) -> list[Study]:
     """All arms of a recording, the default arm first; as :func:`evaluate`."""
-    return [study(bag, arm, further) for arm in arm_names(bag)]
+    return [study(bag, arm, further, span) for arm in arm_names(bag)]
 
 
 Cut = Callable[[Bag, Iterable[Topic], StateHistory], Iterable[Window]]
 
 
-def _run(bag: Bag, arm: str, makers: Sequence[type[Metric]]) -> tuple[Context, list[Metric]]:
-    """Metrics after the whole recording."""
+def _run(
+    bag: Bag, arm: str, makers: Sequence[type[Metric]], span: Span | None
+) -> tuple[Context, list[Metric]]:
+    """Metrics after the whole recording, or its span."""
     history, origin = read_history(bag), read_origin(bag, arm)
     try:
-        context = Context(bag, arm, history, origin)
+        context = Context(bag, arm, history, origin, span)
         return context, _feed(context, makers, windows)
     except DisorderError:
-        context = Context(bag, arm, history, origin)
+        context = Context(bag, arm, history, origin, span)
         return context, _feed(context, makers, whole)
 
 
@@ -117,9 +138,10 @@ def _feed(context: Context, makers: Sequence[type[Metric]], cut: Cut) -> list[Me
             metrics.append(context.shared(maker))
     context.shared(Gains)
     accumulators = context.begin()
+    found = cut(context.bag, context.topics, context.history)
     # What foreign devices record may be infinite; such samples are left out and counted.
     with np.errstate(invalid="ignore", over="ignore"):
-        for window in cut(context.bag, context.topics, context.history):
+        for window in context.span.cut(found) if context.span else found:
             for accumulator in accumulators:
                 with _named(place, accumulator):
                     accumulator.add(window)
@@ -159,7 +181,7 @@ def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
     if share is not None and share >= COMPARABLE:
         return results
     told = "not known" if share is None else f"{100.0 * share:.0f} % < {100.0 * COMPARABLE:.0f} %"
-    note = Row(REACH_GROUP, "published figures: followed", "", told)
+    note = Row(REACH_GROUP, "too little to compare", "", told)
     found = []
     for result in results:
         rows = tuple(replace(entry, is_met=None) for entry in result.rows)
@@ -195,7 +217,7 @@ def _checked(metric: Metric, tree: dict[str, Plain]) -> dict[str, Plain]:
 
 
 def _session(context: Context) -> Session:
-    bag = context.bag
+    bag, span = context.bag, context.span
     seed = bag.metadata.get("seed", "")
     return Session(
         name=bag.path.resolve().name,
@@ -205,4 +227,6 @@ def _session(context: Context) -> Session:
         duration_s=(bag.end_ns - bag.start_ns) * 1e-9,
         gain=context.shared(Gains).gain,
         arm=context.arm,
+        from_s=0.0 if span is None else (span.first_ns - bag.start_ns) * 1e-9,
+        to_s=((bag.end_ns if span is None else span.last_ns) - bag.start_ns) * 1e-9,
     )

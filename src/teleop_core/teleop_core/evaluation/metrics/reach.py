@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from teleop_core.evaluation.accumulators import Moments, Spread
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
-from teleop_core.evaluation.rows import MISSING, Row, row, spread_rows
+from teleop_core.evaluation.rows import MISSING, Row, row
 from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array
@@ -96,17 +96,18 @@ class ReachMetric(Metric):
     def rows(self) -> list[Row]:
         """Shares in percent, the longest stretch, residuals, and whether figures compare."""
         score = self.values()
-        causes = (score.joint_share, score.workspace_share, score.singularity_share,
-                  score.speed_share)  # fmt: skip
-        rows = [
+        return [
             Row(GROUP, "followed, time", "%", _percent(score.followed_share)),
-            row(GROUP, "not followed, longest", "s", score.longest_s),
-            Row(GROUP, "joint/workspace/singularity/speed", "%", "/".join(map(_percent, causes))),
-            Row(GROUP, "aligned anew, time", "%", _percent(score.aligning_share)),
-            *spread_rows(GROUP, "IK residual", "mm", score.residual_mm),
-            row(GROUP, "IK residual, angle, max", "deg", score.residual_deg.max),
+            row(GROUP, "longest not followed", "s", score.longest_s),
+            Row(GROUP, "at a joint's end", "%", _percent(score.joint_share)),
+            Row(GROUP, "beyond the workspace", "%", _percent(score.workspace_share)),
+            Row(GROUP, "near a singularity", "%", _percent(score.singularity_share)),
+            Row(GROUP, "joints too slow", "%", _percent(score.speed_share)),
+            Row(GROUP, "aligned anew", "%", _percent(score.aligning_share)),
+            row(GROUP, "left by IK, RMS", "mm", score.residual_mm.rms),
+            row(GROUP, "left by IK, max", "mm", score.residual_mm.max),
+            row(GROUP, "left by IK, max", "deg", score.residual_deg.max),
         ]
-        return [entry for entry in rows if "S.D." not in entry.label]
 
 
 def _percent(share: float | None) -> str:
