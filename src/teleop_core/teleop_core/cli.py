@@ -130,6 +130,10 @@ def _add_evaluate(commands: Any) -> None:
     score.add_argument("bags", type=Path, nargs="+", metavar="BAG", help="recordings to score")
     score.add_argument("--json", type=Path, metavar="FILE", help="write the scores as JSON")
     score.add_argument("--html", type=Path, metavar="FILE", help="write one page with plots")
+    score.add_argument(
+        "--span", type=float, nargs=2, metavar=("FROM", "TO"),
+        help="score only what was recorded between two times [s] since the first message",
+    )  # fmt: skip
 
 
 def _add_lookups(commands: Any) -> None:
@@ -220,7 +224,8 @@ def _evaluate(arguments: argparse.Namespace) -> int:
 
     from teleop_core.evaluation.command import evaluate_bags
 
-    evaluate_bags(arguments.bags, arguments.json, arguments.html, Console())
+    span = tuple(arguments.span) if arguments.span else None
+    evaluate_bags(arguments.bags, arguments.json, arguments.html, Console(), span)
     return 0
 
 

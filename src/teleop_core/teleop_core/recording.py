@@ -193,25 +193,35 @@ class Recording:
 
         return pandas.concat(frames, axis=1)
 
-    def score(self, arm: str = "", further: "Sequence[type[Metric]]" = ()) -> "Score":
+    def score(
+        self,
+        arm: str = "",
+        further: "Sequence[type[Metric]]" = (),
+        span: tuple[float, float] | None = None,
+    ) -> "Score":
         """Score of one arm.
 
         Args:
             arm: Its name; empty for the default arm.
             further: Metrics beside the registered ones.
+            span: Begin and end [s] of what is scored, since the first message; None for all of it.
 
         Raises:
             TeleopError: Nothing can be scored; the text says why.
         """
         from teleop_core.evaluation import evaluate
 
-        return evaluate(self._bag, arm, further)
+        return evaluate(self._bag, arm, further, span)
 
-    def scores(self, further: "Sequence[type[Metric]]" = ()) -> "list[Score]":
+    def scores(
+        self,
+        further: "Sequence[type[Metric]]" = (),
+        span: tuple[float, float] | None = None,
+    ) -> "list[Score]":
         """Scores of all arms, the default one first; as :meth:`score`."""
         from teleop_core.evaluation import scores
 
-        return scores(self._bag, further)
+        return scores(self._bag, further, span)
 
     def save(self, path: Path | str) -> "Recording":
         """Write it to a new directory, as ``ros2 bag`` reads it.

@@ -10,11 +10,16 @@ from teleop_core.bags.reader import Bag
 from teleop_core.errors import EvaluationError
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.scoring import Study, studies
+from teleop_core.evaluation.span import Seconds
 from teleop_core.evaluation.table import score_tables
 
 
 def evaluate_bags(
-    paths: Sequence[Path], json_file: Path | None, html_file: Path | None, console: Console
+    paths: Sequence[Path],
+    json_file: Path | None,
+    html_file: Path | None,
+    console: Console,
+    span: Seconds | None = None,
 ) -> list[Score]:
     """Score recordings, show the table, and write JSON and page if wanted.
 
@@ -25,6 +30,7 @@ def evaluate_bags(
         json_file: Where the scores go: a list with one entry per recording and arm.
         html_file: Where the page goes.
         console: Where the table and the paths of the files are shown.
+        span: Begin and end [s] of what is scored of each; None for all.
 
     Returns:
         One score per recording and arm.
@@ -36,7 +42,7 @@ def evaluate_bags(
     for file in (json_file, html_file):
         if file is not None:
             _check_place(file)
-    found = [study for path in paths for study in studies(Bag(path))]
+    found = [study for path in paths for study in studies(Bag(path), span=span)]
     scores = [study.score for study in found]
     for table in score_tables(scores, console.width):
         console.print(table)

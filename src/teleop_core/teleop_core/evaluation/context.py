@@ -6,6 +6,7 @@ from typing import Protocol, TypeVar, cast
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import EvaluationError
 from teleop_core.evaluation.origin import Origin
+from teleop_core.evaluation.span import Span
 from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.evaluation.windows import Window
 from teleop_core.topics import Topic
@@ -30,10 +31,14 @@ class Context:
         history: What teleop/state said at any time.
         origin: The session it was made in: graph, streams, chain of stages, map of axes.
         robot: Name of the robot; None if unknown.
+        span: What is scored; None for all of it.
     """
 
-    def __init__(self, bag: Bag, arm: str, history: StateHistory, origin: Origin) -> None:
+    def __init__(
+        self, bag: Bag, arm: str, history: StateHistory, origin: Origin, span: Span | None = None
+    ) -> None:
         self.bag, self.arm, self.history, self.origin = bag, arm, history, origin
+        self.span = span
         self.robot = bag.metadata.get("robot") or None
         self._read: dict[str, Topic] = {}
         self._parts: dict[Callable[[Context], Accumulator], Accumulator] = {}

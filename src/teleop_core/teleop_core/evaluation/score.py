@@ -26,6 +26,7 @@ SESSION_KEYS = (
     Key("session.duration_s", "s", "first to last message"),
     Key("session.gain", "m/m", "gain that was in force most of the time; null if unknown"),
     Key("session.arm", "1", "arm that was scored; empty if the recording names no arms"),
+    Key("session.from_s|to_s", "s", "what was scored, since the first message"),
 )
 """Keys of what is told about a recording, beside those of its metrics."""
 Record = TypeVar("Record")
@@ -50,7 +51,8 @@ def key_table() -> str:
 class Session:
     """Which recording was scored; texts as in its metadata, None if it has none.
 
-    ``arm`` is empty for the default arm of a recording that names no arms.
+    ``arm`` is empty for the default arm of a recording that names no arms. ``from_s`` and ``to_s``
+    bound what was scored, since the first message; None stands for the last one.
     """
 
     name: str
@@ -60,6 +62,14 @@ class Session:
     duration_s: float
     gain: float | None
     arm: str = ""
+    from_s: float = 0.0
+    to_s: float | None = None
+
+    @property
+    def is_part(self) -> bool:
+        """Whether only a span of the recording was scored."""
+        end = self.duration_s if self.to_s is None else self.to_s
+        return self.from_s > 0.0 or end < self.duration_s
 
     @property
     def title(self) -> str:
@@ -241,5 +251,6 @@ def facts(session: Session) -> Iterator[str]:
         None if session.seed is None else f"seed {session.seed}",
         f"{session.duration_s:.1f} s",
         None if session.gain is None else f"gain {session.gain:g}",
+        session.is_part and f"scored from {session.from_s:g} to {session.to_s:g} s",
     )
     return (fact for fact in found if fact)

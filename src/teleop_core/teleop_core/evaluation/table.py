@@ -56,6 +56,7 @@ def heading(session: Session) -> str:
         f"{session.robot or 'unknown'}{seed}",
         mode and f"mode {mode.mode}",
         session.arm and f"arm {session.arm}",
+        session.is_part and f"{session.from_s:g}–{session.to_s:g} s",
     )
     return "\n".join(line for line in lines if line)
 

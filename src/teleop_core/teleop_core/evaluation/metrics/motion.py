@@ -99,12 +99,16 @@ class MotionMetric(Metric):
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._begin_s = (approach_end_ns(context) - context.bag.start_ns) * 1e-9
+        begin_ns = approach_end_ns(context) if context.span is None else context.span.first_ns
+        self._begin_s = (begin_ns - context.bag.start_ns) * 1e-9
         self._streams = {topic: _Stream(topic, context.bag.start_ns) for topic in self.topics}
         self._found: dict[Topic, Kinematics] = {}
+        self._score: MotionScore | None = None
 
     def add(self, window: Window) -> None:
         """Take one window."""
+        self._score = None
+        self._found.clear()
         for stream in self._streams.values():
             stream.add(window)
 
@@ -121,6 +125,10 @@ class MotionMetric(Metric):
 
     def values(self) -> MotionScore:
         """Figures of the whole, with the fixture on, and between clutch strokes."""
+        self._score = self._score or self._scored()
+        return self._score
+
+    def _scored(self) -> MotionScore:
         hand, counts = self._kinematics(MASTER_MEASURED_CP)
         slave, slave_counts = self._kinematics(SLAVE_MEASURED_CP)
         states = self._states(hand)
