@@ -8,6 +8,7 @@ topics.
 Everything a user needs is here:
 
 - :func:`run`, :func:`replay`, :func:`open_recording`: sessions and what was recorded of them;
+- :func:`import_recording`, :func:`export_recording`: recordings of others, and ours for others;
 - :func:`configuration`: what a session runs, checked;
 - :func:`load_robot`, :func:`list_robots`, :func:`robot_from_table`: arms;
 - :class:`Stage`, :class:`Fixture`, :class:`Controller`, :class:`Operator`, :class:`Metric` and the
@@ -36,6 +37,13 @@ if TYPE_CHECKING:
         UnknownNameError,
     )
     from teleop_core.evaluation import Key, Metric, Score, register_metric
+    from teleop_core.exchange import (
+        ExportReport,
+        ImportOptions,
+        ImportReport,
+        export_recording,
+        import_recording,
+    )
     from teleop_core.fixtures import Fixture, register_fixture
     from teleop_core.graph import Graph, build_graph
     from teleop_core.kernels import kernel
@@ -69,6 +77,13 @@ _PLACES = {
         "UnknownNameError",
     ),
     "evaluation": ("Key", "Metric", "Score", "register_metric"),
+    "exchange": (
+        "ExportReport",
+        "ImportOptions",
+        "ImportReport",
+        "export_recording",
+        "import_recording",
+    ),
     "fixtures": ("Fixture", "register_fixture"),
     "graph": ("Graph", "build_graph"),
     "kernels": ("kernel",),
@@ -86,8 +101,11 @@ _HOME = {name: module for module, names in _PLACES.items() for name in names}
 __all__ = [
     "Controller",
     "EvaluationError",
+    "ExportReport",
     "Fixture",
     "Graph",
+    "ImportOptions",
+    "ImportReport",
     "KernelError",
     "Key",
     "Kind",
@@ -112,7 +130,9 @@ __all__ = [
     "__version__",
     "build_graph",
     "configuration",
+    "export_recording",
     "following",
+    "import_recording",
     "kernel",
     "list_robots",
     "load_robot",

@@ -28,6 +28,7 @@ then:
 def add(commands: Any) -> None:
     """Add the commands."""
     _add_import(commands)
+    _add_export(commands)
 
 
 def _add_import(commands: Any) -> None:
@@ -129,6 +130,59 @@ def _damage(group: Any) -> None:
     group.add_argument(
         "--gap", type=float, metavar="N", help="tell gaps longer than N periods (default: 5)"
     )
+
+
+_EXPORT = """\
+Write a recording as CSV or Parquet, with a column for each number of each topic over the time, or
+recordings as a LeRobot data set (version 3.0 of its format, no pictures) with an episode each.
+"""
+_EXPORT_EXAMPLES = """\
+examples:
+  teleop export bags/coarse --out coarse.csv
+  teleop export bags/coarse --out tip.parquet --topics slave/measured_cp slave/servo_cp
+  teleop export bags/coarse --out coarse_100hz.csv --rate 100 --units
+  teleop export bags/a bags/b --out dataset --format lerobot --task "follow the edge"
+"""
+
+
+def _add_export(commands: Any) -> None:
+    parser = command(commands, "export", _export, "write recordings as tables or a data set")
+    parser.description, parser.epilog = _EXPORT, _EXPORT_EXAMPLES
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("bags", type=Path, nargs="+", metavar="BAG", help="recordings to export")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="X",
+        help="file or directory to make: .csv, .csv.gz, .parquet, or no end for a data set",
+    )  # fmt: skip
+    parser.add_argument(
+        "--format", choices=("csv", "parquet", "lerobot"), help="in place of what --out ends with"
+    )
+    parser.add_argument("--topics", nargs="+", default=(), metavar="TOPIC", help="only these")
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ",
+        help="rows per second, each with the newest values (default: every message; lerobot: 50)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--units", action="store_true", help="put the unit behind each column: 'tip.x [m]'"
+    )
+    parser.add_argument(
+        "--action", choices=("joints", "tip"), default="joints",
+        help="lerobot: what the actions are, slave/servo_jp (default) or slave/servo_cp",
+    )  # fmt: skip
+    parser.add_argument(
+        "--task", default="teleoperation", metavar="TEXT", help="lerobot: what is done, in words"
+    )
+
+
+def _export(arguments: argparse.Namespace) -> int:
+    from teleop_core.exchange import export_recording
+
+    report = export_recording(
+        arguments.bags, arguments.out, arguments.format, topics=arguments.topics,
+        rate=arguments.rate, units=arguments.units, action=arguments.action, task=arguments.task,
+    )  # fmt: skip
+    print(report)
+    return 0
 
 
 def _import(arguments: argparse.Namespace) -> int:

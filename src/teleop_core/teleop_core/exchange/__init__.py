@@ -9,19 +9,29 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from teleop_core.exchange.exporting import ExportReport, export_recording
     from teleop_core.exchange.importing import import_recording
     from teleop_core.exchange.master_bag import as_master_bag
     from teleop_core.exchange.options import ImportOptions
     from teleop_core.exchange.report import ImportReport
 
 _HOME = {
+    "ExportReport": "exporting",
     "ImportOptions": "options",
     "ImportReport": "report",
     "as_master_bag": "master_bag",
+    "export_recording": "exporting",
     "import_recording": "importing",
 }
 
-__all__ = ["ImportOptions", "ImportReport", "as_master_bag", "import_recording"]
+__all__ = [
+    "ExportReport",
+    "ImportOptions",
+    "ImportReport",
+    "as_master_bag",
+    "export_recording",
+    "import_recording",
+]
 
 
 def __getattr__(name: str) -> object:
