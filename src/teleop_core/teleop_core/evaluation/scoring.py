@@ -181,7 +181,7 @@ def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
     if share is not None and share >= COMPARABLE:
         return results
     told = "not known" if share is None else f"{100.0 * share:.0f} % < {100.0 * COMPARABLE:.0f} %"
-    note = Row(REACH_GROUP, "published figures: followed", "", told)
+    note = Row(REACH_GROUP, "too little to compare", "", told)
     found = []
     for result in results:
         rows = tuple(replace(entry, is_met=None) for entry in result.rows)
