@@ -12,7 +12,7 @@ from teleop_core.geometry import Array
 from teleop_core.signals import STATE
 from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
 
-GROUP = "against what the hand asked for"
+GROUP = "against what was asked for"
 _FIRST_NS = -(2**62)
 
 
