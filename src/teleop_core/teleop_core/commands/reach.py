@@ -48,6 +48,8 @@ def _run(arguments: argparse.Namespace) -> int:
     for file in (arguments.html, arguments.out):
         if file is not None and not file.parent.is_dir():
             raise TeleopError(f"{file}: the directory {file.parent} does not exist; make it first")
+    if not 0.0 < arguments.share <= 100.0:
+        raise TeleopError(f"--share {arguments.share:g} must be above 0 and at most 100 percent")
     found = [_reach(source, arguments) for source in arguments.sources]
     print("\n\n".join(map(str, found)))
     if arguments.html is not None:

@@ -38,6 +38,12 @@ class AskedPath:
         """Times (N,) [s] since the first sample."""
         return np.asarray((self.stamp_ns - self.stamp_ns[0]) * 1e-9, dtype=np.float64)
 
+    @property
+    def stylus(self) -> Array:
+        """Attitude of the stylus, quaternion (4,), at the first sample without the clutch."""
+        is_free = self.buttons[:, 0] == 0.0
+        return np.array(self.poses[int(is_free.argmax()), 3:])
+
     def limited(self, count: int) -> "AskedPath":
         """The same path with about ``count`` samples at most, evenly spread over the time."""
         return self if len(self) <= count else self.excerpt(count / self.time[-1], 2 * count)

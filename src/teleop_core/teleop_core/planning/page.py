@@ -27,12 +27,14 @@ COLORS = {
 """Of samples that are followed, and of those that are not by their causes."""
 # More points than these make the page slow and the picture no clearer.
 _POINTS, _WORKSPACE, _BINS = 6_000, 3_000, 1_500
+_ROWS = (2, 3)  # of the figure, with curves over the time
 _AXES = (("x", "#1971c2"), ("y", "#495057"), ("z", "#b08900"))
 _STYLE = """\
 body { font: 15px/1.45 system-ui, sans-serif; margin: 1rem auto; max-width: 1500px;
   padding: 0 1rem; }
 pre { overflow-x: auto; background: #f4f4f2; padding: .8rem; font-size: 13px; }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 460px), 1fr)); }
+.pair > div { min-width: 0; overflow: hidden; }
 """
 _HEAD = """\
 <!DOCTYPE html>
@@ -41,6 +43,11 @@ _HEAD = """\
 <title>{title}</title><style>
 {style}</style></head><body>
 <noscript><p>The plots need JavaScript, which is off here; the tables are all there.</p></noscript>
+"""
+# The first figure is drawn before the second takes its half of the width.
+_TAIL = """\
+<script>addEventListener("load", () => dispatchEvent(new Event("resize")));</script>
+</body></html>
 """
 _NOTES = """\
 <p>In space: the path of the hand as it is asked of the slave, with nothing cut off, over places
@@ -69,10 +76,12 @@ def write_reach_page(reaches: Sequence[Reach], file: Path) -> None:
         for name, followed in kinds:
             drawn = reach_figure(reach, followed, name)
             is_first = not any("plotly.js" in part for part in parts)
-            html = drawn.to_html(full_html=False, include_plotlyjs=is_first)
+            html = drawn.to_html(
+                full_html=False, include_plotlyjs=is_first, config={"responsive": True}
+            )
             parts.append(f"<div>{html}</div>")
         parts.append("</div>")
-    file.write_text("\n".join([*parts, "</body></html>", ""]), encoding="utf-8")
+    file.write_text("\n".join([*parts, _TAIL]), encoding="utf-8")
 
 
 def reach_figure(reach: Reach, followed: Followed, name: str) -> plots.Figure:
@@ -92,7 +101,8 @@ def reach_figure(reach: Reach, followed: Followed, name: str) -> plots.Figure:
     axes = {f"{axis}axis": {"title": f"{axis} [m]"} for axis in "xyz"}
     figure.update_layout(
         height=980, template="plotly_white", scene={**axes, "aspectmode": "data"},
-        legend={"orientation": "h", "y": -0.06}, margin={"l": 60, "r": 10, "t": 40, "b": 40},
+        legend={"orientation": "h", "y": -0.06, "itemsizing": "constant"},
+        margin={"l": 60, "r": 10, "t": 60, "b": 40},
     )  # fmt: skip
     return figure
 
@@ -119,7 +129,7 @@ def _in_space(followed: Followed) -> list[Any]:
             traces.append(
                 plots.Scatter3d(
                     x=x, y=y, z=z, mode="markers", marker={"size": 2, "color": color},
-                    name=_label(cause), legendgroup=cause.name,
+                    name=_label(cause),
                 )
             )  # fmt: skip
     x, y, z = ([value] for value in walked.asked[0, :3])
@@ -133,30 +143,35 @@ def _add_times(figure: Any, path: AskedPath, walked: Walked) -> None:
     kept, time = _spread(len(path), _POINTS), path.time
     moves = 1e3 * (walked.asked[:, :3] - walked.asked[0, :3])
     turns = np.degrees(rotation_vectors(walked.asked[:, 3:]))
-    for row, values, unit in ((2, moves, "position [mm]"), (3, turns, "turn [°]")):
+    curves = ((moves, "position [mm]"), (turns, "turn [°]"))
+    for row, (values, unit) in zip(_ROWS, curves, strict=True):
         for cause, bins in _bands(path, walked):
             _add_band(figure, row, bins, cause)
         for column, (axis, color) in enumerate(_AXES):
             figure.add_trace(
                 plots.Scatter(
                     x=time[kept], y=values[kept, column], mode="lines", name=axis,
-                    line={"width": 1.2, "color": color}, legendgroup=axis, showlegend=row == 2,
+                    line={"width": 1.2, "color": color}, legendgroup=axis,
+                    showlegend=row == _ROWS[0],
                 ),
-                row=row, col=1,
+                row=row, col=1, secondary_y=True,
             )  # fmt: skip
-        figure.update_yaxes(title_text=unit, row=row, col=1, secondary_y=False)
-        figure.update_yaxes(range=[0, 1], visible=False, row=row, col=1, secondary_y=True)
-    figure.update_xaxes(matches="x", row=3, col=1, title_text="time [s]")
+        figure.update_yaxes(
+            title_text=unit, side="left", tickmode="auto", row=row, col=1, secondary_y=True
+        )
+        figure.update_yaxes(range=[0, 1], visible=False, row=row, col=1, secondary_y=False)
+    figure.update_xaxes(matches="x", row=_ROWS[1], col=1, title_text="time [s]")
 
 
 def _add_band(figure: Any, row: int, bins: tuple[Array, Array], cause: Limit) -> None:
     begins, is_so = bins
+    red, green, blue = bytes.fromhex(COLORS[cause][1:])
     band = plots.Scatter(
         x=begins, y=is_so, mode="lines", line={"width": 0, "shape": "hv"}, fill="tozeroy",
-        fillcolor=COLORS[cause], opacity=0.35, name=_label(cause), legendgroup=cause.name,
-        showlegend=False, hoverinfo="skip",
+        fillcolor=f"rgba({red}, {green}, {blue}, 0.35)", name=f"not: {_label(cause)}",
+        legendgroup=cause.name, showlegend=row == _ROWS[0], hoverinfo="skip",
     )  # fmt: skip
-    figure.add_trace(band, row=row, col=1, secondary_y=True)
+    figure.add_trace(band, row=row, col=1, secondary_y=False)
 
 
 def _bands(path: AskedPath, walked: Walked) -> Iterable[tuple[Limit, tuple[Array, Array]]]:

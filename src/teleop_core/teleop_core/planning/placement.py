@@ -19,6 +19,8 @@ class Placement:
         coarse_gain: Slave motion per hand motion in coarse mode.
         fine_gain: The same in fine mode.
         rotation_gain: Share of the stylus' turn that the tool makes.
+        tool_axes: The tool's x, y, z as axes of the stylus: ``motion_scaling.tool_axes``.
+        tool_roll: Turn [rad] of the tool about its axis, after that.
     """
 
     start: tuple[float, ...]
@@ -26,6 +28,8 @@ class Placement:
     coarse_gain: float
     fine_gain: float
     rotation_gain: float
+    tool_axes: tuple[str, ...]
+    tool_roll: float
 
     @staticmethod
     def of(parameters: MotionScalingParameters, start: tuple[float, ...]) -> "Placement":
@@ -36,6 +40,8 @@ class Placement:
             coarse_gain=parameters.coarse_gain,
             fine_gain=parameters.fine_gain,
             rotation_gain=parameters.rotation_gain,
+            tool_axes=parameters.tool_axes,
+            tool_roll=parameters.tool_roll,
         )
 
     def settings(self, arm: str = "") -> dict[str, Setting]:
@@ -51,6 +57,8 @@ class Placement:
             f"{prefix}motion_scaling.coarse_gain": self.coarse_gain,
             f"{prefix}motion_scaling.fine_gain": self.fine_gain,
             f"{prefix}motion_scaling.rotation_gain": self.rotation_gain,
+            f"{prefix}motion_scaling.tool_axes": list(self.tool_axes),
+            f"{prefix}motion_scaling.tool_roll": self.tool_roll,
         }
 
     def texts(self, arm: str = "") -> list[str]:
@@ -68,5 +76,5 @@ class Placement:
 
 def _text(value: Setting) -> str:
     if not isinstance(value, list):
-        return f"{value:.6g}"
-    return "[" + ",".join(v if isinstance(v, str) else f"{v:.6g}" for v in value) + "]"
+        return repr(value)
+    return "[" + ",".join(v if isinstance(v, str) else repr(v) for v in value) + "]"

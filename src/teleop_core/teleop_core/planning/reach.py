@@ -6,7 +6,8 @@ from pathlib import Path
 
 from teleop_core.api import run
 from teleop_core.bags.arms import of_arm
-from teleop_core.errors import ParameterError
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.planning.aim import Aim
 from teleop_core.planning.asked import AskedPath, asked_path
 from teleop_core.planning.placement import Placement
 from teleop_core.planning.search import Search
@@ -30,7 +31,7 @@ GOAL = 0.99
 Progress = Callable[[int, int], None]
 Setting = float | str | bool | Sequence[float] | Sequence[str]
 # Samples that are walked at most: of the whole path, and of the excerpt on which the search goes.
-_WHOLE, _EXCERPT = 300_000, 6_000
+_WHOLE, _EXCERPT = 150_000, 6_000
 _EXCERPT_RATE = 20.0  # Hz
 # Walks that a search usually takes, for the progress.
 _USUAL_WALKS = 500
@@ -47,12 +48,14 @@ class Followed:
         session: As in a session: limits cut the hand's motion, joints have their speeds.
         in_place: The path where it is, nothing cut, joints as fast as needed.
         at_given_gain: Share of the time that a session would follow with the gains that were given.
+        misfit: Angle [rad] by which the axes of the tool's turns are off those of the hand's.
     """
 
     placement: Placement
     session: Walked
     in_place: Walked
     at_given_gain: float
+    misfit: float
 
     @property
     def share(self) -> float:
@@ -182,7 +185,9 @@ def _configured(
     source: Recording | Path | str, changes: list[Layer]
 ) -> tuple[Configuration, Recording]:
     """Configuration with the changes, and the recording; of a scenario one that is made now."""
-    if isinstance(source, str) and source in list_scenarios() and not Path(source).exists():
+    if isinstance(source, str) and not Path(source).exists():
+        if source not in list_scenarios():
+            raise UnknownNameError("recording or scenario", source, list_scenarios())
         made = _of_scenario(source, changes)
         return made, run(made)
     recording = source if isinstance(source, Recording) else open_recording(source)
@@ -211,26 +216,29 @@ def _reach(
         done += 1
         progress(min(done, _USUAL_WALKS - 1), _USUAL_WALKS)
 
-    as_given = _followed(whole, given, given)
+    aim = Aim(whole.robot, path.stylus, given)
+    as_given = _followed(whole, given, given, aim)
     proposed = as_given
     if as_given.share < goal:
         excerpt = Walker(path.excerpt(_EXCERPT_RATE, _EXCERPT), scaling, solving)
-        proposed = _proposed(whole, Search(excerpt, given, tell), as_given, goal)
+        proposed = _proposed(whole, Search(excerpt, given, aim, tell), as_given, goal, aim)
     progress(_USUAL_WALKS, _USUAL_WALKS)
     return Reach(whole.path, whole.robot, goal, as_given, proposed, arm)
 
 
-def _followed(walker: Walker, placement: Placement, given: Placement) -> Followed:
+def _followed(walker: Walker, placement: Placement, given: Placement, aim: Aim) -> Followed:
     full = replace(placement, coarse_gain=given.coarse_gain, fine_gain=given.fine_gain)
+    session = walker.walk(placement)
     return Followed(
         placement=placement,
-        session=walker.walk(placement),
+        session=session,
         in_place=walker.walk(placement, is_cut=False),
-        at_given_gain=walker.share(full),
+        at_given_gain=session.share if full == placement else walker.share(full),
+        misfit=aim.misfit(placement),
     )
 
 
-def _proposed(whole: Walker, search: Search, given: Followed, goal: float) -> Followed:
+def _proposed(whole: Walker, search: Search, given: Followed, goal: float, aim: Aim) -> Followed:
     """Best placement found; the goal on the excerpt is raised until the whole path reaches it."""
     best, wanted = (given.share, given.placement), goal
     for _ in range(_ATTEMPTS):
@@ -240,4 +248,4 @@ def _proposed(whole: Walker, search: Search, given: Followed, goal: float) -> Fo
         if share >= goal or wanted >= 1.0:
             break
         wanted += 1.5 * (goal - share)
-    return _followed(whole, best[1], given.placement)
+    return _followed(whole, best[1], given.placement, aim)

@@ -5,20 +5,16 @@ motion drifts against a limit the start is moved by what was cut off, which is h
 middle of its room the arm began.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from teleop_core.geometry import (
-    Array,
-    multiply_quaternions,
-    transform_from_pose,
-)
-from teleop_core.mapping.motion_scaling import AXES
+from teleop_core.geometry import Array, multiply_quaternions, transform_from_pose
+from teleop_core.planning.aim import Aim
 from teleop_core.planning.placement import Placement
+from teleop_core.planning.turns import turns
 from teleop_core.planning.walk import Walker
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.room import roomy_postures
@@ -40,31 +36,23 @@ Found = tuple[float, Placement]
 """Share of the time that is followed, and with what."""
 
 
-def turns() -> list[tuple[str, ...]]:
-    """The 24 maps of axes that do not mirror, as ``motion_scaling.axes`` takes them."""
-    found = []
-    for axes in itertools.product(AXES, repeat=3):
-        matrix = np.zeros((3, 3))
-        for row, axis in enumerate(axes):
-            matrix[row, "xyz".index(axis[1])] = 1.0 if axis[0] == "+" else -1.0
-        if math.isclose(float(np.linalg.det(matrix)), 1.0):
-            found.append(axes)
-    return found
-
-
 class Search:
     """Search for a placement.
 
     Args:
         walker: Walks the path, or an excerpt of it.
         given: Placement to begin with; its gains are the largest that are tried.
+        aim: Fits the tool's axes to every start and turn.
         tell: Called before every walk.
     """
 
-    def __init__(self, walker: Walker, given: Placement, tell: Callable[[], None]) -> None:
-        self._walker, self._given, self._goal, self._tell = walker, given, 1.0, tell
+    def __init__(
+        self, walker: Walker, given: Placement, aim: Aim, tell: Callable[[], None]
+    ) -> None:
+        self._walker, self._given, self._aim, self._tell = walker, given, aim, tell
+        self._goal = 1.0
         self._known: dict[Placement, float] = {}
-        self._starts = [_rounded(q) for q in roomy_postures(walker.robot, STARTS)]
+        self._starts = [self._rounded(q) for q in roomy_postures(walker.robot, STARTS)]
 
     def best(self, goal: float) -> Found:
         """The placement with the largest gains that reach the goal, or the one that comes nearest.
@@ -175,14 +163,15 @@ class Search:
         """Joints from which the whole path passes through the pose ``cut`` at sample ``at``."""
         pose, inverse, T = np.empty(7), whole[at, 3:] * (1.0, -1.0, -1.0, -1.0), np.empty((4, 4))
         pose[:3] = whole[0, :3] + cut[:3] - whole[at, :3]
-        multiply_quaternions(np.ascontiguousarray(whole[0, 3:]), inverse, pose[3:])
-        multiply_quaternions(pose[3:], np.ascontiguousarray(cut[3:]), pose[3:])
+        multiply_quaternions(np.ascontiguousarray(cut[3:]), inverse, pose[3:])
+        multiply_quaternions(pose[3:], np.ascontiguousarray(whole[0, 3:]), pose[3:])
         pose[3:] /= np.linalg.norm(pose[3:])
         transform_from_pose(pose, T)
         answer = self._walker.robot.ik(T, np.array(start))
-        return _rounded(answer.q) if answer.status is IkStatus.FOLLOWED else None
+        return self._rounded(answer.q) if answer.status is IkStatus.FOLLOWED else None
 
     def _found(self, placement: Placement) -> Found:
+        placement = self._aim.aimed(placement)
         if placement not in self._known:
             self._tell()
             self._known[placement] = self._walker.share(placement)
@@ -192,6 +181,11 @@ class Search:
         """Shares of placements, the best first; of equals the first."""
         found = [self._found(placement) for placement in dict.fromkeys(placements)]
         return sorted(found, key=_share, reverse=True)
+
+    def _rounded(self, q: Array) -> tuple[float, ...]:
+        """Joints to four digits, inside the limits."""
+        robot = self._walker.robot
+        return tuple(np.clip(np.round(q, _DIGITS), robot.lower, robot.upper).tolist())
 
     def _factor(self, placement: Placement) -> float:
         return placement.coarse_gain / self._given.coarse_gain
@@ -218,7 +212,3 @@ def _three_digits(value: float) -> float:
     """Value cut to three digits, never above it; not below the least gain that parameters allow."""
     digits = 2 - math.floor(math.log10(value))
     return max(math.floor(value * 10.0**digits + 1e-9) / 10.0**digits, 1e-3)
-
-
-def _rounded(q: Array) -> tuple[float, ...]:
-    return tuple(round(float(value), _DIGITS) for value in q)

@@ -1,5 +1,6 @@
 """Table: what a slave can follow, as given and as proposed, and how to take the proposal."""
 
+import math
 import shlex
 from collections.abc import Iterator
 
@@ -19,7 +20,7 @@ _WIDTH = 38
 def text(reach: Reach) -> str:
     """Lines for the terminal: a table, and what to do next."""
     path, rate = reach.path, (len(reach.path) - 1) / reach.path.time[-1]
-    head = f"{path.name}: {path.time[-1]:.4g} s of motion at {rate:.3g} Hz; {reach.robot.name}"
+    head = f"{path.name}: {path.time[-1]:.4g} s of motion at {rate:.4g} Hz; {reach.robot.name}"
     columns = [reach.given] if reach.is_given else [reach.given, reach.proposed]
     names = ["as given", "proposed"][: len(columns)]
     lines = [f"{'':{_WIDTH}}" + "".join(f"{name:>12}" for name in names)]
@@ -43,6 +44,9 @@ def _rows(columns: list[Followed]) -> Iterator[tuple[str, list[str]]]:
     yield "gain, fine", [f"{p.fine_gain:.3g}" for p in placements]
     yield "share of the stylus' turn", [f"{p.rotation_gain:g}" for p in placements]
     yield "slave's x, y, z are the master's", [" ".join(p.axes) for p in placements]
+    yield "tool's x, y, z are the stylus'", [" ".join(p.tool_axes) for p in placements]
+    yield "then turned about z by", [f"{math.degrees(p.tool_roll):.0f}°" for p in placements]
+    yield "tool's turns off the hand's by", [f"{math.degrees(c.misfit):.0f}°" for c in columns]
 
 
 def _percent(share: float) -> str:

@@ -181,6 +181,8 @@ class Walker:
                 coarse_gain=placement.coarse_gain,
                 fine_gain=placement.fine_gain,
                 rotation_gain=placement.rotation_gain,
+                tool_axes=placement.tool_axes,
+                tool_roll=placement.tool_roll,
             )
         )
         for stage in (scaling, solving):
