@@ -15,7 +15,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import RecordingParameters
 from teleop_core.bags.series import Series, kind_of
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError, TeleopError, UnknownNameError
+from teleop_core.errors import RecordingError, UnknownNameError
 from teleop_core.geometry import Array
 from teleop_core.topics import BY_NAME, Kind
 
@@ -74,15 +74,9 @@ class Stream:
         return self.columns.index(column)
 
     def frame(self) -> "pandas.DataFrame":
-        """The stream as a pandas data frame over the time [s], with its stamps.
+        """The stream as a pandas data frame over the time [s], with its stamps."""
+        import pandas
 
-        Raises:
-            TeleopError: pandas is not installed.
-        """
-        try:
-            import pandas
-        except ImportError as error:
-            raise TeleopError("needs pandas: pip install 'teleop_core[notebook]'") from error
         frame = pandas.DataFrame(self.values, columns=list(self.columns))
         frame.insert(0, "stamp_ns", self.stamp_ns)
         frame.index = pandas.Index(self.time, name="time")
@@ -182,7 +176,6 @@ class Recording:
 
         Raises:
             UnknownNameError: There is no such topic.
-            TeleopError: pandas is not installed.
         """
         names = topics or tuple(n for n in self.topics if not n.endswith(("diagnostics", "state")))
         frames = []
