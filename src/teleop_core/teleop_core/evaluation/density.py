@@ -41,9 +41,9 @@ def time_spent(
     column = np.clip(((across[is_known] - left) / side).astype(np.int64), 0, shape[0] - 1)
     row = np.clip(((up[is_known] - bottom) / side).astype(np.int64), 0, shape[1] - 1)
     counts = np.bincount(row * shape[0] + column, minlength=shape[0] * shape[1])
-    with np.errstate(divide="ignore"):
-        tens = np.round(np.log10(counts * sample_s), 2).reshape(shape[1], shape[0])
-    z = [[None if np.isneginf(cell) else cell for cell in line] for line in tens.tolist()]
+    tens = np.round(np.log10(np.maximum(counts, 1) * sample_s), 2).astype(object)
+    tens[counts == 0] = None
+    z = tens.reshape(shape[1], shape[0]).tolist()
     return {
         "type": "heatmap", "name": "time spent", "legendgroup": "time spent", "z": z,
         "x0": left + side / 2, "dx": side, "y0": bottom + side / 2, "dy": side,

@@ -4,15 +4,16 @@ import json
 from collections.abc import Sequence
 from hashlib import blake2b
 from html import escape
+from math import isfinite
 from typing import Any
 
 import numpy as np
 from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
 from teleop_core.evaluation.bands import Band
-from teleop_core.evaluation.figure import Figure, is_against_time
+from teleop_core.evaluation.figure import Figure, Numbers, is_against_time
 from teleop_core.evaluation.html_table import html_table
-from teleop_core.evaluation.packing import deflated, pack
+from teleop_core.evaluation.packing import bits_within, deflated, pack
 from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_core.evaluation.preview import preview
 from teleop_core.evaluation.published import SOURCE
@@ -20,8 +21,8 @@ from teleop_core.evaluation.score import Score, facts
 from teleop_core.evaluation.scoring import Study
 from teleop_core.evaluation.traces import spacing_s
 
-_BITS = 38_000_000
-"""Room for the curves of a recording: with plotly.js and previews a page stays below 10 MB."""
+_ROOM = 6_800_000
+"""Bytes for the curves of a recording: with everything else a page of it stays below 10 MB."""
 
 
 def report_page(studies: Sequence[Study]) -> str:
@@ -38,8 +39,8 @@ def report_page(studies: Sequence[Study]) -> str:
         for place, plot in zip(places, plots, strict=True):
             if not plot.traces:
                 continue
-            traces = [arrays.named(trace) for trace in plot.traces]
-            layout = {**plot.layout, "height": plot.height}
+            traces, layout = arrays.named(plot.traces), arrays.named(plot.layout)
+            layout |= {"height": plot.height}
             drawn.append({"id": place, "recording": number, "traces": traces, "layout": layout})
     recordings = [_recording(study) for study in studies]
     found = {"recordings": recordings, "arrays": arrays.packed(), "figures": drawn}
@@ -62,29 +63,38 @@ class _Arrays:
     """Arrays of a page, each packed once."""
 
     def __init__(self, recordings: int) -> None:
-        self._bits = _BITS * recordings
-        self._arrays: list[np.ndarray[Any, Any]] = []
-        self._places: dict[bytes, int] = {}
+        self._room = _ROOM * recordings
+        self._arrays: list[Numbers] = []
+        self._places: dict[bytes, int] = {}  # by contents
+        self._seen: dict[object, tuple[int, Numbers]] = {}  # by where they are, and stay
 
-    def named(self, trace: dict[str, Any]) -> dict[str, Any]:
-        """The trace with places in the list instead of arrays."""
-        return {
-            key: self._place(value) if isinstance(value, np.ndarray) else value
-            for key, value in trace.items()
-        }
+    def named(self, tree: Any) -> Any:
+        """A trace or layout with places in the list instead of arrays of numbers."""
+        if isinstance(tree, dict):
+            return {key: self.named(value) for key, value in tree.items()}
+        if isinstance(tree, (list, tuple)):
+            return [self.named(value) for value in tree]
+        if isinstance(tree, np.ndarray) and tree.ndim == 1 and tree.dtype.kind in "fiu":
+            return {"array": self._place(tree)}
+        if isinstance(tree, (np.ndarray, np.generic)):
+            return self.named(tree.tolist())
+        return None if isinstance(tree, float) and not isfinite(tree) else tree
 
     def packed(self) -> list[dict[str, Any]]:
         """All arrays, as fine as the page has room."""
-        count = sum(len(array) for array in self._arrays)
-        return [vars(pack(array, self._bits / max(count, 1))) for array in self._arrays]
+        bits = bits_within(self._arrays, self._room)
+        return [vars(pack(array, bits)) for array in self._arrays]
 
-    def _place(self, array: "np.ndarray[Any, Any]") -> int:
-        data = np.ascontiguousarray(array).data
-        name = blake2b(data, person=array.dtype.str.encode()).digest()
-        if name not in self._places:
-            self._places[name] = len(self._arrays)
-            self._arrays.append(array)
-        return self._places[name]
+    def _place(self, array: Numbers) -> int:
+        where = array.ctypes.data, array.shape, array.strides, array.dtype.str
+        if where not in self._seen:
+            data = np.ascontiguousarray(array).data
+            name = blake2b(data, person=array.dtype.str.encode()).digest()
+            if name not in self._places:
+                self._places[name] = len(self._arrays)
+                self._arrays.append(array)
+            self._seen[where] = self._places[name], array
+        return self._seen[where][0]
 
 
 def _recording(study: Study) -> dict[str, Any]:

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.evaluation.bands import Band, merged
-from teleop_core.evaluation.figure import Figure, is_against_time
-from teleop_core.geometry import Array
+from teleop_core.evaluation.figure import Figure, Numbers, is_against_time
 
 _WIDTH, _HEIGHT, _STRETCHES, _BANDS = 1000, 300, 200, 200
 
@@ -22,17 +21,14 @@ def preview(figure: Figure, bands: Sequence[Band]) -> str:
     if not is_against_time(figure) or not curves:
         return ""
     rows = list(dict.fromkeys(str(trace.get("yaxis", "y")) for trace in curves))
-    times = np.concatenate([np.asarray(trace["x"], float) for trace in curves])
-    begin, end = float(times.min()), float(times.max())
+    begin, end = _ends([trace["x"] for trace in curves])
     height = _HEIGHT / len(rows)
     parts, told = [_bands(bands, begin, end)], [f"{begin:.1f} … {end:.1f} s"]
     for number, row in enumerate(rows):
         members = [trace for trace in curves if trace.get("yaxis", "y") == row]
-        values = np.concatenate([np.asarray(trace["y"], float) for trace in members])
-        finite = values[np.isfinite(values)]
-        if not len(finite):
+        low, high = _ends([trace["y"] for trace in members])
+        if low > high:
             continue
-        low, high = float(finite.min()), float(finite.max())
         frame = (begin, end, low, high, number * height, height)
         parts += [_curve(trace, frame) for trace in members]
         told.append(f"{_axis_name(figure, row)}: {low:.3g} … {high:.3g}")
@@ -66,7 +62,7 @@ def _bands(bands: Sequence[Band], begin: float, end: float) -> str:
 
 def _curve(trace: dict[str, Any], frame: tuple[float, ...]) -> str:
     begin, end, low, high, top, height = frame
-    times, values = _extremes(np.asarray(trace["x"], float), np.asarray(trace["y"], float))
+    times, values = _extremes(trace["x"], trace["y"])
     x = (times - begin) * (_WIDTH / max(end - begin, 1e-9))
     y = top + height * (0.95 - 0.9 * (values - low) / max(high - low, 1e-12))
     points = " ".join(f"{a:.0f},{b:.0f}" for a, b in zip(x.tolist(), y.tolist(), strict=True))
@@ -78,10 +74,21 @@ def _curve(trace: dict[str, Any], frame: tuple[float, ...]) -> str:
     )
 
 
-def _extremes(times: Array, values: Array) -> tuple[Array, Array]:
+def _ends(arrays: Sequence[Numbers]) -> tuple[float, float]:
+    """Smallest and largest of all finite values; infinite and the wrong way round without any."""
+    low, high = np.inf, -np.inf
+    for array in arrays:
+        finite = array if np.isfinite(array).all() else array[np.isfinite(array)]
+        if len(finite):
+            low, high = min(low, float(finite.min())), max(high, float(finite.max()))
+    return low, high
+
+
+def _extremes(times: Numbers, values: Numbers) -> tuple[Numbers, Numbers]:
     """Smallest and largest value of each of some hundred stretches; NaN is left out."""
     is_known = np.isfinite(values)
-    times, values = times[is_known], values[is_known]
+    if not is_known.all():
+        times, values = times[is_known], values[is_known]
     if len(times) <= 2 * _STRETCHES:
         return times, values
     begins = np.linspace(0, len(times), _STRETCHES, endpoint=False).astype(np.int64)

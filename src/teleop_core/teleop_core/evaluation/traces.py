@@ -39,6 +39,7 @@ class Envelope:
     def __init__(self, start_ns: int, end_ns: int, columns: int) -> None:
         self._start_ns, self._end_ns, self._columns = start_ns, end_ns, columns
         self._parts: list[tuple[Integers, Rows]] = []
+        self._times: Array | None = None
         self._count = 0
         self._buckets: _Buckets | None = None
 
@@ -58,7 +59,7 @@ class Envelope:
                 self._buckets.add(*part)
             self._parts.clear()
 
-    def line(self) -> tuple[Array, Array]:
+    def line(self) -> tuple[Array, Rows]:
         """Times (M,) [s] from the start and values (M, columns), through all samples or extremes.
 
         Each stretch of a long recording gives two points, in the order in which the line rises or
@@ -67,9 +68,12 @@ class Envelope:
         if self._buckets is not None:
             return self._buckets.line()
         if not self._parts:
-            return np.empty(0), np.empty((0, self._columns))
-        times, rows = (np.concatenate(column) for column in zip(*self._parts, strict=True))
-        return (times - self._start_ns) / _SECOND_NS, rows
+            return np.empty(0), np.empty((0, self._columns), np.float32)
+        if len(self._parts) > 1 or self._times is None:
+            times_ns, rows = (np.concatenate(column) for column in zip(*self._parts, strict=True))
+            self._parts = [(times_ns, rows)]  # not a second copy
+            self._times = (times_ns - self._start_ns) / _SECOND_NS
+        return self._times, self._parts[0][1]
 
 
 class _Buckets:
@@ -89,7 +93,7 @@ class _Buckets:
         self._lowest[at] = np.fmin(self._lowest[at], low)
         self._highest[at] = np.fmax(self._highest[at], high)
 
-    def line(self) -> tuple[Array, Array]:
+    def line(self) -> tuple[Array, Rows]:
         width = self._length_ns / BUCKETS / _SECOND_NS
         is_full = np.isfinite(self._lowest).any(axis=1)
         low, high = self._lowest[is_full], self._highest[is_full]
@@ -97,6 +101,6 @@ class _Buckets:
         middle = np.where(is_known, 0.5 * (low + np.where(is_known, high, 0.0)), 0.0)
         low, high = np.where(is_known, low, np.nan), np.where(is_known, high, np.nan)
         rises = np.gradient(middle, axis=0) >= 0.0 if len(low) > 1 else np.ones_like(low, bool)
-        pairs: Array = np.stack((np.where(rises, low, high), np.where(rises, high, low)), axis=1)
+        pairs = np.stack((np.where(rises, low, high), np.where(rises, high, low)), axis=1)
         times = (np.flatnonzero(is_full)[:, None] + np.array([0.25, 0.75])) * width
         return times.ravel(), pairs.reshape(-1, low.shape[1])

@@ -1,5 +1,6 @@
 // Page: unpacks what it holds and draws plot after plot, so that it can be scrolled meanwhile.
 
+const PAPER = 690; // px; what a sheet of A4 or letter is wide between its margins
 const errors = [];
 window.addEventListener("error", (event) => tell(event.message));
 window.addEventListener("unhandledrejection", (event) => tell(String(event.reason)));
@@ -34,6 +35,7 @@ async function drawPage() {
   recordings.forEach((recording) => recording.tell(recording.range));
   sketch();
   window.addEventListener("resize", sketch);
+  window.addEventListener("beforeprint", () => plots.forEach(({ place }) => place.style.setProperty("--fit", Math.min(1, PAPER / place.clientWidth))));
   NARROW.addEventListener("change", () => plots.forEach((plot) => plot.refit()));
   document.body.dataset.finished = "yes";
 }

@@ -12,15 +12,13 @@ class Plot {
     this.figure = figure;
     this.place = document.getElementById(figure.id);
     this.recording = recording;
-    this.layout = laidOut(figure.layout);
+    this.layout = laidOut(resolved(figure.layout, arrays));
     // Axes that time_axis() of figure.py made.
     this.axes = Object.keys(this.layout).filter((key) => /^xaxis/.test(key) && this.layout[key].uirevision === TIME);
-    this.traces = figure.traces;
+    this.traces = resolved(figure.traces, arrays);
     this.curves = []; this.paths = [];
     this.faded = this.traces.flatMap((trace, index) => (trace.meta && trace.meta.surrounds ? [index] : []));
     this.traces.forEach((trace, index) => {
-      for (const key of ["x", "y", "z", "customdata"])
-        if (typeof trace[key] === "number") trace[key] = arrays[trace[key]];
       const axis = "xaxis" + (trace.xaxis || "x").slice(1);
       if (trace.meta && trace.meta.path)
         this.paths.push({ index, times: trace.customdata, during: trace.meta.during, colored: trace.meta.colored,
@@ -167,6 +165,15 @@ class Plot {
     const { grid, height, margin, font } = this.layout;
     await Plotly.relayout(this.place, { height, margin, font, ...(grid ? { grid } : {}) });
   }
+}
+
+// The same with arrays in place of { array: number }.
+function resolved(tree, arrays) {
+  if (Array.isArray(tree)) return tree.map((branch) => resolved(branch, arrays));
+  if (tree === null || typeof tree !== "object") return tree;
+  const keys = Object.keys(tree);
+  if (keys.length === 1 && keys[0] === "array") return arrays[tree.array];
+  return Object.fromEntries(keys.map((key) => [key, resolved(tree[key], arrays)]));
 }
 
 function put(target, [key, ...further], value) {
