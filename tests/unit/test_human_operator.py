@@ -1,0 +1,167 @@
+"""The operator ``human``: reaches, errors, corrections, tremor; the same bits in any blocks."""
+
+from itertools import islice, pairwise
+
+import numpy as np
+import pytest
+
+from teleop_core.errors import ParameterError
+from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.operators import OPERATORS, Setting
+from teleop_core.operators.human import HumanParameters, Submovement, submovements, tremor
+from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.parameters import build
+
+SIZE, ROTATION, APPROACH = (0.06, 0.05, 0.04), 0.2, 2.0
+CENTER, TILT = (0.01, -0.02, 0.03), (-0.5, 0.1, 0.2)
+EXACT = {"shortfall": 0.0, "noise_along": 0.0, "noise_across": 0.0, "corrections": 0}
+
+
+def region(**values):
+    given = {"kind": "human", "size": SIZE, "rotation": ROTATION, "approach_time": APPROACH,
+             "center": CENTER, "tilt": TILT}  # fmt: skip
+    return build(OperatorParameters, given | values)
+
+
+def motion(seed=1, parameters=None, **values):
+    setting = Setting(region(**values), np.zeros((6, 4)), seed)
+    return OPERATORS.find("human").make(parameters or HumanParameters(), setting)
+
+
+def reaches(count, parameters, seed=1, **values):
+    """The first submovements."""
+    plan = submovements(parameters, region(**values), np.random.default_rng(seed))
+    return list(islice(plan, count))
+
+
+@pytest.mark.parametrize("size", [1, 13, 1000, 7000])
+def test_motion_is_the_same_to_the_bit_in_blocks_of_any_size(size):
+    times = np.arange(1, 7001) * 1e-3 + APPROACH
+    whole, asked = motion()(times), motion()
+    parts = [asked(times[i : i + size]) for i in range(0, len(times), size)]
+    assert np.array_equal(np.concatenate(parts), whole)
+
+
+def test_motion_asked_for_an_earlier_time_begins_anew():
+    times = np.arange(0.0, 30.0, 0.01)
+    asked = motion()
+    first = asked(times)
+    asked(times + 100.0)
+    assert np.array_equal(asked(times), first)
+
+
+def test_each_seed_is_another_motion():
+    times = np.arange(0.0, 20.0, 0.01)
+    assert np.array_equal(motion(1)(times), motion(1)(times))
+    assert np.abs(motion(1)(times) - motion(2)(times)).max() > 1e-3
+
+
+def test_hand_starts_at_rest_and_has_approached_the_centre_in_time():
+    rows = motion(parameters=HumanParameters(tremor=0.0))(np.array([0.0, APPROACH]))
+    assert not rows[0].any()
+    np.testing.assert_allclose(rows[1, :6], (*CENTER, *TILT), atol=1e-12)
+
+
+def test_hand_without_noise_never_leaves_its_region():
+    times = np.arange(APPROACH, 120.0, 0.01)
+    parameters = HumanParameters(**EXACT, overlap=0.0)
+    rows = motion(parameters=parameters)(times)
+    offsets = np.abs(rows[:, :6] - np.concatenate((CENTER, TILT)))
+    assert (offsets <= np.array((*SIZE, *[2.0 * ROTATION] * 3)) / 2.0 + 1e-9).all()
+    assert (offsets.max(axis=0) > 0.5 * np.array((*SIZE, *[ROTATION] * 3)) / 2.0).all()
+
+
+def test_hand_keeps_to_its_region_but_for_its_errors():
+    times = np.arange(APPROACH, 300.0, 0.01)
+    offsets = np.abs(motion()(times)[:, :3] - CENTER)
+    assert (offsets <= np.array(SIZE) / 2.0 + 0.01).all()
+
+
+def test_submovements_begin_one_after_the_other():
+    found = reaches(500, HumanParameters())
+    assert (np.diff([one.begin for one in found]) > 0.0).all()
+    assert min(one.duration for one in found) > 0.0
+
+
+def test_correction_begins_a_reaction_time_after_the_eye_could_see_the_error():
+    parameters = HumanParameters(passing=0.0, dwell_time=10.0, dwell_spread=0.0)
+    found = reaches(400, parameters)
+    starts = [(a, b.begin - a.begin) for a, b in pairwise(found)]
+    corrections = [(a, wait) for a, wait in starts if wait < 5.0]
+    assert len(corrections) > 20
+    for before, wait in corrections:
+        seen = 0.5 * before.duration + parameters.reaction_time
+        assert wait == pytest.approx(min(before.duration, seen))
+
+
+def test_end_of_a_movement_is_off_in_proportion_to_its_speed():
+    parameters = HumanParameters(shortfall=0.0, corrections=0, noise_along=0.03, noise_across=0.0)
+    exact = HumanParameters(shortfall=0.0, corrections=0, noise_along=0.0, noise_across=0.0)
+    # The same random numbers lead to the same first target.
+    ratios = []
+    for seed in range(400):
+        (aimed,), (found,) = (reaches(1, p, seed) for p in (exact, parameters))
+        way = np.linalg.norm(aimed.step[:3])
+        off = (found.step[:3] - aimed.step[:3]) @ aimed.step[:3] / way
+        ratios.append(off / (way / found.duration))
+    assert np.std(ratios) == pytest.approx(0.03, rel=0.15)
+    assert abs(np.mean(ratios)) < 0.006
+
+
+def test_far_targets_take_longer_by_a_time_per_bit():
+    parameters = HumanParameters(time_spread=0.0, **EXACT)
+    for one in reaches(100, parameters):
+        bits = np.log2(np.linalg.norm(one.step[:3]) / parameters.width + 1.0)
+        expected = parameters.movement_time + parameters.time_per_bit * bits
+        assert one.duration == pytest.approx(expected)
+
+
+def test_submovement_ends_its_duration_after_its_beginning():
+    assert Submovement(1.0, 0.5, np.zeros(6)).end == 1.5
+
+
+def test_hand_without_room_holds_still_but_for_its_tremor():
+    rows = motion(size=(0.0, 0.0, 0.0), rotation=0.0)(np.arange(5.0, 60.0, 0.01))
+    assert not np.ptp(rows[:, :3], axis=0).any()
+    assert np.sqrt((rows[:, 9:] ** 2).sum(axis=1).mean()) == pytest.approx(63e-6, rel=0.1)
+
+
+def test_tremor_has_its_size_and_its_band():
+    times = np.arange(0.0, 100.0, 1e-3)
+    shaking = tremor(63e-6, np.random.default_rng(1))(times)
+    power = (np.abs(np.fft.rfft(shaking, axis=0)) ** 2).sum(axis=1)
+    frequency = np.fft.rfftfreq(len(times), 1e-3)
+    in_band = (frequency >= 8.0) & (frequency <= 12.0)
+    assert power[in_band].sum() > 0.99 * power.sum()
+    assert np.sqrt((shaking**2).sum(axis=1).mean()) == pytest.approx(63e-6, rel=0.05)
+
+
+def resting(kind, **device):
+    """Reading (N, 3) [m] of ten seconds of a hand that rests in the device."""
+    operator = {"operator.kind": kind, "operator.size": (0.0, 0.0, 0.0)}
+    values = {**operator, "operator.rotation": 0.0, "patience": 0.0, **device}
+    master = HapticMaster(build(HapticMasterParameters, values))
+    out = np.empty((10_000, 3))
+    for tick in range(len(out)):
+        master.prepare(1)
+        master.signals["now_ns"] = (tick + 1) * 1_000_000
+        master.step()
+        out[tick] = master.signals["master_measured_cp"][:3]
+    return out[5000:]
+
+
+def in_tremor_band(places):
+    spectrum = np.abs(np.fft.rfft(places - places.mean(axis=0), axis=0)) ** 2
+    frequency = np.fft.rfftfreq(len(places), 1e-3)
+    in_band = (frequency >= 8.0) & (frequency <= 12.0)
+    return float(np.sqrt(2.0 * spectrum[in_band].sum()) / len(places))
+
+
+def test_tremor_of_a_resting_human_is_in_the_reading_in_spite_of_friction_and_steps():
+    assert in_tremor_band(resting("human")) == pytest.approx(63e-6, rel=0.15)
+    assert in_tremor_band(resting("hold")) < 30e-6
+
+
+def test_tolerance_beyond_the_reach_is_refused():
+    with pytest.raises(ParameterError, match="tolerance"):
+        HumanParameters(tolerance=0.05)
