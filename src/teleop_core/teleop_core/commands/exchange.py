@@ -69,8 +69,9 @@ def _place(group: Any) -> None:
     )
     group.add_argument("--quaternion", nargs="+", metavar="COL", help="four columns")
     group.add_argument(
-        "--quaternion-order", choices=("wxyz", "xyzw"), help="of its columns (default: wxyz)"
-    )
+        "--quaternion-order", choices=("auto", "wxyz", "xyzw"),
+        help="of its columns (default: as their names say, else wxyz)",
+    )  # fmt: skip
     group.add_argument("--matrix", nargs="+", metavar="COL", help="nine columns of a rotation")
     group.add_argument(
         "--matrix-order", choices=("row", "column"), help="row by row (default) or column by column"
@@ -105,7 +106,7 @@ def _buttons(group: Any) -> None:
 
 def _changes(group: Any) -> None:
     group.add_argument(
-        "--axes", nargs="+", metavar="AXIS",
+        "--axes", nargs=3, metavar=("X", "Y", "Z"),
         help="the master's x, y, z as axes of the file, such as +y -x +z",
     )  # fmt: skip
     group.add_argument("--scale", type=float, metavar="X", help="multiplies positions (default: 1)")

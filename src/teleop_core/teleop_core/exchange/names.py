@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from itertools import combinations
 
 from teleop_core.exchange.options import LENGTHS, TIMES_NS
 
@@ -64,7 +63,7 @@ def find_time(names: Sequence[str]) -> tuple[int, ...]:
 
 def find_position(names: Sequence[str]) -> tuple[int, ...]:
     """Columns of x, y and z of a position; empty if no names say it."""
-    found = _series(names, "xyz")
+    found = _series(names, "xyz", without="w") or _series(names, "xyz")
     good = [(stem, columns) for stem, columns in found.items() if not _NOT_PLACES.search(stem)]
     named = [columns for stem, columns in found.items() if _PLACES.search(stem)]
     bare = [columns for stem, columns in good if not stem.strip("_")]
@@ -109,7 +108,7 @@ def _three(first: int) -> range:
 
 def find_rotation_vector(names: Sequence[str]) -> tuple[int, ...]:
     """Columns of a rotation vector; empty if no names say it."""
-    found = _series(names, "xyz")
+    found = _series(names, "xyz", without="w")
     return next((columns for stem, columns in found.items() if _VECTORS.search(stem)), ())
 
 
@@ -137,8 +136,10 @@ def unit_of(names: Sequence[str], columns: Sequence[int]) -> str:
     return units.pop() if len(units) == 1 else ""
 
 
-def _series(names: Sequence[str], letters: str) -> dict[str, tuple[int, ...]]:
+def _series(names: Sequence[str], letters: str, without: str = "") -> dict[str, tuple[int, ...]]:
     """Columns whose names differ in one letter alone, by the name without that letter.
+
+    Those that have a column with another letter, ``without``, beside them are left out.
 
     ``pose_position_x`` has the stem ``pose_position_``; ``qx`` has ``q_``, so that it is told from
     a bare ``x``.
@@ -151,14 +152,8 @@ def _series(names: Sequence[str], letters: str) -> dict[str, tuple[int, ...]]:
             gap = "_" if begin and not begin.endswith("_") else ""
             stem = f"{begin}{gap}{text[match.end() :]}"
             found.setdefault(stem, {}).setdefault(match[1], column)
-    whole = {
+    return {
         stem: tuple(hits[letter] for letter in letters)
         for stem, hits in found.items()
-        if all(letter in hits for letter in letters)
+        if set(letters) <= set(hits) and not set(without) & set(hits)
     }
-    return whole if letters == "wxyz" else {s: c for s, c in whole.items() if "w" not in found[s]}
-
-
-def overlapping(groups: Sequence[Sequence[int]]) -> bool:
-    """Whether a column is in two groups."""
-    return any(set(a) & set(b) for a, b in combinations(groups, 2))

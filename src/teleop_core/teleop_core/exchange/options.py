@@ -22,7 +22,7 @@ _CHOICES = {
     "time_unit": ("auto", *TIMES_NS),
     "stamps": ("header", "log"),
     "unit": ("auto", *LENGTHS),
-    "quaternion_order": ("wxyz", "xyzw"),
+    "quaternion_order": ("auto", "wxyz", "xyzw"),
     "matrix_order": ("row", "column"),
     "angles": ("auto", "rad", "deg"),
     "orientation": ("auto", "none"),
@@ -52,7 +52,7 @@ class ImportOptions:
         position: Three columns.
         unit: Of the position: ``auto`` (as the names say, else m), ``m``, ``cm``, ``mm``, ``in``.
         quaternion: Four columns in the order of ``quaternion_order``.
-        quaternion_order: ``wxyz`` or ``xyzw``.
+        quaternion_order: ``wxyz`` or ``xyzw``; ``auto``: as the names say, else wxyz.
         matrix: Nine columns of a rotation matrix.
         matrix_order: ``row`` by row, or ``column`` by column.
         euler: Order of the axes and three columns: ``("xyz", "roll", "pitch", "yaw")``. Small
@@ -89,7 +89,7 @@ class ImportOptions:
     position: Columns = ()
     unit: str = "auto"
     quaternion: Columns = ()
-    quaternion_order: str = "wxyz"
+    quaternion_order: str = "auto"
     matrix: Columns = ()
     matrix_order: str = "row"
     euler: Columns = ()

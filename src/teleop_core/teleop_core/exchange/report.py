@@ -187,7 +187,7 @@ def _warnings(motion: Motion, found: _Figures, extent: Array, rate: float) -> li
     out, c = [], motion.counts
     largest = float(extent.max())
     if largest > LARGE:
-        out.append(f"the hand moves {largest:.3g} m: is the unit mm? (--unit mm, or --scale)")
+        out.append(f"the hand moves {largest:,.4g} m: is the unit mm? (--unit mm, or --scale)")
     elif largest < 1e-3:
         out.append(f"the hand moves {1e6 * largest:.3g} µm at most: is the unit right? (--unit)")
     if found.fast:
@@ -198,6 +198,9 @@ def _warnings(motion: Motion, found: _Figures, extent: Array, rate: float) -> li
                    "time right? (--time-unit)")  # fmt: skip
     if c.missing > 0.1 * c.rows:
         out.append(f"{100.0 * c.missing / c.rows:.3g} % of the rows lack numbers")
+    if c.doubled > 0.1 * c.rows:
+        out.append(f"{100.0 * c.doubled / c.rows:.3g} % of the times are doubled: are they too "
+                   "coarse? (else --rate)")  # fmt: skip
     if motion.strange:
         out.append(f"{motion.strange} rows have an orientation that is none; they are left out")
     return out

@@ -36,7 +36,8 @@ class TableSource:
 
     Raises:
         UnknownNameError: A column is not there.
-        ParameterError: Neither a time nor a rate, or no position.
+        RecordingError: It has no time and no rate is given, or no position.
+        ParameterError: An option does not fit a table.
     """
 
     def __init__(self, table: Table, options: ImportOptions) -> None:
@@ -72,8 +73,8 @@ class TableSource:
         if not found and not self._table.is_named:
             found = self._position_by_place()
         if not found:
-            listed = self._listed()
-            raise ParameterError("--position", "missing", f"three columns; there are {listed}")
+            reason = "has no columns that look like x, y, z: give --position X Y Z; "
+            raise RecordingError(self.path, f"{reason}there are {self._listed()}")
         return self._told("x, y, z", found)
 
     def _position_by_place(self) -> tuple[int, ...]:
@@ -106,23 +107,43 @@ class TableSource:
         if not found and 0 not in position and self._is_rising(0):
             found = (0,)
         if not found:
-            needed = f"a column of times, or give --rate HZ; there are {self._listed()}"
-            raise ParameterError("--time", "missing", needed)
+            reason = (
+                "has no column that looks like a time: give --time COL, or --rate HZ; there are "
+            )
+            raise RecordingError(self.path, reason + self._listed())
         return self._told("time", found)
 
     def _orientation(self, taken: set[int]) -> tuple[Attitudes, tuple[int, ...]]:
         o = self._options
-        orders = {
-            "quaternion": o.quaternion_order, "matrix": o.matrix_order,
-            "euler": o.euler[0] if o.euler else "xyz",
-        }  # fmt: skip
+        orders = {"matrix": o.matrix_order, "euler": o.euler[0] if o.euler else "xyz"}
         for kind in ("quaternion", "matrix", "euler", "rotation_vector", "forward"):
             if columns := self._given(kind):
+                if kind == "quaternion":
+                    orders[kind] = self._quaternion_order(columns)
                 degrees = self._in_degrees(kind, columns)
                 return Attitudes(kind, orders.get(kind, ""), degrees), columns
         if o.orientation == "none":
             return Attitudes("none"), ()
         return self._guessed_orientation(taken)
+
+    def _quaternion_order(self, columns: Sequence[int]) -> str:
+        """Order of the columns of a quaternion.
+
+        Raises:
+            ParameterError: Their names say another one than the option.
+        """
+        wanted = self._options.quaternion_order
+        letters = [names.plain(self._table.names[column])[-1:] for column in columns]
+        named = "".join(letters)
+        if named in {"wxyz", "xyzw"}:
+            if wanted not in {"auto", named}:
+                needed = f"{named}, as the names of the columns of --quaternion say"
+                raise ParameterError("--quaternion-order", wanted, needed)
+            return named
+        if wanted == "auto":
+            self.told.append("quaternion in the order wxyz (else --quaternion-order xyzw)")
+            return "wxyz"
+        return wanted
 
     def _guessed_orientation(self, taken: set[int]) -> tuple[Attitudes, tuple[int, ...]]:
         known = self._table.names
@@ -146,14 +167,12 @@ class TableSource:
         width = len(self._table.names)
         columns = tuple(range(width - 4, width))
         if width in {7, 8} and not self._options.position and self._are_unit(columns):
-            order = self._options.quaternion_order if self._is_order_given() else "xyzw"
+            wanted = self._options.quaternion_order
+            order = "xyzw" if wanted == "auto" else wanted  # as in that benchmark
             self._told(f"quaternion in the order {order}", columns)
             return Attitudes("quaternion", order), columns
         self.told.append("orientation: none found, constant")
         return Attitudes("none"), ()
-
-    def _is_order_given(self) -> bool:
-        return self._options.quaternion_order != ImportOptions().quaternion_order
 
     def _are_unit(self, columns: Sequence[int]) -> bool:
         rows = np.column_stack([self._table.sample(c).astype(np.float64) for c in columns])
@@ -243,7 +262,9 @@ class TableSource:
             return None
         pressed = np.zeros((count, len(BUTTONS)), np.uint8)
         for button, column in zip(self._columns.buttons, columns, strict=True):
-            pressed[:, BUTTONS.index(button)] = column > self._options.threshold
+            # What was guessed is 0 or 1; the threshold is for columns that were named.
+            threshold = self._options.threshold if getattr(self._options, button) else 0.5
+            pressed[:, BUTTONS.index(button)] = column > threshold
         return pressed
 
     def check(self, finite: Array) -> None:

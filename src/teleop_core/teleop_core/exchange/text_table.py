@@ -2,6 +2,7 @@
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -143,7 +144,7 @@ class TextTable:
         try:
             reader = pd.read_csv(
                 self.path, sep=_BLANK, header=None, names=names, usecols=[names[c] for c in wanted],
-                skiprows=form.head, chunksize=ROWS, engine="c", float_precision="round_trip",
+                skiprows=form.head, chunksize=ROWS, engine="c",
                 dtype=types, na_values=list(_MISSING), decimal=form.decimal, index_col=False,
                 encoding=self._encoding, compression=self._packed, on_bad_lines="skip",
             )  # fmt: skip
@@ -197,7 +198,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
         raise RecordingError(path, reason)
     head = [comment_cells for comment_cells in [cells(comment, separator)] if not begin]
     head = rows[:begin] or head
-    width = max(len(row) for row in rows[begin : begin + 20])
+    width = Counter(len(row) for row in rows[begin:]).most_common(1)[0][0]
     names = _head(head, width)
     skipped = _lines_before(lines, first, begin)
     decimal = "," if separator != "," and _has_decimal_commas(rows[begin:]) else "."

@@ -15,6 +15,7 @@ RATES_HZ = (5.0, 3000.0)
 """Rates that a recording of a hand may have; the unit of its times follows from them."""
 _EPOCH_S = 3e8  # 1979: later times are seconds since 1970
 _FOREVER_S = 4e9
+_LONGEST_S = 60.0  # between two samples
 
 
 class Unit(NamedTuple):
@@ -30,16 +31,16 @@ def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
     Args:
         raw: Times (N,) in the file's unit, finite.
     """
-    first = float(np.median(raw)) if len(raw) else 0.0
-    for name, nanoseconds in TIMES_NS.items():
-        seconds = first * nanoseconds / SECOND_NS
-        if _EPOCH_S < seconds < _FOREVER_S:
-            return Unit(name, "they are times of the clock")
-    steps = np.diff(raw)
-    steps = np.abs(steps[steps != 0])
+    middle = float(np.median(raw)) if len(raw) else 0.0
+    steps = np.diff(np.sort(raw))
+    steps = steps[steps > 0]
     step = float(np.median(steps)) if len(steps) else 0.0
     if step <= 0.0:
         return Unit("s", "")
+    for name, nanoseconds in TIMES_NS.items():
+        seconds, period = (value * nanoseconds / SECOND_NS for value in (middle, step))
+        if _EPOCH_S < seconds < _FOREVER_S and period < _LONGEST_S:
+            return Unit(name, "they are times of the clock")
     best, distance = "s", float("inf")
     for name, nanoseconds in TIMES_NS.items():
         rate = SECOND_NS / (step * nanoseconds)

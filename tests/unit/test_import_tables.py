@@ -1,0 +1,524 @@
+"""Importing tables: whatever the form of the file, the same motion comes out."""
+
+import bz2
+import gzip
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+import teleop_core as tc
+from teleop_core.exchange import names, orientation
+
+COUNT, RATE = 400, 100.0
+TIMES = np.arange(COUNT) / RATE
+PLACES = np.column_stack(
+    (0.03 * np.sin(2.0 * TIMES), 0.02 * np.cos(3.0 * TIMES), 0.1 + 0.01 * TIMES)
+)
+TURNS = Rotation.from_rotvec(
+    np.column_stack((0.5 * np.sin(TIMES), 0.4 * np.cos(2.0 * TIMES), 0.6 * TIMES))
+)
+WXYZ = TURNS.as_quat(scalar_first=True)
+HEAD = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"]
+TABLE = np.column_stack((TIMES, PLACES, WXYZ))
+RADIANS = 1e-7
+"""Rounding of an angle between two rotations: the square root of that of a cosine."""
+
+
+def frame(columns=HEAD, rows=TABLE):
+    return pd.DataFrame(rows, columns=columns)
+
+
+def imported(path, tmp_path, **options):
+    """Report and stream of an import."""
+    report = tc.import_recording(path, tmp_path / "out", **options)
+    return report, report.recording["master/measured_cp"]
+
+
+def assert_same_motion(stream, places=PLACES, turns=TURNS, times=TIMES, metres=1e-15):
+    assert np.allclose(stream[["x", "y", "z"]], places, rtol=0, atol=metres)
+    got = Rotation.from_quat(stream[["qw", "qx", "qy", "qz"]], scalar_first=True)
+    assert (turns.inv() * got).magnitude().max() < RADIANS
+    assert np.abs((stream.stamp_ns - stream.stamp_ns[0]) * 1e-9 - (times - times[0])).max() < 1e-9
+
+
+FORMS = {
+    "comma.csv": {"sep": ","},
+    "semicolon.csv": {"sep": ";"},
+    "decimal_comma.csv": {"sep": ";", "decimal": ","},
+    "tab.tsv": {"sep": "\t"},
+    "blank.txt": {"sep": " "},
+    "bar.dat": {"sep": "|"},
+    "quoted.csv": {"quoting": 2},
+    "windows.csv": {"lineterminator": "\r\n"},
+    "marked.csv": {"encoding": "utf-8-sig"},
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_every_form_of_text_gives_the_same_motion(name, tmp_path):
+    frame().to_csv(tmp_path / name, index=False, **FORMS[name])
+    report, stream = imported(tmp_path / name, tmp_path)
+    assert_same_motion(stream)
+    assert report.counts.samples == report.counts.rows == COUNT
+
+
+@pytest.mark.parametrize(("name", "pack"), [("a.csv.gz", gzip.compress), ("a.bz2", bz2.compress)])
+def test_packed_text_is_read_by_what_it_is_not_how_it_is_called(name, pack, tmp_path):
+    (tmp_path / name).write_bytes(pack(frame().to_csv(index=False).encode()))
+    assert_same_motion(imported(tmp_path / name, tmp_path)[1])
+    (tmp_path / "plain").write_bytes(pack(frame().to_csv(index=False).encode()))
+    report = tc.import_recording(tmp_path / "plain", tmp_path / "second")
+    assert_same_motion(report.recording["master/measured_cp"])
+
+
+def test_parquet_gives_the_same_motion_in_any_groups_of_rows(tmp_path):
+    frame().to_parquet(tmp_path / "a.parquet", row_group_size=77)
+    assert_same_motion(imported(tmp_path / "a.parquet", tmp_path)[1], metres=0.0)
+
+
+def test_lists_in_parquet_are_columns_with_numbers(tmp_path):
+    table = pd.DataFrame({"time": TIMES, "pose": list(TABLE[:, 1:])})
+    table.to_parquet(tmp_path / "lists.parquet")
+    places = [f"pose.{i}" for i in range(7)]
+    options = {"position": places[:3], "quaternion": places[3:]}
+    assert_same_motion(imported(tmp_path / "lists.parquet", tmp_path, **options)[1])
+
+
+@pytest.mark.parametrize("sep", [",", " ", "\t"])
+def test_without_a_head_columns_go_by_number_from_one(sep, tmp_path):
+    noise = np.random.default_rng(1).normal(size=(COUNT, 3))
+    pd.DataFrame(np.hstack((noise, TABLE))).to_csv(
+        tmp_path / "bare.txt", sep=sep, header=False, index=False
+    )
+    options = {"time": 4, "position": "5-7", "quaternion": ("8", "9", 10, "11")}
+    assert_same_motion(imported(tmp_path / "bare.txt", tmp_path, **options)[1])
+
+
+def test_eight_columns_without_a_head_are_time_place_and_quaternion_with_w_last(tmp_path):
+    rows = np.column_stack((TIMES, PLACES, TURNS.as_quat()))
+    np.savetxt(tmp_path / "trajectory.txt", rows, fmt="%.17g")
+    report, stream = imported(tmp_path / "trajectory.txt", tmp_path)
+    assert_same_motion(stream)
+    assert any("xyzw" in text for text in report.told)
+
+
+def test_rows_of_many_blanks_with_a_rate_and_a_matrix_are_read(tmp_path):
+    # 76 columns without a head at 30 Hz, as of a surgical robot.
+    rows = np.random.default_rng(2).normal(size=(COUNT, 76))
+    rows[:, 38:41], rows[:, 41:50] = PLACES, TURNS.as_matrix().reshape(-1, 9)
+    np.savetxt(tmp_path / "kinematics.txt", rows, fmt="  %16.12f")
+    options = {"rate": 30.0, "position": "39-41", "matrix": "42-50"}
+    report, stream = imported(tmp_path / "kinematics.txt", tmp_path, **options)
+    assert_same_motion(stream, times=np.arange(COUNT) / 30.0, metres=1e-12)
+    assert report.rate == pytest.approx(30.0, abs=1e-6)
+
+
+def test_comments_and_a_line_of_units_stand_before_the_numbers(tmp_path):
+    text = "# recorded by hand\n# x is to the right\n\nt,x,y,z\n(s),(mm),(mm),(mm)\n"
+    rows = np.column_stack((TIMES, 1e3 * PLACES))
+    (tmp_path / "a.csv").write_text(text + "\n".join(",".join(map(repr, r)) for r in rows.tolist()))
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert np.allclose(stream[["x", "y", "z"]], PLACES, rtol=0, atol=1e-12)
+    assert any("mm" in text for text in report.told)
+
+
+def test_a_comment_may_hold_the_names(tmp_path):
+    np.savetxt(tmp_path / "a.txt", TABLE, fmt="%.17g", header=" ".join(HEAD))
+    assert_same_motion(imported(tmp_path / "a.txt", tmp_path)[1])
+
+
+def test_lines_can_be_skipped(tmp_path):
+    text = "Motion capture 3.1\n1,2\n" + frame().to_csv(index=False)
+    (tmp_path / "a.csv").write_text(text)
+    assert_same_motion(imported(tmp_path / "a.csv", tmp_path, skip=2)[1])
+
+
+# Orientation, against SciPy.
+
+
+def turned(path, tmp_path, columns, values, **options):
+    rows = np.column_stack((TIMES, PLACES, values))
+    frame(["t", "x", "y", "z", *columns], rows).to_csv(path, index=False)
+    return imported(path, tmp_path, **options)
+
+
+@pytest.mark.parametrize("order", ["xyz", "ZYX", "zxz", "YXZ", "xzy", "XYZ"])
+@pytest.mark.parametrize("degrees", [True, False])
+def test_euler_angles_mean_what_they_do_in_scipy(order, degrees, tmp_path):
+    path, names_of = tmp_path / "a.csv", ["a", "b", "c"]
+    values = TURNS.as_euler(order, degrees=degrees)
+    options = {"euler": (order, *names_of), "angles": "deg" if degrees else "rad"}
+    assert_same_motion(turned(path, tmp_path, names_of, values, **options)[1])
+
+
+@pytest.mark.parametrize("order", ["row", "column"])
+def test_matrices_are_read_row_by_row_or_column_by_column(order, tmp_path):
+    matrices = TURNS.as_matrix()
+    values = (matrices if order == "row" else matrices.transpose(0, 2, 1)).reshape(-1, 9)
+    columns = [f"m{i}" for i in range(9)]
+    options = {"matrix": columns, "matrix_order": order}
+    assert_same_motion(turned(tmp_path / "a.csv", tmp_path, columns, values, **options)[1])
+
+
+@pytest.mark.parametrize("degrees", [True, False])
+def test_rotation_vectors_mean_what_they_do_in_scipy(degrees, tmp_path):
+    columns, values = ["u", "v", "w"], TURNS.as_rotvec(degrees=degrees)
+    options = {"rotation_vector": columns, "angles": "deg" if degrees else "rad"}
+    assert_same_motion(turned(tmp_path / "a.csv", tmp_path, columns, values, **options)[1])
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_order_of_a_quaternion_is_stated(order, tmp_path):
+    columns, values = ["a", "b", "c", "d"], TURNS.as_quat(scalar_first=order == "wxyz")
+    options = {"quaternion": columns, "quaternion_order": order}
+    assert_same_motion(turned(tmp_path / "a.csv", tmp_path, columns, values, **options)[1])
+
+
+def test_names_of_a_quaternion_say_its_order(tmp_path):
+    columns = ["qx", "qy", "qz", "qw"]
+    options = {"quaternion": columns}
+    _, stream = turned(tmp_path / "a.csv", tmp_path, columns, TURNS.as_quat(), **options)
+    assert_same_motion(stream)
+
+
+def test_quaternions_of_any_sign_and_nearly_unit_length_give_a_continuous_one(tmp_path):
+    rng = np.random.default_rng(3)
+    values = (
+        WXYZ * rng.choice([-1.0, 1.0], COUNT)[:, None] * rng.uniform(0.95, 1.05, COUNT)[:, None]
+    )
+    _, stream = turned(tmp_path / "a.csv", tmp_path, HEAD[4:], values)
+    assert_same_motion(stream)
+    got = stream[HEAD[4:]]
+    assert (np.sum(got[1:] * got[:-1], axis=1) > 0.9).all()
+    assert np.allclose(np.linalg.norm(got, axis=1), 1.0, rtol=0, atol=1e-15)
+
+
+def test_a_direction_gives_the_attitude_that_turns_least(tmp_path):
+    directions = TURNS.apply([0.0, 0.0, 1.0])
+    columns = ["ax", "ay", "az"]
+    _, stream = turned(tmp_path / "a.csv", tmp_path, columns, 7.0 * directions, forward=columns)
+    got = Rotation.from_quat(stream[HEAD[4:]], scalar_first=True)
+    assert np.allclose(got.apply([0.0, 0.0, 1.0]), directions, rtol=0, atol=1e-12)
+    # From one to the next it turns by the angle between the directions, and not about them.
+    steps = (got[1:] * got[:-1].inv()).as_rotvec()
+    cosines = np.clip(np.sum(directions[1:] * directions[:-1], axis=1), -1.0, 1.0)
+    assert np.allclose(np.linalg.norm(steps, axis=1), np.arccos(cosines), rtol=0, atol=1e-7)
+    assert np.abs(np.sum(steps * directions[:-1], axis=1)).max() < 1e-12
+
+
+def test_a_direction_that_turns_back_still_gives_rotations():
+    reader = orientation.Attitudes("forward")
+    rows = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [np.nan, 0.0, 0.0]])
+    got = reader.quaternions(rows)
+    turned_to = Rotation.from_quat(got[:3], scalar_first=True).apply([0.0, 0.0, 1.0])
+    assert np.allclose(turned_to, rows[:3], rtol=0, atol=1e-12)
+    assert np.isnan(got[3]).all()
+
+
+def test_without_an_orientation_it_is_constant(tmp_path):
+    frame(HEAD[:4], TABLE[:, :4]).to_csv(tmp_path / "a.csv", index=False)
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert np.array_equal(stream[HEAD[4:]], np.tile([1.0, 0.0, 0.0, 0.0], (COUNT, 1)))
+    assert any("constant" in text for text in report.told)
+
+
+def test_orientation_can_be_left_out(tmp_path):
+    frame().to_csv(tmp_path / "a.csv", index=False)
+    _, stream = imported(tmp_path / "a.csv", tmp_path, orientation="none")
+    assert (stream["qw"] == 1.0).all()
+
+
+# Times.
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+@pytest.mark.parametrize("start", [0.0, 1_700_000_000.0])
+def test_unit_of_the_time_is_guessed_from_its_size_or_its_steps(unit, factor, start, tmp_path):
+    rows = TABLE.copy()
+    stamps = np.round((start + TIMES) * 1e6).astype(np.int64)  # [us]
+    whole = pd.DataFrame(rows, columns=HEAD)
+    exact = unit in {"us", "ns"}
+    whole["t"] = stamps * (1000 if unit == "ns" else 1) if exact else stamps / (1e6 / factor)
+    whole.to_csv(tmp_path / "a.csv", index=False)
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert any(f"times in {unit}" in text for text in report.told)
+    first = 1_000_000_000 if start == 0.0 else round(start * 1e9)
+    # A float of seconds since 1970 has steps of 0.24 µs.
+    assert np.abs(stream.stamp_ns - (first + np.round(TIMES * 1e9))).max() <= (0 if exact else 300)
+
+
+def test_given_unit_of_the_time_is_taken(tmp_path):
+    frame().to_csv(tmp_path / "a.csv", index=False)
+    report, _ = imported(tmp_path / "a.csv", tmp_path, time_unit="ms")
+    assert report.duration == pytest.approx(TIMES[-1] * 1e-3, abs=1e-9)
+
+
+def test_seconds_and_nanoseconds_may_stand_in_two_columns(tmp_path):
+    stamps = 1_700_000_000_999_000_000 + np.arange(COUNT) * 10_000_000
+    table = frame().drop(columns="t")
+    table["stamp.sec"], table["stamp.nanosec"] = np.divmod(stamps, 1_000_000_000)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    assert np.array_equal(imported(tmp_path / "a.csv", tmp_path)[1].stamp_ns, stamps)
+
+
+def test_dates_are_times(tmp_path):
+    table = frame()
+    stamps = pd.date_range("2026-01-02T03:04:05.678", periods=COUNT, freq="10ms")
+    table["t"] = stamps
+    table.to_csv(tmp_path / "a.csv", index=False)
+    table.to_parquet(tmp_path / "a.parquet")
+    for number, name in enumerate(("a.csv", "a.parquet")):
+        report = tc.import_recording(tmp_path / name, tmp_path / str(number))
+        got = report.recording["master/measured_cp"].stamp_ns
+        assert np.array_equal(got, stamps.as_unit("ns").astype("int64"))
+
+
+def test_stamps_that_begin_near_zero_begin_at_a_second_and_others_stay(tmp_path):
+    for number, (start, first) in enumerate(((-5.0, 1.0), (0.0, 1.0), (3.25, 3.25))):
+        rows = TABLE.copy()
+        rows[:, 0] += start
+        frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
+        report = tc.import_recording(tmp_path / "a.csv", tmp_path / str(number))
+        assert report.start_ns == round(first * 1e9)
+
+
+def test_irregular_times_stay_as_they_are(tmp_path):
+    rows = TABLE.copy()
+    rows[:, 0] = 10.0 + np.cumsum(np.random.default_rng(4).exponential(0.01, COUNT))
+    frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert np.abs(stream.stamp_ns - rows[:, 0] * 1e9).max() < 2.0
+    steps = np.diff(rows[:, 0])
+    assert report.period_ms == pytest.approx(1e3 * np.percentile(steps, (50, 5, 95)), abs=1e-5)
+
+
+# Places.
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"), [("m", 1.0), ("cm", 0.01), ("mm", 1e-3), ("in", 0.0254)]
+)
+def test_unit_of_the_place_is_given_or_stands_in_the_names(unit, metres, tmp_path):
+    rows = np.column_stack((TIMES, PLACES / metres))
+    for number, (head, options) in enumerate(
+        ((["t", "x", "y", "z"], {"unit": unit}), (["t", *(f"{a} [{unit}]" for a in "xyz")], {}))
+    ):
+        frame(head, rows).to_csv(tmp_path / "a.csv", index=False)
+        report = tc.import_recording(tmp_path / "a.csv", tmp_path / str(number), **options)
+        got = report.recording["master/measured_cp"][["x", "y", "z"]]
+        assert np.allclose(got, PLACES, rtol=0, atol=1e-15)
+
+
+def test_axes_turn_places_and_attitudes_alike(tmp_path):
+    frame().to_csv(tmp_path / "a.csv", index=False)
+    _, stream = imported(tmp_path / "a.csv", tmp_path, axes=("+y", "-x", "+z"), scale=0.5)
+    turn = Rotation.from_matrix([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    assert_same_motion(stream, 0.5 * turn.apply(PLACES), turn * TURNS)
+
+
+@pytest.mark.parametrize("center", ["mean", "middle", "start"])
+def test_the_chosen_middle_comes_to_zero(center, tmp_path):
+    frame().to_csv(tmp_path / "a.csv", index=False)
+    _, stream = imported(tmp_path / "a.csv", tmp_path, center=center, scale=2.0)
+    got = stream[["x", "y", "z"]]
+    middle = {
+        "mean": got.mean(axis=0), "start": got[0], "middle": got.min(axis=0) + got.max(axis=0)
+    }[center]  # fmt: skip
+    assert np.abs(middle).max() < 1e-15
+    assert np.allclose(np.diff(got, axis=0), 2.0 * np.diff(PLACES, axis=0), rtol=0, atol=1e-15)
+
+
+def test_buttons_are_recorded_where_they_change(tmp_path):
+    table = frame()
+    table["pedal"] = np.where((TIMES > 1.0) & (TIMES < 2.0), 3.3, 0.2)
+    table["mode"] = (TIMES > 3.0).astype(int)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    report, stream = imported(tmp_path / "a.csv", tmp_path, clutch="pedal", threshold=1.5)
+    buttons = report.recording["master/buttons"]
+    held = np.searchsorted(buttons.stamp_ns, stream.stamp_ns, side="right") - 1
+    assert np.array_equal(buttons["clutch"][held], table["pedal"] > 1.5)
+    assert np.array_equal(buttons["mode"][held], table["mode"])
+    assert not buttons["fixture"].any()
+    assert len(buttons) == 4
+
+
+def test_without_buttons_none_are_recorded(tmp_path):
+    frame().to_csv(tmp_path / "a.csv", index=False)
+    report, _ = imported(tmp_path / "a.csv", tmp_path)
+    assert report.recording.topics == ("master/measured_cp",)
+
+
+# Rows that are damaged.
+
+
+def test_missing_rows_are_dropped_and_make_a_gap(tmp_path):
+    rows = TABLE.copy()
+    rows[100:120, 2] = np.nan
+    rows[200, 5] = np.inf
+    frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    kept = np.isfinite(rows).all(axis=1)
+    assert report.counts.missing == 21
+    assert_same_motion(stream, PLACES[kept], TURNS[kept], TIMES[kept])
+    assert report.gaps == ((pytest.approx(0.99), pytest.approx(0.21)),)
+
+
+def test_short_stretches_of_missing_rows_are_bridged_on_request(tmp_path):
+    rows = TABLE.copy()
+    rows[100:105, 1:4] = np.nan
+    rows[200:260, 4:] = np.nan
+    frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
+    options = {"missing": "interpolate", "missing_time": 0.1}
+    report, stream = imported(tmp_path / "a.csv", tmp_path, **options)
+    assert (report.counts.filled, report.counts.missing) == (5, 60)
+    share = np.linspace(0.0, 1.0, 7)[1:-1, None]
+    expected = (1.0 - share) * PLACES[99] + share * PLACES[105]
+    assert np.allclose(stream[["x", "y", "z"]][100:105], expected, rtol=0, atol=1e-12)
+    got = Rotation.from_quat(stream[HEAD[4:]][100:105], scalar_first=True)
+    assert (got.inv() * TURNS[100:105]).magnitude().max() < 1e-3
+
+
+def test_doubled_times_keep_the_first_row(tmp_path):
+    rows = np.repeat(TABLE, 2, axis=0)[: 2 * COUNT - 30]
+    rows[1::2, 1] += 1.0
+    frame(rows=rows[: COUNT // 2 * 2]).to_csv(tmp_path / "a.csv", index=False)
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert report.counts.doubled == COUNT // 2
+    assert np.allclose(stream["x"], PLACES[: COUNT // 2, 0], rtol=0, atol=1e-15)
+    assert any("doubled" in text for text in report.warnings)
+
+
+def test_a_few_rows_that_go_back_are_dropped_and_counted(tmp_path):
+    rows = TABLE.copy()
+    rows[[50, 60, 70], 0] -= 0.105
+    frame(rows=rows).to_csv(tmp_path / "a.csv", index=False)
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    kept = np.delete(np.arange(COUNT), [50, 60, 70])
+    assert report.counts.backwards == 3
+    assert_same_motion(stream, PLACES[kept], TURNS[kept], TIMES[kept])
+
+
+def test_shuffled_rows_are_sorted_on_request(tmp_path):
+    order = np.random.default_rng(5).permutation(COUNT)
+    frame(rows=TABLE[order]).to_csv(tmp_path / "a.csv", index=False)
+    assert_same_motion(imported(tmp_path / "a.csv", tmp_path, backwards="sort")[1])
+
+
+def test_rows_of_wrong_length_are_left_out_and_counted(tmp_path):
+    lines = frame().to_csv(index=False).splitlines()
+    lines[10], lines[20] = "1,2,3", lines[20] + ",9"
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    report, _ = imported(tmp_path / "a.csv", tmp_path)
+    assert (report.counts.damaged, report.counts.samples) == (2, COUNT - 2)
+    assert report.counts.rows == COUNT
+
+
+def test_a_long_table_passes_through_the_disk_and_gives_the_same(tmp_path):
+    count = 700_000
+    times = np.arange(count) * 1e-3
+    rows = np.column_stack((times, np.sin(times), np.cos(times), 0.0 * times))
+    rows[:, 1:] *= 0.03
+    pd.DataFrame(rows, columns=HEAD[:4]).to_parquet(tmp_path / "long.parquet")
+    report, stream = imported(tmp_path / "long.parquet", tmp_path, center="mean")
+    expected = rows[:, 1:] - rows[:, 1:].mean(axis=0)
+    assert np.allclose(stream[["x", "y", "z"]], expected, rtol=0, atol=1e-12)
+    assert report.counts.samples == count
+
+
+# The report.
+
+
+def test_report_says_what_numpy_says(tmp_path):
+    frame().to_csv(tmp_path / "a.csv", index=False)
+    report, _ = imported(tmp_path / "a.csv", tmp_path)
+    assert report.range == pytest.approx(np.ptp(PLACES, axis=0), abs=1e-12)
+    assert report.rotation == pytest.approx((TURNS[0].inv() * TURNS).magnitude().max(), abs=1e-6)
+    every_third = PLACES[::3]  # at 33 Hz, the rate nearest to 30 Hz
+    speeds = np.linalg.norm(np.diff(every_third, axis=0), axis=1) / 0.03
+    assert report.speed == pytest.approx(np.percentile(speeds, (50, 95)), rel=1e-6)
+    assert report.rate == pytest.approx(RATE, abs=1e-6)
+    assert report.duration == pytest.approx(TIMES[-1], abs=1e-9)
+    text = str(report)
+    assert "400 of 400 rows" in text
+    assert "gaps      none" in text
+
+
+def test_metadata_say_how_the_import_can_be_repeated(tmp_path):
+    frame().to_csv(tmp_path / "hand.csv", index=False)
+    report, _ = imported(tmp_path / "hand.csv", tmp_path, scale=0.5, axes=("+y", "-x", "+z"))
+    about = report.recording.metadata
+    assert about["imported_from"] == "hand.csv"
+    assert about["imported_by"] == ("teleop import hand.csv --out out --axes +y -x +z --scale 0.5")
+    assert len(about["imported_sha256"]) == 64
+    assert "'x', 'y', 'z'" in about["imported_mapping"]
+    assert str(tmp_path) not in "".join(about.values())
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [({"unit": "m", "scale": 100.0}, "unit mm"), ({"rate": 5.0}, "slow"), ({"rate": 1e4}, "5 m/s")],
+)
+def test_what_looks_wrong_is_told(options, text, tmp_path):
+    rows = PLACES if "rate" in options else np.column_stack((TIMES, PLACES))
+    rows = 2.0 * rows
+    frame(HEAD[:4][-rows.shape[1] :], rows).to_csv(tmp_path / "a.csv", index=False)
+    report, _ = imported(tmp_path / "a.csv", tmp_path, **options)
+    assert any(text in warning for warning in report.warnings)
+
+
+# Names.
+
+
+@pytest.mark.parametrize(
+    ("head", "time", "place", "turn"),
+    [
+        ("t x y z qx qy qz qw", "t", "x y z", "qw qx qy qz"),
+        ("timestamp tx ty tz qx qy qz qw", "timestamp", "tx ty tz", "qw qx qy qz"),
+        ("time pos_x pos_y pos_z quat_w quat_x quat_y quat_z", "time", "pos_x pos_y pos_z",
+         "quat_w quat_x quat_y quat_z"),
+        ("posX posY posZ rotX rotY rotZ rotW Time", "Time", "posX posY posZ",
+         "rotW rotX rotY rotZ"),
+        ("%time field.header.seq field.pose.position.x field.pose.position.y "
+         "field.pose.position.z field.pose.orientation.x field.pose.orientation.y "
+         "field.pose.orientation.z field.pose.orientation.w", "%time",
+         "field.pose.position.x field.pose.position.y field.pose.position.z",
+         "field.pose.orientation.w field.pose.orientation.x field.pose.orientation.y "
+         "field.pose.orientation.z"),
+        ("time vx vy vz x y z", "time", "x y z", ""),
+        ("elapsed hand:X hand:Y hand:Z hand:QX hand:QY hand:QZ hand:QW", "elapsed",
+         "hand:X hand:Y hand:Z", "hand:QW hand:QX hand:QY hand:QZ"),
+        ("a b c", "", "", ""),
+        ("t x y z q0 q1 q2 q3", "t", "x y z", "q0 q1 q2 q3"),
+    ],
+)  # fmt: skip
+def test_names_of_many_recorders_are_understood(head, time, place, turn):
+    columns = head.split()
+    for find, expected in (
+        (names.find_time, time), (names.find_position, place), (names.find_quaternion, turn),
+    ):  # fmt: skip
+        assert [columns[i] for i in find(columns)] == expected.split()
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("x [mm]", "mm"),
+        ("Time (Seconds)", "s"),
+        ("stamp_ns", "ns"),
+        ("roll (deg)", "deg"),
+        ("x", ""),
+    ],
+)
+def test_units_stand_behind_names(name, unit):
+    assert names.without_unit(name)[1] == unit
+
+
+def test_angles_beyond_a_turn_are_degrees(tmp_path):
+    values = np.degrees(TURNS.as_euler("xyz"))
+    report, stream = turned(tmp_path / "a.csv", tmp_path, ["roll", "pitch", "yaw"], values)
+    assert any("degrees" in text for text in report.told)
+    assert_same_motion(stream)
+    assert math.degrees(report.rotation) < 180.1
