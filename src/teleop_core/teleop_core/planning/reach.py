@@ -232,7 +232,7 @@ def _followed(walker: Walker, placement: Placement, given: Placement, aim: Aim) 
     return Followed(
         placement=placement,
         session=session,
-        in_place=walker.walk(placement, is_cut=False),
+        in_place=walker.walk(placement, is_cut=False, is_fast=True),
         at_given_gain=session.share if full == placement else walker.share(full),
         misfit=aim.misfit(placement),
     )

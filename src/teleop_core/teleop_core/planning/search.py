@@ -19,12 +19,15 @@ from teleop_core.planning.walk import Walker
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.room import roomy_postures
 
-ROTATION_GAINS = (1.0, 0.5, 0.25, 0.1, 0.0)
+ROTATION_GAINS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.0)
 """Rotation gains that are tried, the largest first."""
 LEAST_GAIN = 0.1
 """Smallest gain that is tried, as a share of the given one, before the rotation gain is lowered."""
 STARTS = 24
 """Postures that are tried as starts."""
+CUT = 0.03
+"""By how much less of the time than a session follows the path may be followed where it is, with
+nothing cut off: a placement lives from motion that fits, not from motion that is cut to fit."""
 # Another start, which the eye, and another turn, which the hand has to get used to, must be worth
 # this factor of gain.
 _WORTH = 1.25
@@ -64,6 +67,7 @@ class Search:
             Share of the time that the walker's path is followed, and the placement.
         """
         self._goal, nearest = goal, (-1.0, self._given)
+        self._known.clear()
         for rotation_gain in self._rotation_gains():
             found = self._at_rest(rotation_gain)
             nearest = max(nearest, found[0], key=_share)
@@ -148,7 +152,7 @@ class Search:
         self._tell()
         cut = self._walker.walk(placement)
         self._tell()
-        whole = self._walker.walk(placement, is_cut=False)
+        whole = self._walker.walk(placement, is_cut=False, is_fast=True)
         starts = []
         for moment in _MOMENTS:
             at = round(moment * (len(cut.asked) - 1))
@@ -173,9 +177,17 @@ class Search:
     def _found(self, placement: Placement) -> Found:
         placement = self._aim.aimed(placement)
         if placement not in self._known:
-            self._tell()
-            self._known[placement] = self._walker.share(placement)
+            self._known[placement] = self._share(placement)
         return self._known[placement], placement
+
+    def _share(self, placement: Placement) -> float:
+        """Share that a session follows, or what :data:`CUT` leaves of that of the path in place."""
+        self._tell()
+        share = self._walker.share(placement, is_cut=False) + CUT
+        if share < self._goal:
+            return share
+        self._tell()
+        return min(share, self._walker.share(placement))
 
     def _sorted(self, placements: Iterable[Placement]) -> list[Found]:
         """Shares of placements, the best first; of equals the first."""

@@ -146,21 +146,22 @@ class Walker:
             self._switch, self._samples, self._answers, DT,
         )  # fmt: skip
 
-    def share(self, placement: Placement) -> float:
-        """Share of the time that a placement follows, as in :attr:`Walked.share`."""
-        self._run(placement, is_cut=True)
+    def share(self, placement: Placement, *, is_cut: bool = True) -> float:
+        """Share of the time that a placement follows, as in :attr:`Walked.share`; see `walk`."""
+        self._run(placement, is_cut=is_cut, is_fast=False)
         is_followed = self._answers["reach"][:, _COLUMN["limit"]] == Limit.NONE
         return float(self.weights[is_followed].sum())
 
-    def walk(self, placement: Placement, *, is_cut: bool = True) -> Walked:
+    def walk(self, placement: Placement, *, is_cut: bool = True, is_fast: bool = False) -> Walked:
         """What becomes of the path.
 
         Args:
             placement: Start, turn and gains.
             is_cut: Whether a limit cuts the hand's motion, as in a session. Else every pose of the
-                path is asked for where it is, however fast the joints would have to be.
+                path is asked for where it is.
+            is_fast: Whether joints may be as fast as they would have to be.
         """
-        self._run(placement, is_cut=is_cut)
+        self._run(placement, is_cut=is_cut, is_fast=is_fast)
         answers, reach = self._answers, self._answers["reach"]
         return Walked(
             weights=self.weights,
@@ -172,7 +173,7 @@ class Walker:
             residual=reach[:, _COLUMN["position_residual"] : _COLUMN["cut_x"]].copy(),
         )
 
-    def _run(self, placement: Placement, *, is_cut: bool) -> None:
+    def _run(self, placement: Placement, *, is_cut: bool, is_fast: bool) -> None:
         scaling, solving = self._scaling, self._solving
         scaling.retune(
             replace(
@@ -190,7 +191,7 @@ class Walker:
             stage.reset()
         scaling.parameters["pause_ns"] = self._scaling_pause
         solving.parameters["longest_ns"] = self._solving_pause
-        solving.parameters["speed"] = self._speed if is_cut else _ANY_SPEED
+        solving.parameters["speed"] = _ANY_SPEED if is_fast else self._speed
         start = np.array(placement.start)
         solving.signals["slave_setpoint_js"] = start
         pose_from_transform(self.robot.fk(start), scaling.signals["slave_setpoint_cp"])
