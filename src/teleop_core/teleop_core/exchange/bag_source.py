@@ -91,12 +91,8 @@ class BagSource:
         Raises:
             RecordingError: It cannot be read.
         """
-        if self.path.is_dir() and not any(
-            _holds(self.path, f"*{end}") for end in (".mcap", ".db3")
-        ):
-            reason = (
-                "is no recording: it holds neither .mcap nor .db3; for ROS 1 give the .bag file"
-            )
+        if self.path.is_dir() and not _holds(self.path, ".mcap", ".db3", ".zstd"):
+            reason = "is no recording: it holds no .mcap and no .db3; of ROS 1 give the .bag file"
             raise RecordingError(self.path, reason)
         try:
             types = get_typestore(Stores.ROS2_JAZZY)

@@ -1,0 +1,349 @@
+"""Importing bags of others: any pose, any storage, ROS 1 and 2, read beside the rosbags library."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.spatial.transform import Rotation
+
+import teleop_core as tc
+from teleop_core.exchange import bag_messages
+
+START_NS = 1_700_000_000_000_000_000
+COUNT = 300
+STAMPS = START_NS + np.arange(COUNT) * 10_000_000
+LOGS = STAMPS + 3_000_000
+T = np.arange(COUNT) * 0.01
+PLACES = 0.03 * np.column_stack((np.sin(T), np.cos(T), T))
+XYZW = Rotation.from_rotvec(np.column_stack((np.sin(T), 0.2 * T, np.cos(T)))).as_quat()
+POSES = np.column_stack((PLACES, XYZW[:, [3, 0, 1, 2]]))
+KINDS = ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Odometry", "Pose",
+         "Transform", "TFMessage")  # fmt: skip
+
+
+@cache
+def types_of(is_ros2):
+    found = get_typestore(Stores.ROS2_JAZZY if is_ros2 else Stores.ROS1_NOETIC)
+    if not is_ros2:
+        text = "geometry_msgs/TransformStamped[] transforms"
+        found.register(get_types_from_msg(text, "tf2_msgs/msg/TFMessage"))
+    return found
+
+
+class Maker:
+    """Messages of either version of ROS."""
+
+    def __init__(self, is_ros2=True):
+        self.types, self.is_ros2 = types_of(is_ros2), is_ros2
+
+    def make(self, name, **values):
+        return self.types.types[name](**values)
+
+    def header(self, stamp_ns, frame="base", seq=0):
+        sec, nanosec = divmod(int(stamp_ns), 1_000_000_000)
+        stamp = self.make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
+        more = {} if self.is_ros2 else {"seq": seq}
+        return self.make("std_msgs/msg/Header", stamp=stamp, frame_id=frame, **more)
+
+    def pose(self, i, kind, stamp_ns, child="tool"):
+        """Message of a kind, and the name of its type."""
+        g = "geometry_msgs/msg"
+        x, y, z = PLACES[i]
+        turn = self.make(f"{g}/Quaternion", **dict(zip("xyzw", XYZW[i], strict=True)))
+        pose = self.make(f"{g}/Pose", position=self.make(f"{g}/Point", x=x, y=y, z=z),
+                         orientation=turn)  # fmt: skip
+        move = self.make(f"{g}/Transform", translation=self.make(f"{g}/Vector3", x=x, y=y, z=z),
+                         rotation=turn)  # fmt: skip
+        spread = self.make(f"{g}/PoseWithCovariance", pose=pose, covariance=np.full(36, float(i)))
+        head = self.header(stamp_ns, seq=i)
+        moved = self.make(
+            f"{g}/TransformStamped", header=head, child_frame_id=child, transform=move
+        )
+        zero = self.make(f"{g}/Vector3", x=0.0, y=0.0, z=float(i))
+        twist = self.make(f"{g}/TwistWithCovariance", covariance=np.zeros(36),
+                          twist=self.make(f"{g}/Twist", linear=zero, angular=zero))  # fmt: skip
+        return {
+            "PoseStamped": lambda: self.make(f"{g}/PoseStamped", header=head, pose=pose),
+            "PoseWithCovarianceStamped": lambda: self.make(
+                f"{g}/PoseWithCovarianceStamped", header=head, pose=spread
+            ),
+            "TransformStamped": lambda: moved,
+            "Odometry": lambda: self.make(
+                "nav_msgs/msg/Odometry", header=head, child_frame_id=child, pose=spread, twist=twist
+            ),
+            "Pose": lambda: pose,
+            "Transform": lambda: move,
+            "TFMessage": lambda: self.make("tf2_msgs/msg/TFMessage", transforms=[moved]),
+        }[kind]()
+
+    def joy(self, stamp_ns, buttons):
+        return self.make(
+            "sensor_msgs/msg/Joy", header=self.header(stamp_ns), axes=np.zeros(2, np.float32),
+            buttons=np.array(buttons, np.int32),
+        )  # fmt: skip
+
+
+def write2(path, messages, storage=StoragePlugin.MCAP, compression=None):
+    """Rosbag2 directory of (topic, log time, message)."""
+    maker, writer = types_of(True), Writer2(path, version=9, storage_plugin=storage)
+    if compression is not None:
+        writer.set_compression(compression, CompressionFormat.ZSTD)
+    with writer:
+        made = {}
+        for topic, log_ns, message in messages:
+            kind = message.__msgtype__
+            if topic not in made:
+                made[topic] = writer.add_connection(topic, kind, typestore=maker)
+            writer.write(made[topic], int(log_ns), maker.serialize_cdr(message, kind))
+    return path
+
+
+def write1(path, messages, compression=None):
+    """ROS 1 bag."""
+    maker, writer = types_of(False), Writer1(path)
+    if compression is not None:
+        writer.set_compression(compression)
+    with writer:
+        made = {}
+        for topic, log_ns, message in messages:
+            kind = message.__msgtype__
+            if topic not in made:
+                made[topic] = writer.add_connection(topic, kind, typestore=maker)
+            writer.write(made[topic], int(log_ns), maker.serialize_ros1(message, kind))
+    return path
+
+
+def poses(kind="PoseStamped", topic="/hand/pose", is_ros2=True, stamps=STAMPS, logs=LOGS, **more):
+    maker = Maker(is_ros2)
+    return [(topic, logs[i], maker.pose(i, kind, stamps[i], **more)) for i in range(len(logs))]
+
+
+def presses(buttons, topic="/joy", stamps=STAMPS, is_ros2=True):
+    maker = Maker(is_ros2)
+    return [(topic, LOGS[i], maker.joy(stamps[i], buttons(i))) for i in range(COUNT)]
+
+
+def in_order(*parts):
+    return sorted((m for part in parts for m in part), key=lambda message: message[1])
+
+
+def imported(path, tmp_path, **options):
+    report = tc.import_recording(path, tmp_path / "out", **options)
+    return report, report.recording["master/measured_cp"]
+
+
+def assert_same(stream, stamps=STAMPS, rows=POSES):
+    assert np.array_equal(stream.stamp_ns, stamps)
+    assert np.allclose(stream[["x", "y", "z"]], rows[:, :3], rtol=0, atol=1e-16)
+    turn = ["qw", "qx", "qy", "qz"]
+    signs = np.sign(np.sum(stream[turn] * rows[:, 3:], axis=1))[:, None]
+    assert np.allclose(signs * stream[turn], rows[:, 3:], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("version", ["mcap", "db3", "ros1"])
+def test_every_message_of_a_pose_is_read_from_every_storage(kind, version, tmp_path):
+    messages = poses(kind, is_ros2=version != "ros1")
+    if version == "ros1":
+        path = write1(tmp_path / "user.bag", messages)
+    else:
+        storage = StoragePlugin.MCAP if version == "mcap" else StoragePlugin.SQLITE3
+        path = write2(tmp_path / "bag", messages, storage)
+    has_header = kind not in {"Pose", "Transform"}
+    _, stream = imported(path, tmp_path)
+    assert_same(stream, STAMPS if has_header else LOGS)
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_compressed_recordings_are_read(mode, storage, tmp_path):
+    if mode is CompressionMode.FILE and storage is StoragePlugin.MCAP:
+        mode = CompressionMode.STORAGE
+    assert_same(imported(write2(tmp_path / "bag", poses(), storage, mode), tmp_path)[1])
+
+
+@pytest.mark.parametrize("form", list(Writer1.CompressionFormat))
+def test_compressed_bags_of_ros_1_are_read(form, tmp_path):
+    messages = poses(is_ros2=False)
+    assert_same(imported(write1(tmp_path / "user.bag", messages, form), tmp_path)[1])
+
+
+def test_single_files_are_recordings_too(tmp_path):
+    for number, storage in enumerate(StoragePlugin):
+        folder = write2(tmp_path / f"bag{number}", poses(), storage)
+        (file,) = [path for path in folder.iterdir() if path.suffix != ".yaml"]
+        report = tc.import_recording(file, tmp_path / f"out{number}")
+        assert_same(report.recording["master/measured_cp"])
+
+
+def test_rows_are_those_of_the_rosbags_library(tmp_path):
+    path = write2(tmp_path / "bag", poses("Odometry"), StoragePlugin.SQLITE3)
+    expected = []
+    with AnyReader([path], default_typestore=types_of(True)) as reader:
+        for connection, log_ns, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            p, q = message.pose.pose.position, message.pose.pose.orientation
+            expected.append((log_ns, p.x, p.y, p.z, q.w, q.x, q.y, q.z))
+    _, stream = imported(path, tmp_path, stamps="log")
+    rows = np.array([row[1:] for row in expected])
+    assert_same(stream, [row[0] for row in expected], rows)
+
+
+def test_messages_that_are_not_alike_are_read_one_by_one(tmp_path):
+    messages = poses("Odometry")
+    for i in range(0, COUNT, 3):  # of the same length, and of another one
+        topic, log_ns, message = messages[i]
+        message.header.frame_id, message.child_frame_id = ("bas", "etool") if i % 2 else ("b", "t")
+        messages[i] = (topic, log_ns, message)
+    path = write2(tmp_path / "bag", messages, StoragePlugin.SQLITE3)
+    assert_same(imported(path, tmp_path)[1])
+
+
+def test_messages_that_are_alike_are_read_as_one_array(tmp_path, monkeypatch):
+    monkeypatch.setattr(bag_messages.PoseReader, "_one", None)  # reading one by one would fail
+    path = write2(tmp_path / "bag", poses("TransformStamped"), StoragePlugin.SQLITE3)
+    assert_same(imported(path, tmp_path)[1])
+
+
+# Which topic.
+
+
+def test_several_topics_of_poses_are_listed_in_one_line(tmp_path):
+    path = write2(tmp_path / "bag", in_order(poses(topic="/left"), poses("Pose", "/right")))
+    with pytest.raises(tc.UnknownNameError, match="left, right") as error:
+        tc.import_recording(path, tmp_path / "out")
+    assert "--topic" in str(error.value)
+    assert not (tmp_path / "out").exists()
+    assert_same(imported(path, tmp_path, topic="/left")[1])
+
+
+def test_topics_that_are_no_poses_are_told(tmp_path):
+    path = write2(tmp_path / "bag", in_order(poses(), presses(lambda i: [0])))
+    with pytest.raises(tc.UnknownNameError, match="hand/pose"):
+        tc.import_recording(path, tmp_path / "out", topic="foot/pose")
+    with pytest.raises(tc.RecordingError, match="hand/pose"):
+        tc.import_recording(path, tmp_path / "out", topic="joy")
+    only = write2(tmp_path / "joys", presses(lambda i: [0]))
+    with pytest.raises(tc.RecordingError, match="no topic of poses; it has joy"):
+        tc.import_recording(only, tmp_path / "out")
+
+
+def test_of_several_transforms_one_frame_is_taken(tmp_path):
+    both = in_order(poses("TFMessage", "/tf"), poses("TFMessage", "/tf", child="camera"))
+    path = write2(tmp_path / "bag", both)
+    with pytest.raises(tc.UnknownNameError, match="camera, tool"):
+        tc.import_recording(path, tmp_path / "out")
+    assert_same(imported(path, tmp_path, frame="tool")[1])
+
+
+def test_options_of_columns_do_not_fit_a_bag(tmp_path):
+    path = write2(tmp_path / "bag", poses())
+    with pytest.raises(tc.ParameterError, match="topics, not columns"):
+        tc.import_recording(path, tmp_path / "out", position=("x", "y", "z"))
+
+
+# Stamps.
+
+
+@pytest.mark.parametrize("stamp", [0, START_NS])
+def test_header_stamps_that_never_change_give_way_to_the_log(stamp, tmp_path):
+    path = write2(tmp_path / "bag", poses(stamps=np.full(COUNT, stamp)))
+    report, stream = imported(path, tmp_path)
+    assert_same(stream, LOGS)
+    assert any("time of recording" in text for text in report.told)
+
+
+def test_log_times_are_taken_on_request(tmp_path):
+    assert_same(imported(write2(tmp_path / "bag", poses()), tmp_path, stamps="log")[1], LOGS)
+
+
+# Buttons.
+
+
+@pytest.mark.parametrize(
+    ("count", "text", "expected"),
+    [
+        (1, "", (0, -1, -1)),
+        (2, "", (0, 1, -1)),
+        (3, "", (0, 1, 2)),
+        (11, "clutch=4, mode=9", (4, -1, 9)),
+        (11, "none", None),
+    ],
+)
+@pytest.mark.parametrize("is_ros2", [True, False])
+def test_any_joy_has_its_buttons_mapped(count, text, expected, is_ros2, tmp_path):
+    def buttons(i):
+        return [(i // (7 * (n + 1))) % 2 for n in range(count)]
+
+    messages = in_order(poses(is_ros2=is_ros2), presses(buttons, is_ros2=is_ros2))
+    path = write2(tmp_path / "bag", messages) if is_ros2 else write1(tmp_path / "a.bag", messages)
+    report, _ = imported(path, tmp_path, buttons=text)
+    if expected is None:
+        assert report.recording.topics == ("master/measured_cp",)
+        return
+    found = report.recording["master/buttons"]
+    held = found.values[np.searchsorted(found.stamp_ns, STAMPS, side="right") - 1]
+    rows = np.array([buttons(i) for i in range(COUNT)])
+    for column, number in enumerate(expected):
+        assert np.array_equal(held[:, column], rows[:, number] if number >= 0 else np.zeros(COUNT))
+
+
+def test_a_button_that_the_joy_lacks_is_told(tmp_path):
+    path = write2(tmp_path / "bag", in_order(poses(), presses(lambda i: [0, 1])))
+    with pytest.raises(tc.ParameterError, match="below 2"):
+        tc.import_recording(path, tmp_path / "out", buttons="clutch=2")
+
+
+def test_buttons_follow_the_poses_to_the_log_times(tmp_path):
+    zero = np.zeros(COUNT, np.int64)
+    both = in_order(poses(stamps=zero), presses(lambda i: [int(i >= 100)], stamps=zero))
+    report, _ = imported(write2(tmp_path / "bag", both), tmp_path)
+    buttons = report.recording["master/buttons"]
+    assert buttons.stamp_ns.tolist() == [LOGS[0], LOGS[100]]
+    assert buttons["clutch"].tolist() == [0.0, 1.0]
+
+
+# Damage.
+
+
+def test_nan_and_strange_quaternions_are_left_out_and_counted(tmp_path):
+    messages = poses()
+    for i in (10, 11, 12):
+        messages[i][2].pose.position.y = float("nan")
+    messages[20][2].pose.orientation.w += 3.0
+    report, stream = imported(write2(tmp_path / "bag", messages), tmp_path)
+    kept = np.delete(np.arange(COUNT), [10, 11, 12, 20])
+    assert report.counts.missing == 4
+    assert_same(stream, STAMPS[kept], POSES[kept])
+    assert any("orientation" in text for text in report.warnings)
+
+
+@pytest.mark.parametrize("name", ["bag", "bag.bag", "bag.mcap", "bag.db3"])
+def test_what_is_no_recording_is_told_in_one_line(name, tmp_path):
+    path = tmp_path / name
+    if path.suffix:
+        path.write_bytes(b"nothing of the kind" * 10)
+    else:
+        path.mkdir()
+    with pytest.raises(tc.RecordingError) as error:
+        tc.import_recording(path, tmp_path / "out")
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bag_that_was_cut_off_is_told(tmp_path):
+    path = write1(tmp_path / "user.bag", poses(is_ros2=False))
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(tc.RecordingError):
+        tc.import_recording(path, tmp_path / "out")
+    folder = write2(tmp_path / "bag", poses())
+    (file,) = folder.glob("*.mcap")
+    file.write_bytes(file.read_bytes()[:-50])
+    with pytest.raises(tc.RecordingError, match="teleop recover"):
+        tc.import_recording(folder, tmp_path / "out")
