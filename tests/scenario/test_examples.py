@@ -106,6 +106,14 @@ def test_sweep_tells_that_a_stiffer_wall_holds_better(tmp_path):
     assert depths == sorted(depths, reverse=True)
 
 
+def test_a_hand_that_goes_too_far_is_followed_as_proposed(tmp_path):
+    text = run("reach", tmp_path)
+    given, proposed = numbers(r"([\d.]+)% followed", text)
+    assert given < 60.0
+    assert proposed > 98.0
+    assert "motion_scaling.rotation_gain=" in text
+
+
 def test_recording_becomes_a_data_frame_and_a_page(tmp_path):
     text = run("bag_to_pandas", tmp_path)
     assert "10000 rows" in text

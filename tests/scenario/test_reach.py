@@ -248,3 +248,9 @@ def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop):
         assert expected in said
         assert len(said.splitlines()) == 1
     assert not (tmp_path / "x.yaml").exists()
+
+
+def test_axes_stay_where_a_camera_is_fixed():
+    reach = tc.reach(person("motion_capture", 12.0), robot="rcrt1", keeps_axes=True)
+    assert reach.proposed.placement.axes == reach.given.placement.axes
+    assert reach.proposed.share >= 0.99

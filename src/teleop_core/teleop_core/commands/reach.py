@@ -34,6 +34,9 @@ def add(commands: Any) -> None:
         "--share", type=float, default=99.0, metavar="PERCENT",
         help="share of the time that is to be followed (default: 99)",
     )  # fmt: skip
+    parser.add_argument(
+        "--keep-axes", action="store_true", help="leave the map of axes from hand to slave as it is"
+    )
     parser.add_argument("--html", type=Path, metavar="FILE", help="page with pictures")
     parser.add_argument(
         "--out", type=Path, metavar="FILE.yaml",
@@ -70,6 +73,6 @@ def _reach(source: str, arguments: argparse.Namespace) -> "Reach":
     with shown_progress(f"searching, {Path(source).name}") as progress:
         return reach(
             source, robot=arguments.robot, geometry=arguments.geometry, arm=arguments.arm,
-            share=arguments.share / 100.0, progress=progress, files=arguments.config,
-            texts=arguments.settings,
+            share=arguments.share / 100.0, keeps_axes=arguments.keep_axes, progress=progress,
+            files=arguments.config, texts=arguments.settings,
         )  # fmt: skip

@@ -131,6 +131,7 @@ def reach(
     geometry: Iterable[str] = (),
     share: float = GOAL,
     arm: str = "",
+    keeps_axes: bool = False,
     progress: Progress = _silent,
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
@@ -145,6 +146,8 @@ def reach(
         geometry: Its lengths [m, rad] as ``symbol=value``.
         share: Share of the time that is to be followed, above 0 and at most 1.
         arm: Namespace of the arm; empty for the default one.
+        keeps_axes: Whether the map of axes from hand to slave is to stay as it is, as where a
+            camera looks at the slave from a fixed side.
         progress: Told how far it is.
         files: ROS 2 parameter files over the configuration.
         settings: Parameters over the files.
@@ -162,7 +165,7 @@ def reach(
     changes = _changes(robot, geometry, files, settings or {}, texts)
     made, recording = _configured(source, changes)
     path = asked_path(of_arm(recording.bag, arm))
-    return _reach(path, made, share, arm, progress)
+    return _reach(path, made, share, arm, progress, keeps_axes=keeps_axes)
 
 
 def _changes(
@@ -203,7 +206,13 @@ def _of_scenario(name: str, changes: list[Layer]) -> Configuration:
 
 
 def _reach(
-    path: AskedPath, made: Configuration, goal: float, arm: str, progress: Progress
+    path: AskedPath,
+    made: Configuration,
+    goal: float,
+    arm: str,
+    progress: Progress,
+    *,
+    keeps_axes: bool,
 ) -> Reach:
     scaling, solving = made.group("motion_scaling", arm), made.group("inverse_kinematics", arm)
     whole = Walker(path.limited(_WHOLE), scaling, solving)
@@ -221,7 +230,8 @@ def _reach(
     proposed = as_given
     if as_given.share < goal:
         excerpt = Walker(path.excerpt(_EXCERPT_RATE, _EXCERPT), scaling, solving)
-        proposed = _proposed(whole, Search(excerpt, given, aim, tell), as_given, goal, aim)
+        search = Search(excerpt, given, aim, tell, keeps_axes=keeps_axes)
+        proposed = _proposed(whole, search, as_given, goal, aim)
     progress(_USUAL_WALKS, _USUAL_WALKS)
     return Reach(whole.path, whole.robot, goal, as_given, proposed, arm)
 

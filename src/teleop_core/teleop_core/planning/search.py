@@ -47,11 +47,19 @@ class Search:
         given: Placement to begin with; its gains are the largest that are tried.
         aim: Fits the tool's axes to every start and turn.
         tell: Called before every walk.
+        keeps_axes: Whether ``axes`` stay as they are given.
     """
 
     def __init__(
-        self, walker: Walker, given: Placement, aim: Aim, tell: Callable[[], None]
+        self,
+        walker: Walker,
+        given: Placement,
+        aim: Aim,
+        tell: Callable[[], None],
+        *,
+        keeps_axes: bool = False,
     ) -> None:
+        self._turns = () if keeps_axes else turns()
         self._walker, self._given, self._aim, self._tell = walker, given, aim, tell
         self._goal = 1.0
         self._known: dict[Placement, float] = {}
@@ -73,7 +81,7 @@ class Search:
             nearest = max(nearest, found[0], key=_share)
             if found[0][0] >= self._goal:
                 raised = self._with_other(self._raised(found), self._other_starts)
-                return self._with_other(raised, _other_turns)
+                return self._with_other(raised, self._other_turns)
         return nearest
 
     def _rotation_gains(self) -> list[float]:
@@ -88,7 +96,7 @@ class Search:
         scaled = self._scaled(self._given, LEAST_GAIN, self._given)
         least = replace(scaled, rotation_gain=rotation_gain)
         tried = [self._improved(self._found(least))]
-        for others in (self._other_starts, _other_turns):
+        for others in (self._other_starts, self._other_turns):
             if tried[0][0] >= self._goal:
                 break
             more = self._sorted(others(tried[0][1]))[:_IMPROVED]
@@ -98,6 +106,10 @@ class Search:
     def _other_starts(self, placement: Placement) -> list[Placement]:
         """The placement from everywhere else."""
         return [replace(placement, start=start) for start in self._starts]
+
+    def _other_turns(self, placement: Placement) -> list[Placement]:
+        """The placement with every map of axes that may be taken."""
+        return [replace(placement, axes=axes) for axes in self._turns]
 
     def _raised(self, found: Sequence[Found]) -> Found:
         """The largest gain that reaches the goal, from what does so with the least."""
@@ -209,11 +221,6 @@ class Search:
             coarse_gain=_three_digits(gains.coarse_gain * factor),
             fine_gain=_three_digits(gains.fine_gain * factor),
         )
-
-
-def _other_turns(placement: Placement) -> list[Placement]:
-    """The placement with every map of axes."""
-    return [replace(placement, axes=axes) for axes in turns()]
 
 
 def _share(found: Found) -> float:

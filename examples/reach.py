@@ -1,0 +1,25 @@
+"""Ask what a slave can follow of a hand that moves and turns far, and let it follow."""
+
+import teleop_core as tc
+
+
+def main() -> None:
+    """Print the share of the time that is followed as it is, and as proposed."""
+    hand = tc.run(
+        duration=30.0,
+        robot="rcrt1",
+        operator="random",
+        operator__size=(0.25, 0.25, 0.2),
+        operator__rotation=1.2,
+        operator__period=6.0,
+        reach_force__is_on=False,  # the hand is not to be held back
+    )
+    reach = tc.reach(hand)
+    print(reach)
+    for name, settings in (("as given", {}), ("proposed", reach.settings())):
+        told = tc.replay(hand, settings=settings)["slave/reach"]
+        print(f"{name}: {(told['limit'] == 0.0).mean():.1%} followed in a session")
+
+
+if __name__ == "__main__":
+    main()
