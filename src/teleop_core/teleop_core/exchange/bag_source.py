@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from rosbags.highlevel import AnyReader, AnyReaderError
-from rosbags.interfaces import Connection
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
@@ -75,10 +74,7 @@ class BagSource:
 
     def _our_reader(self) -> Bag | None:
         """Our reader of MCAP, which is faster; None for what it does not read."""
-        is_mcap = self.path.suffix == ".mcap" or (
-            self.path.is_dir() and _holds(self.path, "*.mcap")
-        )
-        if not is_mcap:
+        if not _holds(self.path, ".mcap"):
             return None
         with suppress(RecordingError):
             return Bag(self.path)
@@ -197,9 +193,14 @@ class BagSource:
         return PoseReader(reader.typestore, kind, is_ros2=reader.is2, frame=frame)
 
     def _raw(self, reader: AnyReader, topic: str) -> Iterator[Raw]:
-        chosen: list[Connection] = [c for c in reader.connections if plain(c.topic) == topic]
-        for _, log, data in reader.messages(connections=chosen):
-            yield log, bytes(data)
+        if self._bag is not None:
+            for _, _, log, data in self._bag.raw([topic]):
+                yield log, data
+            return
+        chosen = [c for c in reader.connections if plain(c.topic) == topic]
+        # There is one file: its own reader need not be merged with others.
+        for _, log, data in reader.readers[0].messages(connections=chosen):
+            yield log, data
 
     def blocks(self) -> Iterator[Block]:
         """As of any source.
