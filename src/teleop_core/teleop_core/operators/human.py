@@ -35,40 +35,40 @@ class HumanParameters:
         doc="median distance from target to target, within the region of operator.size",
     )  # fmt: skip
     reach_spread: float = parameter(
-        0.5, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm"
+        0.45, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm"
     )
     turn: float = parameter(
         0.3, lower=0.0, upper=2.0, fixed=True,
         doc="standard deviation of the turn to the next target, in parts of operator.rotation",
     )  # fmt: skip
     width: float = parameter(
-        2.5e-3, unit="m", lower=1e-4, upper=0.1, fixed=True, doc="width of a target, as of Fitts"
+        2.8e-3, unit="m", lower=1e-4, upper=0.1, fixed=True, doc="width of a target, as of Fitts"
     )
     tolerance: float = parameter(
-        2e-3, unit="m", lower=1e-4, upper=0.1, fixed=True,
+        2.6e-3, unit="m", lower=1e-4, upper=0.1, fixed=True,
         doc="distance from the target at which no correction is made",
     )  # fmt: skip
     movement_time: float = parameter(
-        0.06, unit="s", lower=0.05, upper=2.0, fixed=True,
+        0.08, unit="s", lower=0.05, upper=2.0, fixed=True,
         doc="duration of a submovement of no difficulty",
     )  # fmt: skip
     time_per_bit: float = parameter(
-        0.16, unit="s", lower=0.0, upper=2.0, fixed=True,
+        0.17, unit="s", lower=0.0, upper=2.0, fixed=True,
         doc="what each bit of difficulty adds to the duration of a submovement",
     )  # fmt: skip
     time_spread: float = parameter(
-        0.23, lower=0.0, upper=1.0, fixed=True, doc="standard deviation of its logarithm"
+        0.27, lower=0.0, upper=1.0, fixed=True, doc="standard deviation of its logarithm"
     )
     shortfall: float = parameter(
-        0.05, lower=0.0, upper=0.5, fixed=True,
+        0.06, lower=0.0, upper=0.5, fixed=True,
         doc="share of the distance that a first submovement aims short by",
     )  # fmt: skip
     noise_along: float = parameter(
-        0.023, unit="s", lower=0.0, upper=0.2, fixed=True,
+        0.03, unit="s", lower=0.0, upper=0.2, fixed=True,
         doc="standard deviation of a submovement's end along its way, per mean speed",
     )  # fmt: skip
     noise_across: float = parameter(
-        0.021, unit="s", lower=0.0, upper=0.2, fixed=True, doc="the same across its way"
+        0.018, unit="s", lower=0.0, upper=0.2, fixed=True, doc="the same across its way"
     )
     reaction_time: float = parameter(
         0.22, unit="s", lower=0.05, upper=1.0, fixed=True,
@@ -78,16 +78,16 @@ class HumanParameters:
         3, lower=0, upper=10, fixed=True, doc="largest number of corrections of a reach"
     )
     dwell_time: float = parameter(
-        0.07, unit="s", lower=0.01, upper=10.0, fixed=True, doc="median rest at a target"
+        0.22, unit="s", lower=0.01, upper=10.0, fixed=True, doc="median rest at a target"
     )
     dwell_spread: float = parameter(
-        0.46, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm"
+        0.5, lower=0.0, upper=2.0, fixed=True, doc="standard deviation of its logarithm"
     )
     passing: float = parameter(
-        0.33, lower=0.0, upper=1.0, fixed=True, doc="share of targets at which the hand rests not"
+        0.7, lower=0.0, upper=1.0, fixed=True, doc="share of targets at which the hand rests not"
     )
     overlap: float = parameter(
-        0.19, lower=0.0, upper=0.5, fixed=True,
+        0.32, lower=0.0, upper=0.5, fixed=True,
         doc="share of the last submovement into which the next reach begins at such a target",
     )  # fmt: skip
     tremor: float = parameter(
