@@ -19,6 +19,7 @@ from teleop_core.mapping.motion_scaling import (
 from teleop_core.master.haptic_master import HAPTIC_MASTER
 from teleop_core.parameters import build
 from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer
+from teleop_core.slave.slave_sim import SLAVE_SIM
 from teleop_core.stage import STAGES
 from teleop_core.topics import Topic
 
@@ -33,11 +34,13 @@ class Origin:
         graph: What ran; the built-in stages where nothing is known or a stage is not installed.
         axes: Rotation (3, 3) from the master's base to the slave's axes.
         operator: What is stored of ``haptic_master.operator``, by names below it.
+        interpolation: How the slave goes from command to command; None if it is not told.
     """
 
     graph: Graph
     axes: Array
     operator: Mapping[str, object] = field(default_factory=dict)
+    interpolation: str | None = None
 
     @cached_property
     def chain(self) -> tuple[tuple[str, Topic], ...]:
@@ -66,7 +69,9 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
         arm: Name of the arm.
     """
     layer = _layer(bag)
-    return Origin(_graph(layer), _axes(layer, arm), _operator(layer, arm))
+    return Origin(
+        _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm)
+    )
 
 
 def _layer(bag: Bag) -> Layer:
@@ -90,6 +95,13 @@ def _graph(layer: Layer) -> Graph:
         return build_graph(session.arms, session.stages, session.delays)
     except TeleopError:
         return build_graph()
+
+
+def _interpolation(layer: Layer, arm: str) -> str | None:
+    """What is said of the slave of the arm, or of all arms."""
+    name = SLAVE_SIM.name
+    said = (layer.get(name, {}) | layer.get(f"{arm}/{name}", {})).get("interpolation")
+    return said if isinstance(said, str) else None
 
 
 def _operator(layer: Layer, arm: str) -> Mapping[str, object]:

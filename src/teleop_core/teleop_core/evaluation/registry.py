@@ -91,7 +91,6 @@ METRICS: Registry[type[Metric]] = Registry(
         "fixture": f"{_FOLDER}.fixture:FixtureMetric",
         "force_n": f"{_FOLDER}.force:ForceMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",
-        "motion": f"{_FOLDER}.motion:MotionMetric",
         "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
         "ticks": f"{_FOLDER}.ticks:TicksMetric",
         "nodes": f"{_FOLDER}.nodes:NodesMetric",

@@ -9,11 +9,12 @@ from teleop_core.evaluation.accumulators import Moments, Spread
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.rows import MISSING, Row, row
+from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array
-from teleop_core.signals import STATE
-from teleop_core.topics import SLAVE_REACH, Limit
+from teleop_core.signals import DT, STATE
+from teleop_core.topics import SLAVE_REACH, SLAVE_SERVO_CP, Limit
 
 GROUP = "slave follows the hand"
 COMPARABLE = 0.99
@@ -36,6 +37,10 @@ class ReachScore:
         aligning_share: Share in which master or slave were silent and it was aligned anew.
         residual_mm: Distance that inverse kinematics left to the command, [mm].
         residual_deg: Angle that it left, [deg].
+        master_hz: Commands per second: the median of their stamps' steps.
+        interpolation: How the slave goes from command to command; None if it is not told.
+        interpolation_ms: By what that is late: a period of the commands, if it is longer than a
+            control tick, [ms].
     """
 
     followed_share: float | None
@@ -47,6 +52,9 @@ class ReachScore:
     aligning_share: float | None
     residual_mm: Spread
     residual_deg: Spread
+    master_hz: float | None
+    interpolation: str | None
+    interpolation_ms: float | None
 
 
 class ReachMetric(Metric):
@@ -64,12 +72,23 @@ class ReachMetric(Metric):
         Key("reach.residual_mm.rms|sd|max", "mm",
             f"what inverse kinematics left of each command: {SPREAD_MEANING}"),
         Key("reach.residual_deg.rms|sd|max", "deg", f"the same for angles: {SPREAD_MEANING}"),
+        Key("reach.master_hz", "Hz", "commands per second, by the median step of their stamps"),
+        Key("reach.interpolation", "1", "how the slave goes from command to command"),
+        Key("reach.interpolation_ms", "ms", "by what that is late; 0 where there is a command "
+            "every tick"),
     )  # fmt: skip
     topics = (SLAVE_REACH,)
 
     def __init__(self, context: Context) -> None:
-        self._history, self._end_ns = context.history, context.bag.end_ns
+        bag, span = context.bag, context.span
+        self._history = context.history
+        self._begin_ns = bag.start_ns if span is None else span.first_ns
+        self._end_ns = bag.end_ns if span is None else span.last_ns
         self._distance, self._angle = Moments(), Moments()
+        self._stamps, self._interpolation = (
+            context.shared(StampTallies),
+            context.origin.interpolation,
+        )
 
     def add(self, window: Window) -> None:
         """Take one window."""
@@ -80,7 +99,9 @@ class ReachMetric(Metric):
 
     def values(self) -> ReachScore:
         """Score of everything so far."""
-        shares, longest_s = _shares(self._history, self._end_ns)
+        shares, longest_s = _shares(self._history, self._begin_ns, self._end_ns)
+        tally = self._stamps.of.get(SLAVE_SERVO_CP.name)
+        period_us = tally.period_us if tally is not None else None
         return ReachScore(
             followed_share=shares.get(Limit.NONE),
             longest_s=longest_s,
@@ -91,7 +112,16 @@ class ReachMetric(Metric):
             aligning_share=shares.get("aligning"),
             residual_mm=self._distance.spread(),
             residual_deg=self._angle.spread(),
+            master_hz=None if not period_us else 1e6 / period_us,
+            interpolation=self._interpolation,
+            interpolation_ms=self._delay_ms(period_us),
         )
+
+    def _delay_ms(self, period_us: int | None) -> float | None:
+        if self._interpolation is None or not period_us:
+            return None
+        is_slow = self._interpolation != "off" and period_us > 1.5e6 * DT
+        return period_us * 1e-3 if is_slow else 0.0
 
     def rows(self) -> list[Row]:
         """Shares in percent, the longest stretch, residuals, and whether figures compare."""
@@ -107,26 +137,38 @@ class ReachMetric(Metric):
             row(GROUP, "left by IK, RMS", "mm", score.residual_mm.rms),
             row(GROUP, "left by IK, max", "mm", score.residual_mm.max),
             row(GROUP, "left by IK, max", "deg", score.residual_deg.max),
+            row(GROUP, "commands", "Hz", score.master_hz),
+            Row(GROUP, "interpolation", "", _way(score)),
         ]
+
+
+def _way(score: ReachScore) -> str:
+    """How the slave goes from command to command, with the delay of it."""
+    if score.interpolation is None:
+        return MISSING
+    name = score.interpolation.replace("_", " ")
+    return f"{name}, {score.interpolation_ms:.3g} ms" if score.interpolation_ms else name
 
 
 def _percent(share: float | None) -> str:
     return MISSING if share is None else f"{100.0 * share:.1f}"
 
 
-def _shares(history: StateHistory, end_ns: int) -> tuple[dict[Limit | str, float], float | None]:
+def _shares(
+    history: StateHistory, begin_ns: int, end_ns: int
+) -> tuple[dict[Limit | str, float], float | None]:
     """Share of the time in each cause, none among them, and the longest stretch [s] off."""
     follows = history.rows[:, STATE["is_following"]] > 0.0
     limits = history.rows[:, STATE["limit"]]
     if not follows.any() or np.isnan(limits).any():
         return {}, None
     first = int(np.argmax(follows))
-    stamps = np.append(history.stamp_ns[first:], max(end_ns, int(history.stamp_ns[-1])))
+    stamps = np.clip(np.append(history.stamp_ns[first:], end_ns), begin_ns, end_ns)
     spans = np.diff(stamps) * 1e-9
-    follows, limits = follows[first:], limits[first:]
     total = float(spans.sum())
     if total <= 0.0:
         return {}, None
+    follows, limits = follows[first:], limits[first:]
     found: dict[Limit | str, float] = {
         cause: float(spans[follows & (limits == cause)].sum()) / total
         for cause in (Limit.NONE, *_CAUSES)
