@@ -17,6 +17,8 @@ SAMPLE = 1000
 """Times of a block, and blocks, from which the unit is guessed."""
 MOST_STRANGE = 0.01
 """Share of rows whose orientation may be none before the file is refused."""
+TOLD_LENGTH = 1e-3
+"""Difference of a quaternion's length from 1 from which on it is told."""
 _NO_TIME = np.iinfo(np.int64).min
 
 
@@ -79,6 +81,8 @@ def gather(source: Source, options: ImportOptions, spool: Spool) -> Gathered:
         raise RecordingError(source.path, "holds no rows")
     _check(source, parts, spool.count)
     told = list(source.told)
+    if source.attitudes.longest > TOLD_LENGTH:
+        told.append(f"quaternions up to {source.attitudes.longest:.2g} off unit length made unit")
     stamps, usable, is_log = _stamps(source, options, parts, told)
     presses = source.presses()
     if presses is not None and (is_log or is_constant(presses.stamp_ns)):

@@ -28,6 +28,7 @@ class Attitudes:
         degrees: Whether angles are in degrees.
         strange: How many rows cannot be rotations.
         mirrored: How many of these are mirrors.
+        longest: By how much the length of a quaternion taken differed from 1, at most.
     """
 
     kind: str
@@ -35,6 +36,7 @@ class Attitudes:
     degrees: bool = False
     strange: int = 0
     mirrored: int = 0
+    longest: float = 0.0
     _last: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
 
     @property
@@ -67,6 +69,8 @@ class Attitudes:
         strange = np.abs(lengths - 1.0) > TOLERANCE
         self.strange += int((strange & ~missing).sum())
         lengths[strange | missing] = math.nan
+        off = np.abs(lengths[np.isfinite(lengths)] - 1.0)
+        self.longest = max(self.longest, float(off.max(initial=0.0)))
         unit: Array = quaternions / lengths[:, None]
         return unit
 

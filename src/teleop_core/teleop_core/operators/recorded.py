@@ -230,14 +230,12 @@ def _tell_stops(path: Path, samples: Samples, setting: Setting) -> None:
     low, high = samples.moves.min(axis=0), samples.moves.max(axis=0)
     hint = f"operator.center={_metres(-start - 0.5 * (low + high))} keeps it within"
     if (high - low > size).any():
-        share = float((size / np.maximum(high - low, 1e-9)).min())
-        hint = f"it is {_millimetres(high - low)}: `teleop import --scale {0.99 * share:.2g}`, or "\
-               "set device.workspace"  # fmt: skip
-    warnings.warn(
-        f"{path.name}: {100.0 * is_beyond.mean():.3g} % of the motion leaves the device's workspace "
-        f"of {_millimetres(size)}, by up to {1e3 * beyond.max():.3g} mm; {hint}",
-        stacklevel=2,
-    )
+        fits = 0.99 * float((size / np.maximum(high - low, 1e-9)).min())
+        hint = f"it is {_millimetres(high - low)}: `teleop import --scale {fits:.2g}`"
+    share = 100.0 * is_beyond.mean()
+    room = f"the device's workspace of {_millimetres(size)}"
+    text = f"{share:.3g} % of the motion leaves {room}, by up to {1e3 * beyond.max():.3g} mm"
+    warnings.warn(f"{path.name}: {text}; {hint}", stacklevel=2)
 
 
 def _metres(place: Array) -> str:
