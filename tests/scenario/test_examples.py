@@ -114,6 +114,14 @@ def test_a_hand_that_goes_too_far_is_followed_as_proposed(tmp_path):
     assert "motion_scaling.rotation_gain=" in text
 
 
+def test_human_operator_moves_as_people_do_and_the_random_one_does_not(tmp_path):
+    text = run("human_operator", tmp_path)
+    rows = {line.split()[0]: numbers(r"(-?[\d.]+)", line[24:]) for line in text.splitlines()[1:]}
+    low, high, *values = rows["peaks_per_s"]
+    assert all(low <= value <= high for value in values[:2])
+    assert all(value < low for value in values[2:])
+
+
 def test_recording_becomes_a_data_frame_and_a_page(tmp_path):
     text = run("bag_to_pandas", tmp_path)
     assert "10000 rows" in text

@@ -161,7 +161,7 @@ def _reach(
 ) -> Iterator[Submovement]:
     """First submovement to a target, which may be a turn alone, and its corrections.
 
-    The duration is that of Fitts (1954) in MacKenzie's (1992, eq. 3) form. The end is off by as
+    The duration is that of Fitts (1954) in MacKenzie's (1992) form. The end is off by as
     much as the submovement is fast (Schmidt et al. 1979; Meyer et al. 1988), as noise that grows
     with the motor command makes it (Harris and Wolpert 1998).
     """
