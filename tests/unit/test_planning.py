@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
 from people import PEOPLE, moves, recorded
+from teleop_core.kernels import IS_COMPILED
 from teleop_core.mapping.motion_scaling import MotionScalingParameters
 from teleop_core.planning.aim import Aim
 from teleop_core.planning.asked import STRETCHES, AskedPath, asked_path
@@ -159,6 +160,7 @@ def test_nothing_moves_over_a_gap_of_the_recording():
     assert np.abs(poses[1300, :3] - poses[699, :3]).max() > 0.05
 
 
+@pytest.mark.skipif(not IS_COMPILED, reason="looks at 100 000 poses")
 def test_roomy_postures_begin_with_the_start_and_have_room():
     robot = tc.load_robot("rcrt1")
     postures = roomy_postures(robot, 8)

@@ -2,16 +2,20 @@
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import teleop_core as tc
 from teleop_core.errors import ParameterError, ShapeError
+from teleop_core.kernels import IS_COMPILED
 from teleop_core.robots import IkStatus
 from teleop_core.robots.dh import robot_from_table
 from teleop_core.robots.room import room, samples, start_posture
 
+TABLES = Path(__file__).resolve().parents[2] / "config/robots"
+walks_far = pytest.mark.skipif(not IS_COMPILED, reason="looks at 100 000 poses")
 FROZEN = ("rcrt1", "puma560", "mma", "scara_stewart")
 ROOMY = ("scara", "planar_3r", "five_axis", "stewart", "rps3", "three_finger_hand")
 ONE_AXIS = ("four_bar", "parallelogram")
@@ -37,6 +41,7 @@ def with_starts(*starts: float) -> tc.Robot:
     return robot_from_table({**ARM, "rows": rows})
 
 
+@walks_far
 @pytest.mark.parametrize("name", FROZEN)
 def test_the_start_in_the_file_is_what_the_rule_says(name: str) -> None:
     robot = tc.load_robot(name)
@@ -85,6 +90,7 @@ def test_a_joint_on_its_stop_leaves_no_room() -> None:
     assert room(robot, q).metres == 0.0
 
 
+@walks_far
 def test_a_stretched_arm_starts_bent() -> None:
     robot = robot_from_table(ARM)
     assert room(robot, robot.home).metres == 0.0
@@ -93,6 +99,7 @@ def test_a_stretched_arm_starts_bent() -> None:
     assert room(robot, robot.start).radians == math.inf  # it controls x and y alone
 
 
+@walks_far
 def test_another_length_makes_another_start() -> None:
     robot = tc.load_robot("rcrt1", L6=0.3)
     assert not np.array_equal(robot.start, tc.load_robot("rcrt1").start)
@@ -102,6 +109,12 @@ def test_another_length_makes_another_start() -> None:
 def test_a_table_states_its_own_start() -> None:
     np.testing.assert_allclose(with_starts(10.0, 60.0).start, np.radians([10.0, 60.0]))
     np.testing.assert_allclose(with_starts(10.0).start, np.radians([10.0, 0.0]))
+
+
+@pytest.mark.parametrize("name", ["rcrt1", "puma560"])
+def test_the_table_of_an_arm_starts_where_the_built_in_one_does(name: str) -> None:
+    table = tc.load_robot(str(TABLES / f"{name}.yaml"))
+    np.testing.assert_allclose(table.start, tc.load_robot(name).start, rtol=0, atol=2e-4)
 
 
 def test_a_start_outside_the_limits_is_refused() -> None:
@@ -115,6 +128,7 @@ def test_a_start_outside_the_limits_is_refused() -> None:
         dataclasses.replace(robot, start=np.zeros(3))
 
 
+@walks_far
 def test_a_start_is_nobody_elses_to_change() -> None:
     mine = np.radians([10.0, 60.0])
     robot = dataclasses.replace(robot_from_table(ARM), start=mine)
