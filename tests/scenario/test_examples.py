@@ -128,6 +128,16 @@ def test_recording_becomes_a_data_frame_and_a_page(tmp_path):
     assert numbers(r"height.html: (\d+) MB", text)[0] >= 4
 
 
+def test_imported_hand_is_followed_by_the_slave(tmp_path):
+    text = run("import_hand", tmp_path)
+    assert "990 of 1000 rows, 10 with missing numbers left out" in text
+    assert "positions in mm" in text
+    assert "warning" not in text
+    hand, slave = numbers(r"cp: ([\d.]+) mm wide", text)
+    assert 29.0 < hand < 31.0
+    assert abs(slave - hand) < 3.0
+
+
 @pytest.mark.ros
 def test_plain_ros_node_leads_the_slave_in_place_of_the_simulated_master(tmp_path):
     from teleop_core.nodes.children import environment, free_domain
