@@ -199,8 +199,11 @@ class MotionMetric(Metric):
         )
         layout = {
             "xaxis": {"title": {"text": "frequency [Hz]"}, "type": "log"},
-            "yaxis": {"title": {"text": "power of velocity [mm²/s²/Hz]"}, "type": "log"},
-        }
+            "yaxis": {
+                "title": {"text": "power of velocity [mm²/s²/Hz]"}, "type": "log",
+                "exponentformat": "power",
+            },
+        }  # fmt: skip
         return Figure("Spectrum of motion", sentence, traces, layout, 340)
 
 
