@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pandas
 import pinocchio
 import pytest
 from scipy.spatial.transform import Rotation
@@ -205,6 +206,18 @@ def test_a_scenario_is_run_first():
     reach = tc.reach("coarse_box", texts=["teleop.duration=8.0"])
     assert abs(reach.path.time[-1] - 8.0) < 0.01 + 5.0  # with the way to the start
     assert reach.given.share > 0.99
+
+
+def test_a_table_of_others_is_taken_as_it_is(tmp_path):
+    stamps, poses = moves(PEOPLE["da_vinci_36"], 10.0)
+    table = pandas.DataFrame(poses, columns=["x", "y", "z", "qw", "qx", "qy", "qz"])
+    table.insert(0, "time", (stamps - stamps[0]) * 1e-9)
+    file = tmp_path / "hand.csv"
+    table.to_csv(file, index=False)
+    with pytest.warns(UserWarning, match=r"hand\.csv: x, y, z"):
+        from_file = tc.reach(file, robot="rcrt1", share=1e-3).given
+    direct = tc.reach(recorded(stamps, poses), robot="rcrt1", share=1e-3).given
+    assert abs(from_file.share - direct.share) <= AGREE
 
 
 def test_unknown_sources_are_told_with_the_alternatives():

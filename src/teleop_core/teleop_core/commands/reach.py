@@ -25,7 +25,7 @@ def add(commands: Any) -> None:
     parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
     parser.add_argument(
         "sources", nargs="+", metavar="BAG|SCENARIO",
-        help="recording with master/measured_cp, or one of `teleop scenarios`",
+        help="recording, ours or of others, or one of `teleop scenarios`",
     )  # fmt: skip
     parser.add_argument("--robot", help="slave, in place of the recording's; see `teleop robot`")
     geometry_argument(parser)

@@ -6,13 +6,15 @@ from pathlib import Path
 
 from teleop_core.api import run
 from teleop_core.bags.arms import of_arm
+from teleop_core.bags.reader import Bag
 from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.exchange import as_master_bag
 from teleop_core.planning.aim import Aim
 from teleop_core.planning.asked import AskedPath, asked_path
 from teleop_core.planning.placement import Placement
 from teleop_core.planning.search import Search
 from teleop_core.planning.walk import Walked, Walker
-from teleop_core.recording import Recording, open_recording
+from teleop_core.recording import Recording
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import (
@@ -141,7 +143,8 @@ def reach(
 
     Args:
         source: A recording, its path, or the name of a scenario, which is run first. Its own
-            configuration is the start; of a foreign recording the default one.
+            configuration is the start; of a recording of others, in any file that replay takes,
+            the default one.
         robot: The slave, in place of the configuration's; its start then is the robot's own.
         geometry: Its lengths [m, rad] as ``symbol=value``.
         share: Share of the time that is to be followed, above 0 and at most 1.
@@ -163,8 +166,8 @@ def reach(
     if not 0.0 < share <= 1.0:
         raise ParameterError("share", share, "above 0 and at most 1")
     changes = _changes(robot, geometry, files, settings or {}, texts)
-    made, recording = _configured(source, changes)
-    path = asked_path(of_arm(recording.bag, arm))
+    made, bag = _configured(source, changes)
+    path = asked_path(of_arm(bag, arm))
     return _reach(path, made, share, arm, progress, keeps_axes=keeps_axes)
 
 
@@ -184,18 +187,16 @@ def _changes(
     return layers + [parse_setting(text) for text in texts]
 
 
-def _configured(
-    source: Recording | Path | str, changes: list[Layer]
-) -> tuple[Configuration, Recording]:
+def _configured(source: Recording | Path | str, changes: list[Layer]) -> tuple[Configuration, Bag]:
     """Configuration with the changes, and the recording; of a scenario one that is made now."""
     if isinstance(source, str) and not Path(source).exists():
         if source not in list_scenarios():
             raise UnknownNameError("recording or scenario", source, list_scenarios())
         made = _of_scenario(source, changes)
-        return made, run(made)
-    recording = source if isinstance(source, Recording) else open_recording(source)
-    layer, scenario = recorded_configuration(recording.bag)
-    return Configuration.from_layers([layer, *changes], scenario), recording
+        return made, run(made).bag
+    bag = as_master_bag(source.bag if isinstance(source, Recording) else source)
+    layer, scenario = recorded_configuration(bag)
+    return Configuration.from_layers([layer, *changes], scenario), bag
 
 
 def _of_scenario(name: str, changes: list[Layer]) -> Configuration:
