@@ -94,7 +94,8 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
     first_ns, last_ns = int(poses.stamp_ns[0]), int(poses.stamp_ns[-1])
     lead_ns = 0 if "configuration" in bag.metadata else session.lead * TICK_NS
     later_ns = max(0, TICK_NS + lead_ns - first_ns)  # stamps are positive
-    stamps = stamps_of(first_ns + later_ns - lead_ns, last_ns + later_ns)
+    # The last tick is the first one that is not before the last sample.
+    stamps = stamps_of(first_ns + later_ns - lead_ns, last_ns + later_ns + TICK_NS - 1)
 
     def blocks() -> Iterator[Any]:
         for done in range(0, len(stamps), BLOCK):

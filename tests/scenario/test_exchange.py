@@ -1,0 +1,158 @@
+"""A recording of others on its way through the commands: import, replay, follow, export."""
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+from teleop_core.bags.reader import Bag
+from teleop_core.master.haptic_master import REST_POSITION
+from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
+
+pytestmark = pytest.mark.slow
+
+COUNT = 300
+T = 5.0 + np.arange(COUNT) / 30.0
+PLACES = 0.02 * np.column_stack((np.sin(T), np.cos(1.3 * T), np.sin(0.7 * T)))
+TURNS = Rotation.from_rotvec(0.2 * np.column_stack((np.sin(T), np.cos(T), 0.0 * T)))
+
+
+@pytest.fixture(scope="module")
+def hand(tmp_path_factory):
+    """Ten seconds at 30 Hz with a pedal, as another program would write them."""
+    names = ["time", "x", "y", "z", "qx", "qy", "qz", "qw"]
+    table = pd.DataFrame(np.column_stack((T, PLACES, TURNS.as_quat())), columns=names)
+    table["clutch"] = ((T > 8.0) & (T < 9.0)).astype(int)
+    path = tmp_path_factory.mktemp("files") / "hand.csv"
+    table.to_csv(path, index=False)
+    return path
+
+
+@pytest.fixture(scope="module")
+def imported(teleop, hand, tmp_path_factory):
+    """The recording, and what the command said."""
+    out = tmp_path_factory.mktemp("bags") / "hand"
+    return out, teleop("import", hand, "--out", out).stdout
+
+
+def next_command(text):
+    return re.search(r"next: teleop (.*)", text)[1].split()
+
+
+def test_import_says_what_it_took_and_what_to_do_next(imported):
+    out, text = imported
+    assert "300 of 300 rows" in text
+    assert "button clutch" in text
+    assert f"{out}: 10.0 s imported" in text
+    assert next_command(text)[0] == "replay"
+
+
+def test_a_motion_goes_in_through_the_graph_and_out_unchanged(teleop, imported, tmp_path):
+    _, text = imported
+    teleop(*next_command(text))
+    answer = next_command(text)[-1]
+    teleop("export", answer, "--out", tmp_path / "a.csv", "--topics", "master/measured_cp",
+           "slave/measured_cp", "teleop/state")  # fmt: skip
+    table = pd.read_csv(tmp_path / "a.csv")
+    columns = [f"master/measured_cp.{axis}" for axis in "xyz"]
+    played = Bag(answer).read(MASTER_MEASURED_CP)
+    at = np.searchsorted(played.stamp_ns, np.rint(T * 1e9).astype(np.int64))
+    assert np.array_equal(played.stamp_ns[at], np.rint(T * 1e9).astype(np.int64))
+    assert np.allclose(table[columns].dropna().to_numpy()[at], PLACES, rtol=0, atol=1e-15)
+    following = table["teleop/state.is_following"] == 1.0
+    clutched = table["teleop/state.is_clutched"] == 1.0
+    assert clutched.sum() == pytest.approx(1000, abs=70)
+    tip = table.loc[following & ~clutched, [f"slave/measured_cp.{axis}" for axis in "xyz"]]
+    assert np.ptp(tip.to_numpy(), axis=0).min() > 0.01
+
+
+def test_replaying_the_file_itself_gives_the_same_motion(teleop, hand, imported, tmp_path):
+    out, text = imported
+    if not (out.parent / "hand_replayed").exists():
+        teleop(*next_command(text))
+    said = teleop("replay", hand, "--out", tmp_path / "direct").stderr
+    assert "note: hand.csv: x, y, z" in said
+    a, b = (
+        Bag(p).read(SLAVE_MEASURED_CP).values for p in (next_command(text)[-1], tmp_path / "direct")
+    )
+    assert np.array_equal(a, b)
+
+
+def test_import_is_repeated_by_what_its_metadata_say(teleop, hand, imported, tmp_path):
+    out, _ = imported
+    about = Bag(out).metadata
+    assert about["imported_from"] == "hand.csv"
+    words = about["imported_by"].split()
+    done = subprocess.run(
+        [sys.executable, "-m", "teleop_core.cli", *words[1:-1], str(tmp_path / "again")],
+        cwd=hand.parent, capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    again = Bag(tmp_path / "again")
+    assert again.metadata["imported_sha256"] == about["imported_sha256"]
+    one, two = (bag.read(MASTER_MEASURED_CP) for bag in (Bag(out), again))
+    assert np.array_equal(one.values, two.values)
+    assert np.array_equal(one.stamp_ns, two.stamp_ns)
+
+
+def test_axes_with_a_minus_are_values_not_options(teleop, hand, tmp_path):
+    for number, axes in enumerate((("-y", "+x", "+z"), ("+y", "-x", "+z"), ("z", "x", "y"))):
+        out = tmp_path / str(number)
+        teleop("import", hand, "--out", out, "--axes", *axes, "--scale", "0.5")
+        turn = np.zeros((3, 3))
+        for row, axis in enumerate(axes):
+            turn[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
+        got = Bag(out).read(MASTER_MEASURED_CP).values[:, :3]
+        assert np.allclose(got, 0.5 * PLACES @ turn.T, rtol=0, atol=1e-15)
+
+
+def test_a_session_follows_the_recording_for_as_long_as_it_is(teleop, imported, tmp_path):
+    out, _ = imported
+    center = np.array([0.0, 0.01, 0.03])
+    settings = (f"operator.center={center.tolist()}", "operator.approach_time=1.0")
+    followed = tmp_path / "followed"
+    teleop("sim", "--out", followed, "--set", "operator=bag", f"operator.bag={out}", *settings)
+    series = Bag(followed).read(MASTER_MEASURED_CP)
+    end = REST_POSITION + center + PLACES[-1] - PLACES[0]
+    assert np.linalg.norm(series.values[-1, :3] - end) < 5e-3  # the hand lags behind
+    start = REST_POSITION + center
+    before = np.searchsorted(series.stamp_ns, series.stamp_ns[-1] - 9_966_000_000)
+    assert np.linalg.norm(series.values[before, :3] - start) < 5e-3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("import", "{hand}", "--out", "{out}", "--position", "a", "y", "z"), "time, x, y, z, qx"),
+        (("import", "nothing.csv", "--out", "{out}"), "does not exist"),
+        (("import", "{hand}", "--out", "{out}", "--unit", "km"), "invalid choice"),
+        (("import", "{hand}", "--out", "{bag}"), "exists already"),
+        (("export", "{bag}", "--out", "{out}.csv", "--topics", "nowhere"), "master/measured_cp"),
+        (("export", "{bag}", "--out", "{out}"), "lacks slave/measured_js"),
+        (("export", "nothing", "--out", "{out}.csv"), "does not exist"),
+        (("replay", "{bag}/metadata.yaml", "--out", "{out}"), ""),
+    ],
+)
+def test_mistakes_are_one_line_and_leave_nothing(teleop, imported, hand, tmp_path, arguments, text):
+    places = {"hand": hand, "out": tmp_path / "out", "bag": imported[0]}
+    done = teleop(*(word.format(**places) for word in arguments), code=2)
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("note:")]
+    assert len(lines) == 1, done.stderr
+    assert text in lines[0]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_data_set_of_several_recordings_is_made(teleop, imported, tmp_path):
+    _, text = imported
+    answer = next_command(text)[-1]
+    if not Bag(imported[0]).path.with_name("hand_replayed").exists():
+        teleop(*next_command(text))
+    said = teleop("export", answer, answer, "--out", tmp_path / "set", "--task", "draw")
+    assert "2 episodes" in said.stdout
+    info = json.loads((tmp_path / "set" / "meta" / "info.json").read_text())
+    assert info["robot_type"] == "rcrt1"
