@@ -46,6 +46,8 @@ LIMIT_FIELDS = [
     # depth is positive.
     ("anchor", "f8", (3,)), ("out", "f8", (3,)), ("depth", "f8"),
     ("turn_anchor", "f8", (4,)), ("turn_out", "f8", (3,)), ("turn_depth", "f8"),
+    # Depths when something was cut off last: who gets farther out has left the limit.
+    ("met", "f8"), ("turn_met", "f8"),
 ]  # fmt: skip
 _LIMIT, _JOINT, _CUT = (SLAVE_REACH.columns.index(name) for name in ("limit", "joint", "cut_x"))
 _NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
@@ -53,6 +55,8 @@ _NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPA
 _TOLD_NS = 100_000_000
 # A turn beyond a limit counts up to this [rad].
 _MOST_TURN = 0.05
+# So much farther out than where something was cut off last, the limit is left [m, rad].
+_PAST, _TURN_PAST = 2e-4, 5e-3
 # What is cut off by less is rounding [m or rad].
 _ROUNDING = 1e-9
 
@@ -128,6 +132,7 @@ def _move_back(s: Any, entry: Any, gain: float, reach: Array) -> None:
         return
     if s.depth <= 0.0:
         s.depth = length / gain
+    s.met = s.depth
     for i in range(3):
         s.command[i] += cut[i]
         s.moved[i] += cut[i]
@@ -147,6 +152,7 @@ def _turn_back(s: Any, entry: Any, reach: Array) -> None:
         return
     if s.turn_depth <= 0.0:
         s.turn_depth = min(length, _MOST_TURN)
+    s.turn_met = s.turn_depth
     before = np.empty(4)
     for i in range(4):
         before[i], s.turned[i] = s.command[3 + i], wanted[i]
@@ -187,6 +193,8 @@ def measure_depth(s: Any, most: float, now_ns: int) -> None:
         s.depth = 0.0
         for i in range(3):
             s.depth += (s.hand[i] - s.anchor[i]) * s.out[i]
+        if s.depth > s.met + _PAST:
+            s.depth = 0.0
         if s.depth > most:
             s.depth = most
             for i in range(3):
@@ -195,6 +203,8 @@ def measure_depth(s: Any, most: float, now_ns: int) -> None:
         turn = np.empty(3)
         turn_within(s.turn_anchor, s.tool, turn)
         s.turn_depth = turn[0] * s.turn_out[0] + turn[1] * s.turn_out[1] + turn[2] * s.turn_out[2]
+        if s.turn_depth > s.turn_met + _TURN_PAST:
+            s.turn_depth = 0.0
         if s.turn_depth > _MOST_TURN:
             s.turn_depth = _MOST_TURN
             _anchor_turn(s)

@@ -107,7 +107,9 @@ def _explain(p: Any, solver: Any, reach: Array) -> None:
         solver.fk(q, solver.geometry, solver.reached)
         status = solver.ik(solver.reached, q, limits, solver.geometry, free, solver.residual)
         is_near = reach[_RESIDUAL] <= p.tolerance[0] and reach[_RESIDUAL + 1] <= p.tolerance[1]
-        if not is_near:
+        if is_near:
+            reach[_STATUS] = status
+        else:
             reach[_LIMIT] = _SINGULAR if status == _NEAR_SINGULAR else _SLOW
         return
     reach[_JOINT] = _joint_at_limit(free, limits)

@@ -5,22 +5,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.evaluation.accumulators import Moments, Spread
+from teleop_core.evaluation.accumulators import Integers, Moments, Spread
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.rows import MISSING, Row, row
 from teleop_core.evaluation.stamps import StampTallies
-from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array
-from teleop_core.signals import DT, STATE
+from teleop_core.signals import DT
 from teleop_core.topics import SLAVE_REACH, SLAVE_SERVO_CP, Limit
 
 GROUP = "slave follows the hand"
 COMPARABLE = 0.99
 """Least share of the time followed with which published figures are compared."""
 _RESIDUAL = SLAVE_REACH.columns.index("position_residual")
-_CAUSES = (Limit.JOINT, Limit.WORKSPACE, Limit.SINGULARITY, Limit.SPEED)
+_LIMIT = SLAVE_REACH.columns.index("limit")
+# Beside the limits: while the slave is aligned, or nothing was sent for longer than this [s].
+_ALIGNING, _SILENT_S = len(Limit), 0.5
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class ReachScore:
         workspace_share: Share beyond all joint vectors.
         singularity_share: Share in which it lagged near a singularity.
         speed_share: Share in which it lagged because joints were too slow.
-        aligning_share: Share in which master or slave were silent and it was aligned anew.
+        aligning_share: Share in which master or slave were silent, or it was aligned anew.
         residual_mm: Distance that inverse kinematics left to the command, [mm].
         residual_deg: Angle that it left, [deg].
         master_hz: Commands per second: the median of their stamps' steps.
@@ -58,13 +59,14 @@ class ReachScore:
 
 
 class ReachMetric(Metric):
-    """Shares of time by teleop/state, residuals by slave/reach."""
+    """Shares of time and residuals by slave/reach."""
 
     name = "reach"
     keys = (
         Key("reach.followed_share", "1",
-            "share of the time since the slave first followed in which no limit held it back and "
-            "it was not aligned anew; clutched time counts as followed"),
+            "share of the time since the slave first followed in which it could do what it was "
+            "asked: commands whose limit in slave/reach is 0, each until the next one; clutched "
+            "time counts as followed"),
         Key("reach.longest_s", "s", "longest stretch in which it did not follow"),
         Key("reach.joint_share|workspace_share|singularity_share|speed_share|aligning_share", "1",
             "share of that time against the end of a joint, beyond the workspace, too slow near a "
@@ -80,36 +82,63 @@ class ReachMetric(Metric):
     topics = (SLAVE_REACH,)
 
     def __init__(self, context: Context) -> None:
-        bag, span = context.bag, context.span
-        self._history = context.history
-        self._begin_ns = bag.start_ns if span is None else span.first_ns
-        self._end_ns = bag.end_ns if span is None else span.last_ns
         self._distance, self._angle = Moments(), Moments()
-        self._stamps, self._interpolation = (
-            context.shared(StampTallies),
-            context.origin.interpolation,
-        )
+        self._stamps = context.shared(StampTallies)
+        self._interpolation = context.origin.interpolation
+        self._time = np.zeros(len(Limit) + 1)  # in each limit, and while aligning [s]
+        self._longest_s = self._open_s = 0.0
+        self._last: tuple[int, int] | None = None  # stamp [ns] of the last command, and its limit
 
     def add(self, window: Window) -> None:
         """Take one window."""
-        follows = window.states(SLAVE_REACH).column("is_following") > 0.0
-        left = window.samples(SLAVE_REACH).values[follows, _RESIDUAL : _RESIDUAL + 2]
+        found, states = window.samples(SLAVE_REACH), window.states(SLAVE_REACH)
+        follows = states.column("is_following") > 0.0
+        left = found.values[follows, _RESIDUAL : _RESIDUAL + 2]
         self._distance.add(left[:, 0] * 1e3)
         self._angle.add(np.degrees(left[:, 1]))
+        if self._last is None:  # what was before the slave first followed does not count
+            first = int(np.argmax(follows)) if follows.any() else len(follows)
+            found, follows = found.only(np.arange(len(follows)) >= first), follows[first:]
+        self._add_times(found.stamp_ns, np.where(follows, found.values[:, _LIMIT], _ALIGNING))
+
+    def _add_times(self, stamp_ns: Integers, limits: Array) -> None:
+        """Take commands: each counts until the next one, silence as alignment."""
+        kinds = limits.astype(np.int64)
+        if self._last is not None:
+            stamp_ns = np.concatenate(([self._last[0]], stamp_ns))
+            kinds = np.concatenate(([self._last[1]], kinds))
+        if not len(stamp_ns):
+            return
+        self._last = int(stamp_ns[-1]), int(kinds[-1])
+        spans = np.maximum(np.diff(stamp_ns), 0) * 1e-9
+        kinds = np.where(spans > _SILENT_S, _ALIGNING, kinds[:-1])
+        self._time += np.bincount(kinds, weights=spans, minlength=len(self._time))
+        self._add_stretches(spans, kinds != Limit.NONE)
+
+    def _add_stretches(self, spans: Array, is_off: NDArray[np.bool_]) -> None:
+        """Take spans of time [s] that are off or not; a stretch may have begun before them."""
+        if not len(spans):
+            return
+        stretch = np.cumsum(np.diff(is_off, prepend=True) != 0)
+        sums = np.bincount(stretch, weights=np.where(is_off, spans, 0.0))
+        sums[0] += self._open_s  # before the first change the stretch from before goes on
+        self._longest_s = max(self._longest_s, float(sums.max()))
+        self._open_s = float(sums[-1]) if is_off[-1] else 0.0
 
     def values(self) -> ReachScore:
         """Score of everything so far."""
-        shares, longest_s = _shares(self._history, self._begin_ns, self._end_ns)
+        total = float(self._time.sum())
+        shares = self._time / total if total > 0.0 else [None] * len(self._time)
         tally = self._stamps.of.get(SLAVE_SERVO_CP.name)
         period_us = tally.period_us if tally is not None else None
         return ReachScore(
-            followed_share=shares.get(Limit.NONE),
-            longest_s=longest_s,
-            joint_share=shares.get(Limit.JOINT),
-            workspace_share=shares.get(Limit.WORKSPACE),
-            singularity_share=shares.get(Limit.SINGULARITY),
-            speed_share=shares.get(Limit.SPEED),
-            aligning_share=shares.get("aligning"),
+            followed_share=_number(shares[Limit.NONE]),
+            longest_s=self._longest_s if total > 0.0 else None,
+            joint_share=_number(shares[Limit.JOINT]),
+            workspace_share=_number(shares[Limit.WORKSPACE]),
+            singularity_share=_number(shares[Limit.SINGULARITY]),
+            speed_share=_number(shares[Limit.SPEED]),
+            aligning_share=_number(shares[_ALIGNING]),
             residual_mm=self._distance.spread(),
             residual_deg=self._angle.spread(),
             master_hz=None if not period_us else 1e6 / period_us,
@@ -154,31 +183,5 @@ def _percent(share: float | None) -> str:
     return MISSING if share is None else f"{100.0 * share:.1f}"
 
 
-def _shares(
-    history: StateHistory, begin_ns: int, end_ns: int
-) -> tuple[dict[Limit | str, float], float | None]:
-    """Share of the time in each cause, none among them, and the longest stretch [s] off."""
-    follows = history.rows[:, STATE["is_following"]] > 0.0
-    limits = history.rows[:, STATE["limit"]]
-    if not follows.any() or np.isnan(limits).any():
-        return {}, None
-    first = int(np.argmax(follows))
-    stamps = np.clip(np.append(history.stamp_ns[first:], end_ns), begin_ns, end_ns)
-    spans = np.diff(stamps) * 1e-9
-    total = float(spans.sum())
-    if total <= 0.0:
-        return {}, None
-    follows, limits = follows[first:], limits[first:]
-    found: dict[Limit | str, float] = {
-        cause: float(spans[follows & (limits == cause)].sum()) / total
-        for cause in (Limit.NONE, *_CAUSES)
-    }
-    found["aligning"] = float(spans[~follows].sum()) / total
-    return found, _longest(spans, ~follows | (limits > 0.0))
-
-
-def _longest(spans: Array, is_off: NDArray[np.bool_]) -> float:
-    """Longest sum of neighbouring spans that are off; 0 if none is."""
-    stretch = np.cumsum(np.diff(is_off, prepend=~is_off[:1]) != 0)
-    sums = np.bincount(stretch, weights=np.where(is_off, spans, 0.0))
-    return float(sums.max())
+def _number(share: float | None) -> float | None:
+    return None if share is None else float(share)
