@@ -233,7 +233,7 @@ def test_samples_that_are_no_motion_are_refused(case):
 
 def master_of(name, **values):
     wanted = build(OperatorParameters, {"kind": name, **values})
-    return HapticMaster(HapticMasterParameters(operator=wanted))
+    return HapticMaster(HapticMasterParameters(operator=wanted, patience=0.0))
 
 
 def poses(master, ticks):
