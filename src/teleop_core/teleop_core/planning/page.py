@@ -35,6 +35,7 @@ body { font: 15px/1.45 system-ui, sans-serif; margin: 1rem auto; max-width: 1500
 pre { overflow-x: auto; background: #f4f4f2; padding: .8rem; font-size: 13px; }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 460px), 1fr)); }
 .pair > div { min-width: 0; overflow: hidden; }
+@media (max-width: 600px) { h1 { font-size: 1.3rem; } pre { font-size: 10px; padding: .4rem; } }
 """
 _HEAD = """\
 <!DOCTYPE html>
