@@ -258,6 +258,15 @@ def test_header_stamps_that_never_change_give_way_to_the_log(stamp, tmp_path):
     assert any("time of recording" in text for text in report.told)
 
 
+def test_single_messages_without_a_stamp_are_left_out(tmp_path):
+    stamps = STAMPS.copy()
+    stamps[[0, 1, 77]] = 0
+    report, stream = imported(write2(tmp_path / "bag", poses(stamps=stamps)), tmp_path)
+    kept = np.delete(np.arange(COUNT), [0, 1, 77])
+    assert_same(stream, STAMPS[kept], POSES[kept])
+    assert report.counts.missing == 3
+
+
 def test_log_times_are_taken_on_request(tmp_path):
     assert_same(imported(write2(tmp_path / "bag", poses()), tmp_path, stamps="log")[1], LOGS)
 

@@ -502,6 +502,16 @@ def test_names_of_many_recorders_are_understood(head, time, place, turn):
         assert [columns[i] for i in find(columns)] == expected.split()
 
 
+def test_other_positions_beside_the_one_taken_are_told(tmp_path):
+    head = ["t", *(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")]
+    frame(head, np.column_stack((TIMES, PLACES, 2.0 * PLACES))).to_csv(
+        tmp_path / "a.csv", index=False
+    )
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert np.allclose(stream[["x", "y", "z"]], PLACES, rtol=0, atol=1e-15)
+    assert any("right.x" in text for text in report.told)
+
+
 @pytest.mark.parametrize(
     ("name", "unit"),
     [

@@ -132,25 +132,35 @@ def _stamps(
     if parts.logs and options.stamps == "log":
         told.append("stamps: time of recording")
         return np.concatenate(parts.logs), usable, True
-    known = [part[np.isfinite(part)] for part in parts.times]
-    first = next((float(part[0]) for part in known if len(part)), math.nan)
+    is_bag = bool(parts.logs)  # where a stamp of zero says that there is none
+    known = [part[np.isfinite(part) & ((part != 0) | (not is_bag))] for part in parts.times]
+    first = next((float(part[0]) for part in known if len(part)), 0.0 if is_bag else math.nan)
     if math.isnan(first):
         raise RecordingError(source.path, "the column of the time holds no numbers")
     if all((part == first).all() for part in known) and len(usable) > 1:
-        if not parts.logs:
-            reason = f"the time is {first:g} in every row; choose another --time, or give --rate HZ"
-            raise RecordingError(source.path, reason)
-        told.append(f"header stamps are all {first / SECOND_NS:g} s: "
-                    "the time of recording is taken")  # fmt: skip
-        return np.concatenate(parts.logs), usable, True
+        return _without_stamps(source, parts, first, told), usable, True
     unit = source.time_unit
     if unit == "auto":
         unit, reason = guessed_unit(_few(known))
         told.append(f"times in {unit}" + (f" ({reason})" if reason else ""))
     del known
     stamps = joined_ns(parts.times, unit, _NO_TIME)
-    usable &= stamps != _NO_TIME
+    usable &= (stamps != _NO_TIME) & ((stamps != 0) | (not is_bag))
     return stamps, usable, False
+
+
+def _without_stamps(source: Source, parts: _Parts, value: float, told: list[str]) -> Stamps:
+    """Times of recording in place of times that are all the same.
+
+    Raises:
+        RecordingError: There are none.
+    """
+    if not parts.logs:
+        reason = f"the time is {value:g} in every row; choose another --time, or give --rate HZ"
+        raise RecordingError(source.path, reason)
+    stamp = f"{value / SECOND_NS:g} s"
+    told.append(f"header stamps are all {stamp}: the time of recording is taken")
+    return np.concatenate(parts.logs)
 
 
 def _few(parts: list[NDArray[np.float64] | Stamps]) -> NDArray[np.float64]:

@@ -63,12 +63,16 @@ def find_time(names: Sequence[str]) -> tuple[int, ...]:
 
 def find_position(names: Sequence[str]) -> tuple[int, ...]:
     """Columns of x, y and z of a position; empty if no names say it."""
+    return next(iter(find_positions(names)), ())
+
+
+def find_positions(names: Sequence[str]) -> list[tuple[int, ...]]:
+    """Columns of x, y and z of all positions that the names say equally well, the first first."""
     found = _series(names, "xyz", without="w") or _series(names, "xyz")
     good = [(stem, columns) for stem, columns in found.items() if not _NOT_PLACES.search(stem)]
     named = [columns for stem, columns in found.items() if _PLACES.search(stem)]
     bare = [columns for stem, columns in good if not stem.strip("_")]
-    rest = [columns for _, columns in good]
-    return next(iter((*bare, *named, *rest)), ())
+    return bare or named or [columns for _, columns in good]
 
 
 def find_quaternion(names: Sequence[str]) -> tuple[int, ...]:

@@ -69,13 +69,16 @@ class TableSource:
     def _position(self) -> tuple[int, ...]:
         if given := self._given("position"):
             return given
-        found = names.find_position(self._table.names) if self._table.is_named else ()
+        several = names.find_positions(self._table.names) if self._table.is_named else []
+        found = several[0] if several else ()
         if not found and not self._table.is_named:
             found = self._position_by_place()
         if not found:
             reason = "has no columns that look like x, y, z: give --position X Y Z; "
             raise RecordingError(self.path, f"{reason}there are {self._listed()}")
-        return self._told("x, y, z", found)
+        others = ", ".join(repr(self._table.names[columns[0]]) for columns in several[1:])
+        more = f" (--position could also take {others}, …)" if others else ""
+        return self._told("x, y, z", found, more)
 
     def _position_by_place(self) -> tuple[int, ...]:
         """Columns of a table without names that is like others of its width.
