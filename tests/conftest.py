@@ -41,7 +41,10 @@ def teleop() -> Run:
 
 @pytest.fixture(scope="session")
 def recording(teleop: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Twelve seconds of a session with clutch, both modes and the box, made once."""
+    """Twelve seconds of a hand with clutch, both modes and the box, made once.
+
+    Before them the slave moves to where it starts, and the hand rests.
+    """
     out = tmp_path_factory.mktemp("bags") / "session"
     settings = ("path.approach_time=1.0", "buttons.clutch=[4.0, 5.0]", "buttons.mode=[6.0, 9.0]",
                 "buttons.fixture=[2.0, 11.0]")  # fmt: skip
