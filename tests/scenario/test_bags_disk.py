@@ -33,7 +33,7 @@ if ending.startswith("limit"):
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
 rng = np.random.default_rng(1)
 names = tuple("abcdef")
-values = {t: rng.normal(size=(1000, t.kind.width(6))) for t in topics.STREAMS}
+values = {t: rng.normal(size=(1000, t.width(6))) for t in topics.STREAMS}
 told = ""
 try:
     with BagWriter(path, topics.ALL, names, compression=compression) as writer:
