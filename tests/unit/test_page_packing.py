@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from teleop_core.evaluation.packing import FINEST_BITS, pack
+from teleop_core.evaluation.packing import EXACT, FINEST_BITS, bits_within, pack
 
 # Steps come out as decimal fractions; sums of half a million of them as float64.
 ROUNDING = 1e-6
@@ -19,6 +19,8 @@ def inflated(text):
 def unpacked(packed):
     """The numbers again, by sums over Python's integers."""
     data = inflated(packed.data)
+    if packed.order == 0:
+        return np.frombuffer(data, "<f8")
     numbers, level, change = [], 0, 0
     for i in range(packed.count):
         code = sum(data[plane * packed.count + i] << 8 * plane for plane in range(packed.planes))
@@ -42,13 +44,13 @@ def walk(count=20_000, seed=1):
     [
         walk(),
         np.random.default_rng(2).laplace(size=10_000),
-        np.linspace(-3.0, 5.0, 777),
-        np.repeat([0.0, 0.055, 0.11, 0.055], 500),
-        np.concatenate((np.zeros(1000), [1e6], np.zeros(1000))),
-        np.array([7.25]),
-        np.full(50, -3.5),
-        np.array([1e-9, 2e-9, 5e-9]),
-        np.arange(1000),
+        np.linspace(-3.0, 5.0, 7777),
+        np.repeat([0.0, 0.055, 0.11, 0.055], 2000),
+        np.concatenate((np.zeros(5000), [1e6], np.zeros(5000))),
+        np.full(5000, -3.5),
+        1e-9 * np.arange(9000) ** 2,
+        np.arange(10_000),
+        walk(EXACT + 1),
     ],
 )
 @pytest.mark.parametrize("bits", [2.0, 5.0, 8.0])
@@ -60,7 +62,7 @@ def test_unpacked_numbers_are_within_half_a_step(values, bits):
 
 
 def test_what_is_no_number_is_a_hole_and_nothing_else_is():
-    values = walk(3000)
+    values = walk(9000)
     values[:7] = values[100:250] = values[-1] = np.nan
     values[500], values[501] = np.inf, -np.inf
     found = unpacked(pack(values, 6.0))
@@ -69,9 +71,15 @@ def test_what_is_no_number_is_a_hole_and_nothing_else_is():
     assert np.abs(found - values)[is_known].max() < 0.01
 
 
-@pytest.mark.parametrize("values", [np.full(9, np.nan), np.empty(0)])
+@pytest.mark.parametrize("values", [np.full(9000, np.nan), np.full(9, np.nan), np.empty(0)])
 def test_without_numbers_there_are_only_holes(values):
     assert np.array_equal(unpacked(pack(values, 4.0)), values, equal_nan=True)
+
+
+def test_few_numbers_are_not_rounded():
+    values = 10.0 ** np.random.default_rng(5).uniform(-9, 9, EXACT)
+    values[7] = np.nan
+    assert np.array_equal(unpacked(pack(values, 2.0)), values, equal_nan=True)
 
 
 @pytest.mark.parametrize("bits", [3.0, 4.0, 6.0])
@@ -105,7 +113,7 @@ def test_regular_times_take_next_to_nothing(period):
 def test_steps_are_short_decimal_fractions():
     rng = np.random.default_rng(6)
     for scale in 10.0 ** rng.uniform(-7, 7, 100):
-        step = pack(scale * walk(500), 5.0).step
+        step = pack(scale * walk(5000), 5.0).step
         assert f"{step:.0e}"[0] in "125"
         assert step == float(f"{step:.0e}")
 
@@ -113,3 +121,16 @@ def test_steps_are_short_decimal_fractions():
 def test_large_numbers_are_unpacked_in_double_precision():
     assert pack(1e9 + walk(), 6.0).wide
     assert not pack(walk(), 4.0).wide
+
+
+def test_all_arrays_together_fill_the_room_but_no_more():
+    rng = np.random.default_rng(8)
+    steps = np.repeat(rng.integers(0, 9, 3000), 100) * 0.055
+    arrays = [walk(300_000, 1), walk(300_000, 2), rng.normal(size=300_000), steps]
+    for room in (400_000, 700_000):
+        bits = bits_within(arrays, room)
+        taken = sum(len(pack(array, bits).data) for array in arrays)
+        assert taken <= 1.03 * room  # tried on parts of them
+        assert taken >= 0.7 * room
+    assert bits_within(arrays, 10**9) == FINEST_BITS
+    assert bits_within([], 100) == FINEST_BITS

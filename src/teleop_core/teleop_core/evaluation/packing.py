@@ -14,6 +14,8 @@ from teleop_core.geometry import Array
 
 FINEST_BITS = 8.0
 """Bits per number that are never exceeded: the finest steps that anybody could want to see."""
+EXACT = 4000
+"""Arrays that are no longer than this are not rounded."""
 COARSEST_BITS = 2.0
 """Bits per number that are always spent."""
 _SAMPLED, _SAMPLES = 8, 2500  # stretches of an array, and numbers in each
@@ -32,7 +34,7 @@ class Packed:
         count: How many numbers.
         first: The first of them.
         step: Distance of neighbouring levels, in the unit of the numbers.
-        order: How often differences were taken, 1 or 2.
+        order: How often differences were taken, 1 or 2; 0 for the numbers themselves, in 8 bytes.
         planes: Bytes per difference; the lowest bytes of all come first.
         data: Differences with the sign in the lowest bit, deflated, as base64.
         holes: One bit per number, set where there is none, deflated, as base64; empty without any.
@@ -58,7 +60,7 @@ def bits_within(arrays: Sequence[Numbers], room: int) -> float:
         arrays: As for :func:`pack`.
         room: Bytes for all of them, as base64.
     """
-    samples = [(_stretches(array), len(array)) for array in arrays if len(array)]
+    samples = [(_stretches(array), len(array)) for array in arrays if len(array) > EXACT]
 
     def is_enough(bits: float) -> bool:
         taken = (len(pack(sample, bits).data) / len(sample) * count for sample, count in samples)
@@ -69,7 +71,7 @@ def bits_within(arrays: Sequence[Numbers], room: int) -> float:
 
 
 def pack(values: Numbers, bits: float) -> Packed:
-    """Numbers in at most about so many bits each, whatever they are.
+    """Numbers in at most about so many bits each, whatever they are; a few as they are.
 
     Steps are as fine as that allows. Of all differences with a mean magnitude m, those with
     Laplace's distribution have the largest entropy, log2(2 e m / step) (Cover and Thomas 2006,
@@ -81,10 +83,11 @@ def pack(values: Numbers, bits: float) -> Packed:
         bits: Bits per number, between :data:`COARSEST_BITS` and :data:`FINEST_BITS`.
     """
     numbers = np.asarray(values, dtype=float)
+    if len(numbers) <= EXACT:  # such as those of an axis with a logarithmic scale
+        exact = deflated(numbers.astype("<f8").tobytes())
+        return Packed(len(numbers), 0.0, 0.0, 0, 8, exact, "", wide=True)
     is_hole = ~np.isfinite(numbers)
     filled = _filled(numbers, is_hole)
-    if not len(filled):
-        return Packed(0, 0.0, 1.0, 1, 0, "", "", wide=False)
     first = float(filled[0])
     step = step_for(filled, bits)
     levels = np.round((filled - first) / step).astype(np.int64)
@@ -102,7 +105,7 @@ def step_for(filled: Array, bits: float) -> float:
     bits = min(max(bits, COARSEST_BITS), FINEST_BITS)
     change = min(float(np.abs(np.diff(filled, order)).mean()) if len(filled) > order else 0.0
                  for order in (1, 2))  # fmt: skip
-    finest = float(np.ptp(filled)) / _LEVELS if len(filled) else 0.0
+    finest = float(np.ptp(filled)) / _LEVELS
     wanted = max(2.0 * np.e * change * 2.0**-bits, finest)
     if not wanted:
         return 1.0

@@ -35,7 +35,7 @@ class Plot {
     this.place.textContent = "";
     this.fit();
     const options = { responsive: true, displaylogo: false, displayModeBar: NARROW.matches ? false : "hover",
-      doubleClick: this.isTimed ? false : "reset+autosize" };
+      doubleClickDelay: 500, doubleClick: this.isTimed ? false : "reset+autosize" };
     const range = this.recording.range;
     this.show(range, (index, changes) => {
       for (const [key, value] of Object.entries(changes)) {
@@ -152,7 +152,7 @@ class Plot {
   // Plots side by side stand below each other where there is no room.
   fit() {
     const grid = this.figure.layout.grid, height = this.figure.layout.height;
-    this.layout.margin = NARROW.matches ? { l: 48, r: 8, t: 30, b: 44 } : { l: 64, r: 16, t: 34, b: 48 };
+    this.layout.margin = NARROW.matches ? { l: 56, r: 8, t: 30, b: 44 } : { l: 76, r: 16, t: 34, b: 48 };
     this.layout.font = { ...this.layout.font, size: NARROW.matches ? 11 : 13 };
     if (!grid || !(grid.columns > 1)) return;
     this.layout.grid = NARROW.matches ? { ...grid, rows: grid.columns * grid.rows, columns: 1 } : { ...grid };

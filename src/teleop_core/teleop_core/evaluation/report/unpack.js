@@ -1,6 +1,7 @@
 // Unpack: numbers and texts that the page holds as base64 of a raw deflate stream.
 
 async function inflated(text) {
+  if (!text) return new Uint8Array(0);
   if (typeof DecompressionStream === "undefined")
     throw new Error("this browser cannot unpack the plots; one of 2023 or later can");
   const packed = atob(text), bytes = new Uint8Array(packed.length);
@@ -10,9 +11,10 @@ async function inflated(text) {
 }
 
 // Sums of differences, as packing.py writes them: the lowest bytes of all first, the sign in the
-// lowest bit, holes as bits.
+// lowest bit, holes as bits. A few numbers come as they are.
 async function unpacked({ count, first, step, order, planes, data, holes, wide }) {
   const bytes = await inflated(data);
+  if (order === 0) return new Float64Array(bytes.buffer, 0, count);
   const numbers = wide ? new Float64Array(count) : new Float32Array(count);
   for (let i = 0, level = 0, change = 0; i < count; i++) {
     let code = 0;
