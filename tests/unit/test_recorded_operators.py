@@ -139,6 +139,12 @@ def test_a_session_lasts_as_long_as_what_it_follows_unless_told(given, seconds, 
     assert made.groups["teleop"].duration == pytest.approx(seconds)
 
 
+def test_a_length_that_cannot_be_asked_is_refused():
+    part = tc.Operator("endless", lambda parameters, setting: lambda times: times, length=3.0)
+    with pytest.raises(tc.PartError, match="length"):
+        tc.register_operator("endless", part)
+
+
 def test_operators_without_end_leave_the_duration_alone():
     assert tc.configuration("coarse_box").groups["teleop"].duration == 46.0
 

@@ -113,6 +113,8 @@ def _checked(name: str, part: object) -> Operator:
     if isinstance(part, Operator):
         if not callable(part.make) or part.ahead < 1:
             raise PartError("operator", name, "one whose make can be called, asked >= 1 tick ahead")
+        if part.length is not None and not callable(part.length):
+            raise PartError("operator", name, "one whose length is length(parameters, setting)")
         if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
             text = "one whose parameters are a dataclass, not an instance of one"
             raise PartError("operator", name, text)
