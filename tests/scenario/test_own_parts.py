@@ -14,6 +14,7 @@ from teleop_core.fixtures.box import BOX
 from teleop_core.fixtures.sphere import SPHERE, sphere_depth
 from teleop_core.kernels import kernel
 from teleop_core.mapping.motion_scaling import MotionScalingParameters
+from teleop_core.operators import register_operator
 from teleop_core.parameters import NoParameters, build, parameter
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
@@ -33,7 +34,10 @@ from teleop_core.topics import (
 
 TICKS = 1500
 MS = 1e-3
-SHORT = ("approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]",
+HOME = load_robot("rcrt1").home
+# Slave and hand begin at once: neither moves to another start, nor waits for the other.
+AT_ONCE = (f"slave_sim.start={HOME.tolist()}", "patience=0.0")
+SHORT = (*AT_ONCE, "approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]",
          "buttons.clutch=[0.9, 1.0]", "fixture.box.size=[0.01, 0.01, 0.01]")  # fmt: skip
 
 
@@ -56,13 +60,24 @@ def assert_same_streams(block, other, topics=STREAMS):
 # Delays.
 
 
-def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(plain):
-    delayed = session("teleop.delays=[slave/servo_jp=0.02]")
+def waits(times):
+    """Rest until the slave follows, with the delay too; then swing by 20 mm."""
+    swing = 0.01 * (1.0 - np.cos(2.0 * np.pi * np.maximum(times - 0.1, 0.0)))
+    return np.column_stack((swing, -swing, 0.5 * swing))
+
+
+def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(own_parts):
+    register_operator("waits", waits)
+    # The push of the limit that home is at would differ by rounding.
+    still = ("operator=waits", "tremor_amplitude=0.0", "gimbal_noise=0.0",
+             "reach_force.is_on=false")  # fmt: skip
+    delayed, plain = session(*still, "teleop.delays=[slave/servo_jp=0.02]"), session(*still)
+    assert np.ptp(plain["slave_setpoint_cp"][:, :3], axis=0).min() > 1 * MS
     assert_same_streams(delayed, plain, [t for t in STREAMS if t.name.startswith("master/")])
     for field in ("slave_setpoint_js", "slave_setpoint_cp"):
-        assert np.array_equal(delayed[field][20:], plain[field][:-20]), field
-    home = load_robot("rcrt1").home
-    assert np.allclose(delayed["slave_setpoint_js"][:20], home, rtol=0, atol=1e-15)
+        # The hand is followed from 20 ticks later on, with other roundings before it moves.
+        assert np.allclose(delayed[field][20:], plain[field][:-20], rtol=0, atol=1e-9), field
+    assert np.allclose(delayed["slave_setpoint_js"][:20], HOME, rtol=0, atol=1e-15)
     assert np.array_equal(
         delayed["slave_setpoint_js_ns"], np.maximum(plain["slave_servo_jp_ns"] - 20 * TICK_NS, 0)
     )
@@ -70,7 +85,7 @@ def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(p
 
 @pytest.mark.parametrize(("seconds", "ticks"), [(0.0, 0), (0.0014, 1), (0.001, 1), (0.02, 20)])
 def test_delay_on_a_late_link_comes_on_top_of_its_tick(seconds, ticks):
-    block = session(f"teleop.delays=[master/servo_cf={seconds}]", "max_force=2.0")
+    block = session(f"teleop.delays=[master/servo_cf={seconds}]", "fixture.max_force=2.0")
     applied, late = block["master_measured_cf"][:, :3], 1 + ticks
     # What the device applies is what was asked for, this many ticks ago, below its peak force.
     assert np.array_equal(applied[late:], block["master_servo_cf"][:-late, :3])
@@ -165,7 +180,8 @@ def test_parameters_of_an_own_stage_are_set_like_others(own_parts):
 
 def test_own_stage_is_recorded_with_its_topic_and_stamp(own_parts, tmp_path):
     register_stage(limit("limit", kernel(limit_step)))
-    simulate(configure(settings=["teleop.stages=[limit]", "duration=0.2"]), tmp_path / "bag")
+    settings = [*AT_ONCE, "teleop.stages=[limit]", "duration=0.2"]
+    simulate(configure(settings=settings), tmp_path / "bag")
     series = Bag(tmp_path / "bag").read(LIMITED)
     assert np.array_equal(series.stamp_ns, TICK_NS * np.arange(1, 201))
 
@@ -205,7 +221,7 @@ class PushParameters:
 def test_second_source_of_force_is_added_and_pushes_the_hand(own_parts, plain, is_compiled):
     step = kernel(push_step) if is_compiled else push_step
     register_stage(Stage("contact", PushParameters, (MASTER_MEASURED_CP,), (PUSH,), step=step))
-    block = session("teleop.stages=[contact]", "contact.newton=1.5", "max_force=1.5")
+    block = session("teleop.stages=[contact]", "contact.newton=1.5", "fixture.max_force=1.5")
     applied, walls = block["master_measured_cf"][1:, :3], block["master_servo_cf"][:-1, :3]
     assert np.array_equal(applied, walls + np.array((1.5, 0.0, 0.0)))
     assert np.abs(walls).max() > 0.1
@@ -266,11 +282,14 @@ def test_default_axis_map_is_the_published_one(plain):
 def test_other_axis_map_moves_the_slave_along_other_axes():
     line = ("operator=line", "operator.size=[0.02, 0.0, 0.0]", "rotation=0.0",
             "operator.center=[0.0, 0.0, 0.0]", "operator.tilt=[0.0, 0.0, 0.0]")  # fmt: skip
-    still = (*line, "buttons.fixture=[]", "buttons.clutch=[]", "tremor_amplitude=0.0")
+    still = (*line, "approach_time=0.5", "operator.period=2.0", "buttons.fixture=[]",
+             "buttons.clutch=[]", "tremor_amplitude=0.0")  # fmt: skip
     axes = {"['-z', '-x', '+y']": (1, -1.0), "['+x', '+y', '+z']": (0, 1.0),
             "['+y', '+z', '+x']": (2, 1.0), "['-x', '-y', '+z']": (0, -1.0)}  # fmt: skip
     for text, (axis, sign) in axes.items():
-        block = session(*still, f"axes={text}", ticks=1200)
+        block = VirtualTime(configure("coarse_box", settings=[*still, f"axes={text}"]))
+        block.run(block.lead)  # where it starts, all directions have room
+        block = block.run(1200)
         command = block["slave_servo_cp"][:, :3] - block["slave_servo_cp"][0, :3]
         hand = block["master_measured_cp"][:, 0] - block["master_measured_cp"][0, 0]
         assert hand.max() > 5 * MS
