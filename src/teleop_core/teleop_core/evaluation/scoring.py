@@ -1,5 +1,6 @@
 """Scoring: a recording becomes a score, in one pass and in memory that does not grow with it."""
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -180,8 +181,7 @@ def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
     share = reach.followed_share if reach is not None else None
     if share is not None and share >= COMPARABLE:
         return results
-    told = "not known" if share is None else f"{100.0 * share:.0f} % < {100.0 * COMPARABLE:.0f} %"
-    note = Row(REACH_GROUP, "too little to compare", "", told)
+    note = Row(REACH_GROUP, "too little to compare", "", _too_little(share))
     found = []
     for result in results:
         rows = tuple(replace(entry, is_met=None) for entry in result.rows)
@@ -195,6 +195,13 @@ def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
         else result
         for result in found
     )
+
+
+def _too_little(share: float | None) -> str:
+    """Share of the time followed beside what is needed; rounded down, so that it reads as less."""
+    if share is None:
+        return "not known"
+    return f"{math.floor(1000.0 * share) / 10.0:.1f} % < {100.0 * COMPARABLE:.0f} %"
 
 
 def _insist(metric: Metric, found: object, kind: type[object]) -> None:
