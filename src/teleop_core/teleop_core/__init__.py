@@ -19,7 +19,7 @@ Everything a user needs is here:
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 if TYPE_CHECKING:
     from teleop_core import topics
