@@ -6,13 +6,16 @@ import yaml
 
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import TeleopError
+from teleop_core.operators import register_operator
 from teleop_core.session.configuration import Configuration, configure
 from teleop_core.session.layers import parse_layer
 from teleop_core.session.runner import replay, simulate
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.topics import STREAMS
 
-TICKS = 1500
+# So long moves the rcrt1 to where it starts, at half of its speed; its hand moves from then on.
+LEAD = VirtualTime(configure()).lead
+TICKS = LEAD + 1500
 SHORT = ("approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]")
 ARMS = ("teleop.arms=[right, left]", "left/robot=scara", "left/seed=7", "left/coarse_gain=0.5",
         "right/fixture=sphere", "right/fixture.sphere.diameter=0.01")  # fmt: skip
@@ -97,11 +100,24 @@ def test_wrong_arms_are_refused_in_one_line_before_anything_runs(more, says):
     assert "\n" not in str(error.value)
 
 
-def test_delay_of_one_arm_is_not_one_of_the_other(both):
-    block = VirtualTime(settings(*ARMS, "teleop.delays=[left/slave/servo_jp=0.02]")).run(TICKS)
+def waits(times):
+    """Rest until the slave follows, with the delay too; then swing by 20 mm."""
+    swing = 0.01 * (1.0 - np.cos(2.0 * np.pi * np.maximum(times - 0.1, 0.0)))
+    return np.column_stack((swing, -swing, 0.5 * swing))
+
+
+def test_delay_of_one_arm_is_not_one_of_the_other(own_parts):
+    register_operator("waits", waits)
+    # The scara starts at home; its hand begins at once, whenever it follows.
+    still = ("left/operator=waits", "left/patience=0.0", "left/tremor_amplitude=0.0",
+             "left/gimbal_noise=0.0")  # fmt: skip
+    delay = "teleop.delays=[left/slave/servo_jp=0.02]"
+    block, both = (VirtualTime(settings(*ARMS, *still, *m)).run(TICKS) for m in ((delay,), ()))
     assert np.array_equal(block["slave_setpoint_js"], both["slave_setpoint_js"])
+    assert np.ptp(both["slave_setpoint_cp"][LEAD:, :3], axis=0).min() > 1e-3
     setpoints = [rows["left_slave_setpoint_js"] for rows in (block, both)]
-    assert np.array_equal(setpoints[0][20:], setpoints[1][:-20])
+    assert np.allclose(setpoints[0][20:], setpoints[1][:-20], rtol=0, atol=1e-9)
+    assert np.ptp(setpoints[1][:, :3], axis=0).min() > 1e-3
 
 
 def test_one_recording_holds_and_replays_both_arms_to_the_bit(tmp_path, both):
