@@ -375,10 +375,10 @@ class SlaveSim(RunningStage):
         assert robot.drives is not None
         start = np.array(parameters.start or robot.start, dtype=np.float64)
         if start.shape != robot.home.shape:
-            raise ParameterError("start", parameters.start, f"{robot.n} joints, or empty")
+            raise ParameterError("slave_sim.start", parameters.start, f"{robot.n} joints, or empty")
         if not ((robot.lower <= start) & (start <= robot.upper)).all():
             limits = f"{robot.lower.tolist()} to {robot.upper.tolist()}"
-            raise ParameterError("start", parameters.start, f"inside the limits, {limits}")
+            raise ParameterError("slave_sim.start", parameters.start, f"inside the limits, {limits}")
         speed = robot.drives.speed_limit * parameters.start_speed
         time = shortest_move_time(robot.home, start, speed)
         p["home"], p["start"], p["start_ticks"] = robot.home, start, math.ceil(time / self.dt)
