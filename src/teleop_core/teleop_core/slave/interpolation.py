@@ -34,6 +34,9 @@ def begin_way(p: Any, s: Any, command: Array, period_ns: int, dt: float) -> None
             longer = span / s.span
             s.slope[i], s.bend[i] = slope * longer, bend * longer * longer
             s.end_slope[i] = goal - s.target[i]
+        else:  # a straight way, or a jump, for a way of least jerk that may go on from it
+            s.bend[i] = 0.0
+            s.slope[i] = s.end_slope[i] = goal - s.command[i] if p.interpolation == _LINEAR else 0.0
         s.begin[i], s.target[i] = s.command[i], goal
     s.ticks, s.span = 0, span
 

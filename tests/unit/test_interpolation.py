@@ -1,0 +1,224 @@
+"""Interpolation: slow commands become a way that reaches each of them one period later."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import BPoly
+
+from teleop_core.robots import load_robot
+from teleop_core.signals import DT, TICK_NS
+from teleop_core.slave.slave_sim import INTERPOLATIONS, CommandStatus, SlaveSim, SlaveSimParameters
+
+ROBOT = load_robot("planar_3r")  # it starts at home, with room on all sides
+HOME, SPEED = ROBOT.home, ROBOT.drives.speed_limit
+PERIODS = [2, 8, 33, 100]  # of the commands, in ticks
+# Joints of up to 3 rad after a polynomial of the fifth degree.
+ROUNDING = 1e-13
+
+
+def way(interpolation, commands, ticks_between, robot="planar_3r", after=0):
+    """Command in force at the end of every tick (N, n), under commands that come now and then.
+
+    Args:
+        interpolation: Its name.
+        commands: Joints (M, n).
+        ticks_between: Ticks from each command to the next (M - 1,).
+        robot: Name of the robot.
+        after: Ticks after the last command.
+    """
+    slave = SlaveSim(SlaveSimParameters(robot=robot, interpolation=interpolation))
+    row, now_ns, found = slave.signals, 0, []
+    for command, ticks in zip(commands, [*ticks_between, after], strict=True):
+        for tick in range(ticks):
+            now_ns += TICK_NS
+            row["now_ns"] = now_ns
+            if tick == 0:
+                row["slave_servo_jp"], row["slave_servo_jp_ns"] = command, now_ns
+            slave.step()
+            assert row["command_status"] in {CommandStatus.FRESH, CommandStatus.STALE}
+            found.append(slave.state["command"].copy())
+    return np.array(found)
+
+
+def wander(count, period, seed=3):
+    """Commands (count, 3) from home on, each as far from the last as a stream may be."""
+    rng = np.random.default_rng(seed)
+    steps = 0.4 * period * DT * SPEED * rng.uniform(-1.0, 1.0, (count, 3))
+    steps[0] = 0.0
+    return HOME + np.cumsum(steps, axis=0)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "minimum_jerk"])
+@pytest.mark.parametrize("period", PERIODS)
+def test_each_command_is_reached_exactly_one_period_after_it_came(interpolation, period):
+    commands = wander(12, period)
+    found = way(interpolation, commands, [period] * 11, after=period)
+    # The first comes alone; of the others each is there when the next one is due, not before.
+    assert np.array_equal(found[0], commands[0])
+    assert np.array_equal(found[period - 1 :: period], commands)
+    before = found[2 * period - 2 :: period]
+    assert (before != commands[1:]).any(axis=1).all()
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_linear_way_is_the_straight_line_between_commands(period):
+    commands = wander(12, period)
+    found = way("linear", commands, [period] * 11, after=period)
+    ticks = np.arange(len(found)) + 1.0
+    knots = period * np.arange(1.0, 13.0)
+    line = np.column_stack([np.interp(ticks, knots, column) for column in commands.T])
+    assert np.abs(found - line).max() < ROUNDING
+
+
+def test_without_interpolation_a_command_is_in_force_at_once_and_held():
+    commands = wander(6, 20)
+    found = way("off", commands, [20] * 5, after=20)
+    assert np.array_equal(found, np.repeat(commands, 20, axis=0))
+
+
+def test_at_one_command_per_tick_all_kinds_are_equal():
+    commands = wander(300, 1)
+    ways = [way(name, commands, [1] * 299, after=1) for name in INTERPOLATIONS]
+    assert np.array_equal(ways[0], commands)
+    assert np.array_equal(ways[0], ways[1])
+    assert np.array_equal(ways[0], ways[2])
+
+
+def least_jerk(commands, ticks_between, after):
+    """The ways of least jerk, polynomials of SciPy one after the other, sampled every tick.
+
+    A way takes as long as its command came after the last one. It begins where the one before it
+    is by then, as fast and as curved, or at rest if that one was over; it ends as fast as the
+    commands go, without acceleration.
+    """
+    place, rate, bend = commands[0], 0.0 * HOME, 0.0 * HOME
+    found = [place] * ticks_between[0]
+    for k, ticks in enumerate([*ticks_between[1:], after], start=1):
+        time = ticks_between[k - 1] * DT
+        ends = (
+            [place, rate, bend],
+            [commands[k], (commands[k] - commands[k - 1]) / time, 0.0 * HOME],
+        )
+        polynomial = BPoly.from_derivatives([0.0, time], np.array(ends))
+        found += list(polynomial(np.minimum(DT * np.arange(1, ticks + 1), time)))
+        place, rate, bend = found[-1], 0.0 * HOME, 0.0 * HOME
+        if ticks <= ticks_between[k - 1]:
+            rate, bend = (polynomial(ticks * DT, order) for order in (1, 2))
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    "ticks", [[20] * 9, [100] * 5, [3, 5, 40, 7, 90, 90, 11], [200, 30, 300, 10]], ids=str
+)
+def test_minimum_jerk_way_is_the_polynomial_of_fifth_degree_with_smooth_ends(ticks):
+    rng = np.random.default_rng(5)
+    steps = 0.4 * DT * np.array([0, *ticks])[:, None] * SPEED
+    commands = HOME + np.cumsum(steps * rng.uniform(-1.0, 1.0, steps.shape), axis=0)
+    found = way("minimum_jerk", commands, ticks, after=50)
+    assert np.abs(found - least_jerk(commands, ticks, 50)).max() < ROUNDING
+
+
+def largest_changes(found, period):
+    """Largest change per tick, of speed and of acceleration, near commands and between them."""
+    changes = []
+    for order in (2, 3):
+        change = np.abs(np.diff(found, n=order, axis=0)).max(axis=1)
+        # The first and last of the ticks that a difference spans have the middle tick between.
+        near = (np.arange(len(change)) + order) % period < order
+        changes.append((change[near].max(), change[~near].max()))
+    return changes
+
+
+def test_minimum_jerk_way_is_as_smooth_at_its_ends_as_on_the_way():
+    commands = wander(12, 100)
+    speed, acceleration = largest_changes(
+        way("minimum_jerk", commands, [100] * 11, after=100)[100:], 100
+    )
+    assert speed[0] <= speed[1]
+    assert acceleration[0] <= 1.1 * acceleration[1]
+    kinks = largest_changes(way("linear", commands, [100] * 11, after=100)[100:], 100)
+    assert kinks[0][0] > 20.0 * speed[0]
+
+
+@pytest.mark.parametrize(
+    ("first", "then"), [("linear", "minimum_jerk"), ("minimum_jerk", "linear")]
+)
+def test_kinds_change_on_the_way_without_a_jump(first, then):
+    slave = SlaveSim(SlaveSimParameters(robot="planar_3r", interpolation=first))
+    row, found = slave.signals, []
+    for tick in range(600):
+        if tick == 300:
+            slave.retune(SlaveSimParameters(robot="planar_3r", interpolation=then))
+        row["now_ns"] = (tick + 1) * TICK_NS
+        if tick % 50 == 0:
+            row["slave_servo_jp"] = HOME + 1e-3 * tick * 0.2 * SPEED
+            row["slave_servo_jp_ns"] = row["now_ns"]
+        slave.step()
+        found.append(slave.state["command"].copy())
+    # Commands run at constant speed, and so does the way, after a period to begin.
+    steps = np.diff(found, axis=0)[100:]
+    assert np.allclose(steps, 0.2e-3 * SPEED, rtol=1e-9, atol=0)
+
+
+def test_a_still_command_after_other_kinds_is_a_still_way():
+    slave = SlaveSim(SlaveSimParameters(robot="planar_3r", interpolation="minimum_jerk"))
+    row, found = slave.signals, []
+    kinds = {100: "off", 200: "linear", 300: "minimum_jerk"}
+    for tick in range(500):
+        if tick in kinds:
+            slave.retune(SlaveSimParameters(robot="planar_3r", interpolation=kinds[tick]))
+        row["now_ns"] = (tick + 1) * TICK_NS
+        if tick % 20 == 0:
+            row["slave_servo_jp"] = HOME + 1e-3 * min(tick, 80) * 0.4 * SPEED
+            row["slave_servo_jp_ns"] = row["now_ns"]
+        slave.step()
+        found.append(slave.state["command"].copy())
+    assert np.ptp(found[:120], axis=0).min() > 0.05
+    assert np.ptp(found[120:], axis=0).max() == 0.0
+
+
+# -- limits ----------------------------------------------------------------------------------------
+
+# d3 begins at its upper end, which is home; the other joints stay there.
+SLIDING = load_robot("rcrt1")
+D3, TOP = 2, SLIDING.upper[2]
+
+
+def slide(interpolation, places, ticks):
+    """Commands in force (N,) of d3 [m], under commands to some places below its upper end [m]."""
+    slave = SlaveSim(SlaveSimParameters(start=tuple(SLIDING.home), interpolation=interpolation))
+    row, now_ns, found = slave.signals, 0, []
+    for place in places:
+        for tick in range(ticks):
+            now_ns += TICK_NS
+            row["now_ns"] = now_ns
+            if tick == 0:
+                row["slave_servo_jp"], row["slave_servo_jp_ns"] = SLIDING.home, now_ns
+                row["slave_servo_jp"][D3] = TOP - place
+            slave.step()
+            assert row["command_status"] == CommandStatus.FRESH
+            found.append(float(slave.state["command"][D3]))
+    return np.array(found)
+
+
+def test_minimum_jerk_way_that_would_swing_beyond_a_limit_stays_at_it():
+    places = np.array([0.0, 4e-3, 4e-3, 0.0, 0.0, 0.0])
+    found = slide("minimum_jerk", places, 50)
+    commands = HOME + np.column_stack((-places, 0.0 * places, 0.0 * places))
+    free = least_jerk(commands, [50] * 5, 50)[:, 0] - HOME[0]
+    assert free.max() > 1e-4  # it arrives with the speed of the commands
+    assert found.max() == TOP
+    assert np.allclose(found, TOP + np.minimum(free, 0.0), rtol=0, atol=1e-12)
+
+
+@given(
+    st.lists(st.floats(-1e-3, 5e-3), min_size=2, max_size=8),
+    st.integers(2, 90),
+    st.sampled_from(INTERPOLATIONS),
+)
+def test_no_way_leaves_the_limits_of_the_joints(places, ticks, interpolation):
+    found = slide(interpolation, places, ticks)
+    assert found.max() <= TOP
+    assert found.min() >= SLIDING.lower[D3]
+    assert found[-1] == min(TOP - places[-1], TOP)
