@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core import topics
+from teleop_core import api, topics
 from teleop_core.bags.reader import Bag
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import Configuration, configure
 from teleop_core.session.runner import recorded_configuration, replay, simulate
+from teleop_core.session.virtual import VirtualTime
 from teleop_core.signals import TICK_NS
 
 HOME = load_robot("rcrt1").home.tolist()
@@ -44,3 +45,16 @@ def test_recording_of_before_is_read_and_replayed_from_where_it_began(tmp_path):
     before, after = (b.read(topics.SLAVE_SETPOINT_CP).values[:, :3] for b in (bag, again))
     assert np.array_equal(before[0], after[0])
     assert np.abs(before - after).max() < 2e-3
+
+
+def test_arms_that_begin_farther_away_are_waited_for_before_the_recorded_hand_moves():
+    at_home = api.run("coarse_box", duration=1.0, slave_sim__start=HOME)
+    again = api.replay(at_home)
+    for topic in ("slave/setpoint_js", "slave/measured_cp"):
+        assert np.array_equal(again[topic].values, at_home[topic].values)
+    later = api.replay(at_home, settings={"slave_sim.start": []})
+    commands, hand = later["slave/servo_cp"][["x", "y", "z"]], later["master/measured_cp"]
+    lead = VirtualTime(configure("coarse_box")).lead
+    assert len(later["slave/measured_js"]) > len(at_home["slave/measured_js"]) + lead - 10
+    moved = hand[["z", "x", "y"]] * (-1.0, -1.0, 1.0)  # in the slave's axes
+    assert np.allclose(np.ptp(commands, axis=0), np.ptp(moved, axis=0), rtol=0, atol=2e-4)

@@ -19,7 +19,7 @@ from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION, Layer, parse_layer
 from teleop_core.session.virtual import BLOCK, VirtualTime, stamps_of
 from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import Kind, Topic, limit_text
+from teleop_core.topics import TELEOP_STATE, Kind, Topic, limit_text
 
 Progress = Callable[[int, int], None]
 
@@ -64,7 +64,8 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
     Ticks are 1 ms apart, from the first to the last recorded sample; each sample is answered once,
     at the first tick that is not before it. For a recording of virtual time every tick has its own
     sample, so the same configuration gives the same slave motion, bit for bit. Recordings that are
-    not ours begin with the time that the arms need to get ready.
+    not ours, or whose hand did not wait as long, begin with the time that the arms need to get
+    ready.
 
     Args:
         bag: Recording with master/measured_cp of every arm.
@@ -92,7 +93,7 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
     series = bag.read_many(recorded)
     poses = series[needed[0].name]
     first_ns, last_ns = int(poses.stamp_ns[0]), int(poses.stamp_ns[-1])
-    lead_ns = 0 if "configuration" in bag.metadata else session.lead * TICK_NS
+    lead_ns = _lead_ns(session, bag, first_ns)
     later_ns = max(0, TICK_NS + lead_ns - first_ns)  # stamps are positive
     # The last tick is the first one that is not before the last sample.
     stamps = stamps_of(first_ns + later_ns - lead_ns, last_ns + later_ns + TICK_NS - 1)
@@ -106,6 +107,16 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
             yield session.replay(samples)
 
     return blocks(), len(stamps)
+
+
+def _lead_ns(session: VirtualTime, bag: Bag, first_ns: int) -> int:
+    """Time [ns] that arms need before the first sample; none where the hand waited as long."""
+    lead_ns = session.lead * TICK_NS
+    if not lead_ns or "configuration" not in bag.metadata or TELEOP_STATE.name not in bag.topics:
+        return lead_ns
+    reports = bag.reports(TELEOP_STATE)
+    follows = [r.stamp_ns for r in reports if r.values.get("is_following") == "1.0"]
+    return max(0, lead_ns - (min(follows) - first_ns)) if follows else lead_ns
 
 
 def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
