@@ -30,7 +30,8 @@ def state(stamp_ns, described=None, **values):
 
     ``described`` holds further names and texts, such as the kind of the fixture.
     """
-    texts = {name: repr(float(values.get(name, name in {"gain", "is_following"}))) for name in STATE_FIELDS}
+    is_one = {"gain", "is_following"}
+    texts = {name: repr(float(values.get(name, name in is_one))) for name in STATE_FIELDS}
     return report(stamp_ns, "teleop", 0, "FOLLOWING", texts | (described or {}))
 
 

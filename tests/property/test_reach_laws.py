@@ -10,7 +10,8 @@ from teleop_core.api import configuration
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.series import Series
 from teleop_core.geometry import pose_from_transform
-from teleop_core.mapping.motion_scaling import MotionScaling, MotionScalingParameters
+from teleop_core.mapping.motion_scaling import MotionScaling
+from teleop_core.mapping.parameters import MotionScalingParameters
 from teleop_core.operators.shapes import minimum_jerk
 from teleop_core.robots import load_robot
 from teleop_core.robots.inverse_kinematics import InverseKinematics, InverseKinematicsParameters

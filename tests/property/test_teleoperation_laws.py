@@ -8,11 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from teleop_core.mapping.motion_scaling import (
-    MotionScaling,
-    MotionScalingParameters,
-    axis_map,
-)
+from teleop_core.mapping.motion_scaling import MotionScaling
+from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime

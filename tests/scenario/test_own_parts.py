@@ -13,7 +13,7 @@ from teleop_core.fixtures import register_fixture
 from teleop_core.fixtures.box import BOX
 from teleop_core.fixtures.sphere import SPHERE, sphere_depth
 from teleop_core.kernels import kernel
-from teleop_core.mapping.motion_scaling import MotionScalingParameters
+from teleop_core.mapping.parameters import MotionScalingParameters
 from teleop_core.operators import register_operator
 from teleop_core.parameters import NoParameters, build, parameter
 from teleop_core.robots import load_robot

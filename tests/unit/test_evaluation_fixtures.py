@@ -16,7 +16,7 @@ from teleop_core.evaluation.reported_fixture import ReportedFixture
 from teleop_core.evaluation.scoring import evaluate, study
 from teleop_core.evaluation.summary import summary
 from teleop_core.fixtures import Fixture, register_fixture
-from teleop_core.mapping.motion_scaling import MotionScalingParameters, axis_map
+from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.parameters import parameter
 from teleop_core.signals import TICK_NS
 from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TELEOP_STATE

@@ -12,7 +12,7 @@ from teleop_core.errors import PartError
 from teleop_core.fixtures import FIXTURES, Fixture, register_fixture, shape_of
 from teleop_core.fixtures.sphere import SphereParameters, sphere_depth, sphere_outline
 from teleop_core.kernels import kernel
-from teleop_core.mapping.motion_scaling import FixtureParameters
+from teleop_core.mapping.parameters import FixtureParameters
 from teleop_core.parameters import build, parameter
 
 # Quotients of numbers below one.

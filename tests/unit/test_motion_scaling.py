@@ -13,13 +13,8 @@ from teleop_core.geometry import (
     rotation_from_quaternion,
     transform,
 )
-from teleop_core.mapping.motion_scaling import (
-    FixtureParameters,
-    MotionScaling,
-    MotionScalingParameters,
-    mapped_orientation,
-    to_slave_axes,
-)
+from teleop_core.mapping.motion_scaling import MotionScaling, mapped_orientation, to_slave_axes
+from teleop_core.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.master.haptic_master import REST_POSITION, REST_TILT
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot

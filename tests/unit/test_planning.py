@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 from people import PEOPLE, moves, recorded
 from teleop_core.kernels import IS_COMPILED
-from teleop_core.mapping.motion_scaling import MotionScalingParameters
+from teleop_core.mapping.parameters import MotionScalingParameters
 from teleop_core.planning.aim import Aim
 from teleop_core.planning.asked import STRETCHES, AskedPath, asked_path
 from teleop_core.planning.placement import Placement

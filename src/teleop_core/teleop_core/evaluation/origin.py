@@ -10,12 +10,8 @@ from teleop_core.bags.reader import Bag
 from teleop_core.errors import ParameterError, TeleopError
 from teleop_core.geometry import Array
 from teleop_core.graph import Graph, build_graph
-from teleop_core.mapping.motion_scaling import (
-    AXES,
-    MOTION_SCALING,
-    MotionScalingParameters,
-    axis_map,
-)
+from teleop_core.mapping.motion_scaling import MOTION_SCALING
+from teleop_core.mapping.parameters import AXES, MotionScalingParameters, axis_map
 from teleop_core.master.haptic_master import HAPTIC_MASTER
 from teleop_core.parameters import build
 from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer

@@ -13,7 +13,7 @@ from teleop_core.exchange.options import ImportOptions
 from teleop_core.exchange.orientation import continuous, from_matrices, products
 from teleop_core.exchange.times import SECOND_NS, Stamps, gaps, ordered
 from teleop_core.geometry import Array
-from teleop_core.mapping.motion_scaling import axis_map
+from teleop_core.mapping.parameters import axis_map
 
 ROWS = 20_000
 """Rows of a block."""

@@ -130,7 +130,7 @@ class ImportOptions:
     def _check_axes(self) -> None:
         if len(self.axes) != 3 or not set(self.signed_axes) <= set(AXES):
             raise ParameterError("--axes", self.axes, "three of " + ", ".join(AXES))
-        from teleop_core.mapping.motion_scaling import axis_map  # compiled: not for `--help`
+        from teleop_core.mapping.parameters import axis_map  # compiled: not for `--help`
 
         axis_map("--axes", self.signed_axes)
 

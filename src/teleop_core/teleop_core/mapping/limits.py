@@ -6,7 +6,6 @@ beyond which the limit is dragged along; that is what the hand feels and what th
 """
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,18 +20,7 @@ from teleop_core.geometry import (
     turn_within,
 )
 from teleop_core.kernels import inner
-from teleop_core.parameters import parameter
 from teleop_core.topics import SLAVE_REACH, Limit
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReachForceParameters:
-    """The push that the hand feels where the slave cannot follow."""
-
-    is_on: bool = parameter(True, doc="whether the hand feels the slave's limits as a wall")
-    stiffness: float = parameter(500.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring of it")
-    max_force: float = parameter(1.5, unit="N", lower=0.0, upper=10.0, doc="largest push")
-
 
 SENT = 512
 """Commands that are remembered until the answer comes how far they could be followed."""

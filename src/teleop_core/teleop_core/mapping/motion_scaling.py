@@ -1,12 +1,10 @@
 """Motion scaling: from the master's pose to the slave's, with modes, clutch and fixture."""
 
 import math
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
 from teleop_core.fixtures import FIXTURES, shape_of
 from teleop_core.geometry import (
     Array,
@@ -21,15 +19,21 @@ from teleop_core.mapping.limits import (
     LIMIT_FIELDS,
     SENT,
     SENT_FIELDS,
-    ReachForceParameters,
     align,
     draw_back,
     forget_limits,
     measure_depth,
     remember,
 )
+from teleop_core.mapping.parameters import (
+    MODES,
+    FixtureParameters,
+    MotionScalingParameters,
+    ReachForceParameters,
+    axis_map,
+)
 from teleop_core.mapping.walls import wall_force
-from teleop_core.parameters import Choice, choice, parameter, values_of
+from teleop_core.parameters import values_of
 from teleop_core.signals import DT, STATE, assign
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
@@ -41,72 +45,6 @@ from teleop_core.topics import (
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
 )
-
-MODES = ("coarse", "fine")
-AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
-
-
-@dataclass(frozen=True, kw_only=True)
-class FixtureParameters:
-    """What the fixture button puts around the hand."""
-
-    kind: Choice = choice(FIXTURES, "box", doc="shape of the fixture")
-    wall: str = parameter(
-        "soft", choices=("soft", "hard"), doc="spring up to max_force, or max_force at once"
-    )
-    stiffness: float = parameter(
-        1000.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring of the soft wall"
-    )
-    max_force: float = parameter(
-        3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further"
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class MotionScalingParameters:
-    """Parameters of :class:`MotionScaling`."""
-
-    coarse_gain: float = parameter(
-        1.0, unit="m/m", lower=1e-3, upper=10.0, doc="slave motion per master motion, coarse mode"
-    )
-    fine_gain: float = parameter(
-        0.1, unit="m/m", lower=1e-3, upper=10.0, doc="slave motion per master motion, fine mode"
-    )
-    mode: str = parameter("coarse", choices=MODES, doc="mode; the mode button changes it too")
-    tool_roll: float = parameter(
-        math.pi / 2, unit="rad", lower=-math.pi, upper=math.pi,
-        doc="turn of the slave's tool about its axis; π/2 aligns it with the home pose",
-    )  # fmt: skip
-    axes: tuple[str, ...] = parameter(
-        ("-z", "-x", "+y"), choices=AXES, length=3,
-        doc="the slave's x, y, z as axes of the master's base; the default is that of the source",
-    )  # fmt: skip
-    tool_axes: tuple[str, ...] = parameter(
-        ("+x", "-y", "-z"), choices=AXES, length=3,
-        doc="the tool's x, y, z as axes of the stylus, before tool_roll",
-    )  # fmt: skip
-    rotation_gain: float = parameter(
-        1.0, unit="rad/rad", lower=0.0, upper=1.0,
-        doc="tool turn per stylus turn; below 1 the tool keeps no fixed relation to the stylus",
-    )  # fmt: skip
-    longest_pause: float = parameter(
-        0.3, unit="s", lower=0.002, upper=5.0,
-        doc="after a longer pause of the master the slave is aligned anew and does not jump",
-    )  # fmt: skip
-    feedback_timeout: float = parameter(
-        0.1, unit="s", lower=0.002, upper=5.0,
-        doc="slave counts as not following when its setpoint lags behind the last command by more; "
-        "of slow masters twice their period counts",
-    )  # fmt: skip
-    fixture: FixtureParameters = field(default_factory=FixtureParameters)
-    reach_force: ReachForceParameters = field(default_factory=ReachForceParameters)
-
-    def __post_init__(self) -> None:
-        if self.fine_gain > self.coarse_gain:
-            raise ParameterError("fine_gain", self.fine_gain, f"<= coarse_gain {self.coarse_gain}")
-        for name in ("axes", "tool_axes"):
-            axis_map(name, getattr(self, name))
-
 
 _PARAMETERS = [
     ("gain", "f8", (2,)), ("stylus_tool", "f8", (4,)), ("slave_master", "f8", (4,)),
@@ -126,27 +64,6 @@ _CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
 _LIMIT, _JOINT = STATE["limit"], STATE["limited_joint"]
 # Depth [m] up to which the hand's stand against a limit is measured, where no force is felt.
 _SHALLOW = 2e-3
-
-
-def axis_map(name: str, axes: tuple[str, ...]) -> Array:
-    """Rotation (3, 3) whose rows pick axes by name: ("-z", "-x", "+y") maps z to -x and so on.
-
-    Args:
-        name: Of the parameter, for messages.
-        axes: Three of :data:`AXES`.
-
-    Raises:
-        ParameterError: An axis is used twice, or the map would mirror.
-
-    Source:
-        Vongbunyong 2008, eq. 6.2.3, for the defaults.
-    """
-    matrix = np.zeros((3, 3))
-    for row, axis in enumerate(axes):
-        matrix[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
-    if not math.isclose(float(np.linalg.det(matrix)), 1.0):
-        raise ParameterError(name, axes, "three axes at right angles that do not mirror")
-    return matrix
 
 
 @kernel

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from teleop_core.geometry import Array, rotation, rotations_from_quaternions
-from teleop_core.mapping.motion_scaling import axis_map
+from teleop_core.mapping.parameters import axis_map
 from teleop_core.planning.placement import Placement
 from teleop_core.planning.turns import turns
 from teleop_core.robots.robot import Robot

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import yaml
 
-from teleop_core.mapping.motion_scaling import MotionScalingParameters
+from teleop_core.mapping.parameters import MotionScalingParameters
 
 Setting = float | list[float] | list[str]
 

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from teleop_core.mapping.motion_scaling import AXES
+from teleop_core.mapping.parameters import AXES
 
 
 @cache

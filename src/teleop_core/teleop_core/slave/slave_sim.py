@@ -378,7 +378,8 @@ class SlaveSim(RunningStage):
             raise ParameterError("slave_sim.start", parameters.start, f"{robot.n} joints, or empty")
         if not ((robot.lower <= start) & (start <= robot.upper)).all():
             limits = f"{robot.lower.tolist()} to {robot.upper.tolist()}"
-            raise ParameterError("slave_sim.start", parameters.start, f"inside the limits, {limits}")
+            needed = f"inside the limits, {limits}"
+            raise ParameterError("slave_sim.start", parameters.start, needed)
         speed = robot.drives.speed_limit * parameters.start_speed
         time = shortest_move_time(robot.home, start, speed)
         p["home"], p["start"], p["start_ticks"] = robot.home, start, math.ceil(time / self.dt)
