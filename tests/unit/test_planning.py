@@ -17,10 +17,12 @@ from teleop_core.planning.placement import Placement
 from teleop_core.planning.turns import turns
 from teleop_core.planning.walk import Walker
 from teleop_core.robots.inverse_kinematics import InverseKinematicsParameters
+from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.room import room, roomy_postures
 
 START = tuple(tc.load_robot("puma560").start.tolist())
-GIVEN = Placement.of(MotionScalingParameters(), START)
+PUMA = RobotParameters(robot="puma560")
+GIVEN = Placement.of(MotionScalingParameters(), PUMA, START)
 
 
 def path_of(name: str, seconds: float, seed: int = 1) -> AskedPath:
@@ -81,7 +83,8 @@ def test_there_are_24_turns_and_all_are_maps_that_parameters_take():
 
 def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path):
     placement = Placement(
-        start=START, axes=("+y", "-x", "+z"), coarse_gain=0.3, fine_gain=0.03, rotation_gain=0.25,
+        robot="puma560", start=START,
+        axes=("+y", "-x", "+z"), coarse_gain=0.3, fine_gain=0.03, rotation_gain=0.25,
         tool_axes=("-x", "+y", "-z"), tool_roll=-1.25,
     )  # fmt: skip
     file = tmp_path / "placement.yaml"
@@ -90,8 +93,9 @@ def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path):
     texts = shlex.split(" ".join(shlex.quote(text) for text in placement.texts()))
     ways = ({"files": [file]}, {"texts": texts}, {"settings": placement.settings()})
     for way in ways:
-        made = tc.configuration(robot="puma560", **way)
-        taken = Placement.of(made.group("motion_scaling"), made.group("slave_sim").start)
+        made = tc.configuration(**way)
+        slave = made.group("slave_sim")
+        taken = Placement.of(made.group("motion_scaling"), slave, slave.start)
         assert taken == placement
 
 
@@ -129,7 +133,8 @@ def test_no_tool_is_aimed_worse_than_a_cube_allows():
 def test_a_walk_tells_the_same_of_a_path_that_was_walked_before():
     walks = walker(path_of("da_vinci_36", 10.0))
     first = walks.walk(GIVEN)
-    walks.walk(Placement.of(MotionScalingParameters(coarse_gain=3.0, rotation_gain=0.5), START))
+    other = MotionScalingParameters(coarse_gain=3.0, rotation_gain=0.5)
+    walks.walk(Placement.of(other, PUMA, START))
     again = walks.walk(GIVEN)
     np.testing.assert_array_equal(first.q, again.q)
     np.testing.assert_array_equal(first.limit, again.limit)
@@ -139,7 +144,7 @@ def test_a_walk_tells_the_same_of_a_path_that_was_walked_before():
 def test_shares_and_causes_add_up_to_one():
     walked = walker(path_of("da_vinci_36", 20.0), "rcrt1")
     start = tuple(tc.load_robot("rcrt1").start.tolist())
-    found = walked.walk(Placement.of(MotionScalingParameters(), start))
+    found = walked.walk(Placement.of(MotionScalingParameters(), PUMA, start))
     assert found.share < 0.9
     assert abs(found.share + sum(found.causes.values()) - 1.0) < 1e-12
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import yaml
 
 from teleop_core.mapping.parameters import MotionScalingParameters
+from teleop_core.robots.parameters import RobotParameters
 
-Setting = float | list[float] | list[str]
+Setting = float | str | list[float] | list[str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,6 +15,8 @@ class Placement:
     """How a slave is put to a hand's motion.
 
     Attributes:
+        robot: Which slave: ``robot`` of the stages that have one.
+        geometry: Lengths and options in place of its published ones, ``symbol=value`` each.
         start: Joints (n,) [rad, m] from which the slave follows: ``slave_sim.start``.
         axes: The slave's x, y, z as axes of the master: ``motion_scaling.axes``.
         coarse_gain: Slave motion per hand motion in coarse mode.
@@ -23,6 +26,8 @@ class Placement:
         tool_roll: Turn [rad] of the tool about its axis, after that.
     """
 
+    robot: str
+    geometry: tuple[str, ...] = ()
     start: tuple[float, ...]
     axes: tuple[str, ...]
     coarse_gain: float
@@ -32,9 +37,13 @@ class Placement:
     tool_roll: float
 
     @staticmethod
-    def of(parameters: MotionScalingParameters, start: tuple[float, ...]) -> "Placement":
-        """Placement that parameters of motion scaling and a start make."""
+    def of(
+        parameters: MotionScalingParameters, slave: RobotParameters, start: tuple[float, ...]
+    ) -> "Placement":
+        """Placement that parameters of motion scaling, a slave and its start make."""
         return Placement(
+            robot=slave.robot,
+            geometry=slave.geometry,
             start=start,
             axes=parameters.axes,
             coarse_gain=parameters.coarse_gain,
@@ -51,7 +60,12 @@ class Placement:
             arm: Namespace of the arm that they are for; empty for the default one.
         """
         prefix = f"{arm}/" if arm else ""
-        return {
+        robot: dict[str, Setting] = {}
+        for stage in ("inverse_kinematics", "slave_sim"):
+            robot[f"{prefix}{stage}.robot"] = self.robot
+            if self.geometry:
+                robot[f"{prefix}{stage}.geometry"] = list(self.geometry)
+        return robot | {
             f"{prefix}slave_sim.start": list(self.start),
             f"{prefix}motion_scaling.axes": list(self.axes),
             f"{prefix}motion_scaling.coarse_gain": self.coarse_gain,
@@ -75,6 +89,8 @@ class Placement:
 
 
 def _text(value: Setting) -> str:
+    if isinstance(value, str):
+        return value
     if not isinstance(value, list):
         return repr(value)
     return "[" + ",".join(v if isinstance(v, str) else repr(v) for v in value) + "]"

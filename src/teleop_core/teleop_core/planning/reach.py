@@ -90,7 +90,7 @@ class Reach:
         """Whether the given parameters reach the goal, so that nothing is to be changed."""
         return self.given.placement == self.proposed.placement
 
-    def settings(self) -> dict[str, float | list[float] | list[str]]:
+    def settings(self) -> dict[str, float | str | list[float] | list[str]]:
         """Proposed parameters, as ``tc.replay(..., settings=...)`` takes them."""
         return self.proposed.placement.settings(self.arm)
 
@@ -218,7 +218,7 @@ def _reach(
     scaling, solving = made.group("motion_scaling", arm), made.group("inverse_kinematics", arm)
     whole = Walker(path.limited(_WHOLE), scaling, solving)
     start = made.group("slave_sim", arm).start or whole.robot.start.tolist()
-    given = Placement.of(scaling, tuple(start))
+    given = Placement.of(scaling, solving, tuple(start))
     done = 0
 
     def tell() -> None:
