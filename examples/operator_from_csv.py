@@ -27,8 +27,12 @@ def main() -> None:
         table = Path(folder, "circle.csv")
         write_table(table)
         recording = tc.run(operator=table, duration=5.0)
+    # The slave moves to where it starts first; the hand waits for that.
+    state = recording["teleop/state"]
+    begin = state.time[state["is_following"] > 0.0][0]
     for topic in ("master/measured_cp", "slave/measured_cp"):
-        position = recording[topic][["x", "y", "z"]]
+        stream = recording[topic]
+        position = stream[["x", "y", "z"]][stream.time >= begin]
         width = np.ptp(position, axis=0).max()
         print(f"{topic}: {1e3 * width:.1f} mm wide")
 

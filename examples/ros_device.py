@@ -5,16 +5,18 @@ Start the rest of the graph first, in other terminals or in the background::
     motion_scaling & inverse_kinematics & slave_sim &
 
 The device needs no part of this package, only the topics: it sends its pose and its buttons, and
-gets the force that it should apply.
+gets the force that it should apply. It rests until teleop/state says that the slave, which moves to
+where it starts first, follows.
 """
 
 import math
 import sys
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import qos_profile_action_status_default, qos_profile_sensor_data
 from sensor_msgs.msg import Joy
 
 SECONDS = 4.0
@@ -30,20 +32,18 @@ class Device(Node):
         self._buttons = self.create_publisher(Joy, "master/buttons", quality)
         self.create_subscription(WrenchStamped, "master/servo_cf", self._push, quality)
         self.create_subscription(PoseStamped, "slave/measured_cp", self._look, quality)
+        latched = qos_profile_action_status_default  # reliable; the last one comes late too
+        self.create_subscription(DiagnosticArray, "teleop/state", self._know, latched)
         self.forces, self.seen, self.ticks = 0, list[float](), 0
+        self.is_followed = False
         self.create_timer(0.002, self._tick)
-
-    @property
-    def is_read(self) -> bool:
-        """Whether somebody is there to follow."""
-        return self._poses.get_subscription_count() > 0 and bool(self.seen)
 
     def _tick(self) -> None:
         """Send one sample; a real device would read its encoders here."""
         pose, buttons = PoseStamped(), Joy(buttons=[0, 0, 0])
         pose.header.stamp = buttons.header.stamp = self.get_clock().now().to_msg()
         pose.header.frame_id = buttons.header.frame_id = "master_base"
-        self.ticks += self.is_read
+        self.ticks += self.is_followed
         pose.pose.position.x = 0.01 * (math.cos(math.pi * 0.002 * self.ticks) - 1.0)
         pose.pose.orientation.w = 1.0
         self._poses.publish(pose)
@@ -55,7 +55,12 @@ class Device(Node):
 
     def _look(self, message: PoseStamped) -> None:
         """See where the slave is: the master's x is the slave's -y."""
-        self.seen.append(float(message.pose.position.y))
+        if self.is_followed:
+            self.seen.append(float(message.pose.position.y))
+
+    def _know(self, message: DiagnosticArray) -> None:
+        """Hear what the slave does: ALIGNING, FOLLOWING or CLUTCHED."""
+        self.is_followed = message.status[0].message.startswith("FOLLOWING")
 
 
 def main() -> int:
