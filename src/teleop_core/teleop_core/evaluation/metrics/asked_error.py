@@ -41,17 +41,19 @@ class AskedErrorMetric(Metric):
 
     def add(self, window: Window) -> None:
         """Take one window."""
+        # The last command of the window before is in force until the first of this one.
+        before_ns, before = self._until_ns, self._command - self._cut
         stamps, asked = self._asked(window)
+        stamps = np.concatenate(([before_ns], stamps))
+        asked = np.concatenate((before[None], asked))
         measured = window.samples(SLAVE_MEASURED_CP)
-        at = latest(measured.stamp_ns, stamps) if len(stamps) else np.empty(0, np.int64)
-        if not len(at):
-            return
+        at = latest(measured.stamp_ns, stamps)
         places = np.where((at == NONE)[:, None], np.nan, asked[at])
         self._error.add(np.linalg.norm(measured.values[:, :3] - places, axis=1) * 1e3)
 
     def _asked(self, window: Window) -> tuple[Integers, Array]:
         """Stamps (N,) and asked places (N, 3) [m] of a window's commands; NaN if nothing is."""
-        hand, command = window.around(MASTER_MEASURED_CP), window.around(SLAVE_SERVO_CP)
+        hand, command = window.around(MASTER_MEASURED_CP), window.samples(SLAVE_SERVO_CP)
         is_new = command.stamp_ns > self._until_ns
         stamps, commands = command.stamp_ns[is_new], command.values[is_new, :3]
         partner = same_stamp(stamps, hand.stamp_ns)
