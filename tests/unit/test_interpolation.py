@@ -6,7 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
+from teleop_core.api import configuration
 from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
 from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.slave_sim import INTERPOLATIONS, CommandStatus, SlaveSim, SlaveSimParameters
 
@@ -159,6 +161,11 @@ def test_kinds_change_on_the_way_without_a_jump(first, then):
     # Commands run at constant speed, and so does the way, after a period to begin.
     steps = np.diff(found, axis=0)[100:]
     assert np.allclose(steps, 0.2e-3 * SPEED, rtol=1e-9, atol=0)
+
+
+def test_off_is_its_name_wherever_it_is_set():
+    said = configure(settings=["interpolation=off"]), configuration(interpolation="off")
+    assert [made.group("slave_sim").interpolation for made in said] == ["off", "off"]
 
 
 def test_a_still_command_after_other_kinds_is_a_still_way():
