@@ -154,8 +154,8 @@ def test_stages_of_a_user_run_between_ours_compiled_and_plain(teleop, package, t
         assert np.array_equal(before, after)
     goals, joints = common(twice, bag.read(topics.SLAVE_SERVO_JP))
     reached = np.array([load_robot("rcrt1").fk(q)[:3, 3] for q in joints[-100:]])
-    # After a sample that was lost the joints need some ticks to be there again.
-    assert np.median(np.abs(reached - goals[-100:, :3]).max(axis=1)) < 1e-9
+    # Noise of the device is faster than the joints, which are there again some ticks later.
+    assert np.median(np.abs(reached - goals[-100:, :3]).max(axis=1)) < 1e-4
 
 
 @pytest.mark.slow
