@@ -27,7 +27,11 @@ def own(name="own", **more):
 
 def slave(kind, **values):
     return SlaveSim(
-        SlaveSimParameters(controller=build(ControllerParameters, {"kind": kind}), **values)
+        SlaveSimParameters(
+            controller=build(ControllerParameters, {"kind": kind}),
+            start=tuple(ARM.home.tolist()),
+            **values,
+        )
     )
 
 
