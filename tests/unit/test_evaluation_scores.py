@@ -26,6 +26,7 @@ from teleop_core.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
+    SLAVE_REACH,
     SLAVE_SERVO_CP,
     SLAVE_SERVO_JP,
     SLAVE_SETPOINT_CP,
@@ -334,6 +335,8 @@ def console(width=80):
 
 def test_command_writes_table_scores_and_page(recipe, path, tmp_path):
     recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.5e-3
+    followed = np.zeros((len(recipe.stamps), len(SLAVE_REACH.columns)))
+    recipe.rows[SLAVE_REACH] = (recipe.stamps, followed, recipe.stamps)
     recipe.write(path)
     shown = console()
     target, page = tmp_path / "scores.json", tmp_path / "page.html"
