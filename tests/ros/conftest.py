@@ -166,7 +166,13 @@ class Peer:
         self, name: str, wait: str = "active", arm: str = "", env: Mapping[str, str] | None = None,
         **parameters: Any,
     ) -> NodeProcess:  # fmt: skip
-        """Start a node; double underscores in names stand for dots."""
+        """Start a node; double underscores in names stand for dots.
+
+        A slave starts at home unless it is told otherwise, so that it follows at once.
+        """
+        if name == "slave_sim":
+            home = load_robot(parameters.get("robot", "rcrt1")).home.tolist()
+            parameters = {"start": home} | parameters
         named = {key.replace("__", "."): value for key, value in parameters.items()}
         node = NodeProcess(name, named, self.domain, self._folder, arm, env)
         self.nodes.append(node)

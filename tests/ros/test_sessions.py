@@ -269,7 +269,8 @@ def test_a_second_publisher_of_commands_is_reported(peer):
 
 @pytest.mark.slow
 def test_nodes_give_bit_equal_motion_to_the_core_for_the_same_commands(peer):
-    session = VirtualTime(configure("free_motion"))
+    settings = [f"slave_sim.start={HOME.tolist()}", "motion_scaling.reach_force.is_on=false"]
+    session = VirtualTime(configure("free_motion", settings=settings))
     poses = session.run(2500)["slave_servo_cp"]
     listeners = [
         peer.listen(topic)
@@ -320,6 +321,7 @@ def _slave_ticks(peer, measured, setpoints):
 
 def _core_answers(poses, stamps):
     stage = InverseKinematics(InverseKinematicsParameters(feedback_timeout=5.0))
+    stage.signals["slave_setpoint_js"] = HOME
     answers = []
     for stamp in stamps:
         stage.signals["slave_servo_cp_ns"] = stamp
@@ -330,7 +332,7 @@ def _core_answers(poses, stamps):
 
 
 def _assert_core_slave_moves_alike(unseen, commands, setpoints, measured):
-    stage = SlaveSim(SlaveSimParameters())
+    stage = SlaveSim(SlaveSimParameters(start=tuple(HOME.tolist())))
     row = stage.signals
     for tick in range(unseen):
         row["now_ns"] = measured.stamps[0] - (unseen - tick) * MS

@@ -19,6 +19,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.live import live
 from teleop_core.nodes.real_time import apply_options
+from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.layers import RealTimeParameters
 from teleop_core.session.virtual import VirtualTime
@@ -36,6 +37,7 @@ def session(peer, tmp_path):
     parameters = {
         "recorder": {"out": str(tmp_path / "bag")},
         "haptic_master": {"operator": {"approach_time": 1.0}, "patience": 0.0},
+        "slave_sim": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
     }
     file = tmp_path / "session.yaml"
     file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))

@@ -22,6 +22,8 @@ class SlaveSimNode(TickingNode):
     def concerns(self) -> list[str]:
         """A slave that holds still because nothing sound tells it where to go."""
         status = CommandStatus(int(self.row["command_status"]))
+        if status is CommandStatus.MOVING:
+            return ["moves to where it starts, and follows then"]
         servo_jp = self.input(SLAVE_SERVO_JP)
         if servo_jp.stamp_ns is None:
             return ["waits for slave/servo_jp and holds"]

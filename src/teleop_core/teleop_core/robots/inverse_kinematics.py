@@ -68,7 +68,7 @@ _STATUS, _LIMIT, _JOINT, _RESIDUAL, _CUT = 0, 1, 2, 3, 5
 _NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
 _SINGULAR, _SLOW = int(Limit.SINGULARITY), int(Limit.SPEED)
 _FOLLOWED, _NEAR_SINGULAR = int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR)
-_STATE = [(name, "i8") for name in ("last_ns", "asked", "limited", "limit", "joint")]
+_STATE = [(name, "i8") for name in ("first_ns", "last_ns", "asked", "limited", "limit", "joint")]
 # A step [rad or m] that no speed limit is: a path still, but one that has all the time it needs.
 _ANY_STEP = 1e6
 # A joint this close to its limit [rad or m] is at it.
@@ -133,8 +133,11 @@ def inverse_kinematics_step(p: Any, s: Any, solver: Any, row: Any, dt: float) ->
     if s.last_ns == 0 or elapsed_ns <= 0:
         elapsed_ns = round(dt * 1e9)
     elapsed_ns = min(elapsed_ns, p.longest_ns)
-    is_followed = s.last_ns - row.slave_setpoint_js_ns <= max(p.timeout_ns, 2 * elapsed_ns)
-    if row.slave_setpoint_js_ns == 0 or not is_followed:
+    if s.last_ns == 0:
+        s.first_ns = row.slave_servo_cp_ns
+    answered_ns = row.slave_setpoint_js_ns if row.slave_setpoint_js_ns != 0 else s.first_ns
+    is_followed = s.last_ns - answered_ns <= max(p.timeout_ns, 2 * elapsed_ns)
+    if s.last_ns == 0 or not is_followed:
         copy(row.slave_setpoint_js, seed)
     s.last_ns = row.slave_servo_cp_ns
     for i in range(q.shape[0]):
