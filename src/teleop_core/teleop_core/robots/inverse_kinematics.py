@@ -181,7 +181,7 @@ class InverseKinematics(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Start from home."""
+        """Start from where the slave is, as the first pose finds it."""
         self._solver.seed[:] = self.robot.home
         assign(self.state, 0)
         self._told = 0, 0
