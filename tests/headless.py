@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import select
 import subprocess
 from itertools import count
 
@@ -12,6 +13,8 @@ FLAGS = (
     "--disable-sync", "--disable-extensions", "--hide-scrollbars",
     "--host-resolver-rules=MAP * ~NOTFOUND", "--remote-debugging-pipe",
 )  # fmt: skip
+SILENCE = 200.0
+"""Time after which a browser that does not answer has failed, [s]."""
 
 
 class Headless:
@@ -34,7 +37,7 @@ class Headless:
         )
         os.close(read_there)
         os.close(write_there)
-        self._in, self._out = os.fdopen(read_here, "rb"), os.fdopen(write_here, "wb")
+        self._in, self._out, self._heard = read_here, os.fdopen(write_here, "wb"), b""
         self._numbers, self._session, self.said = count(1), None, []
         targets = self.call("Target.getTargets")["targetInfos"]
         page = next(target["targetId"] for target in targets if target["type"] == "page")
@@ -51,7 +54,7 @@ class Headless:
         self._session = None
         self.call("Browser.close")
         self._process.wait(30)
-        self._in.close()
+        os.close(self._in)
         self._out.close()
 
     def call(self, method, **parameters):
@@ -70,11 +73,13 @@ class Headless:
             self._note(answer)
 
     def _read(self):
-        data = bytearray()
-        while (byte := self._in.read(1)) != b"\0":
-            assert byte, "the browser has gone"
-            data += byte
-        return data
+        while b"\0" not in self._heard:
+            assert select.select([self._in], [], [], SILENCE)[0], "the browser is silent"
+            more = os.read(self._in, 1 << 16)
+            assert more, "the browser has gone"
+            self._heard += more
+        message, _, self._heard = self._heard.partition(b"\0")
+        return message
 
     def _note(self, event):
         if event.get("method") == "Runtime.exceptionThrown":
@@ -103,11 +108,13 @@ class Headless:
             "document.body && (document.body.dataset.finished || document.body.dataset.errors)"
         )
 
-    def until(self, condition):
-        """Wait until an expression is true."""
+    def until(self, condition, seconds=60):
+        """Wait until an expression is true, but not for ever."""
         self.value(
-            "new Promise((done) => { const look = () => "
-            f"({condition}) ? done(true) : setTimeout(look, 20); look(); }})"
+            "new Promise((done, fail) => { const end = performance.now() + "
+            f"{1000 * seconds}; const look = () => ({condition}) ? done(true) : "
+            "performance.now() > end ? fail(new Error('waited in vain')) : setTimeout(look, 20); "
+            "look(); })"
         )
 
     def settled(self):

@@ -12,6 +12,7 @@ class Plot {
     this.figure = figure;
     this.place = document.getElementById(figure.id);
     this.recording = recording;
+    this.arrays = arrays;
     this.layout = laidOut(resolved(figure.layout, arrays));
     // Axes that time_axis() of figure.py made.
     this.axes = Object.keys(this.layout).filter((key) => /^xaxis/.test(key) && this.layout[key].uirevision === TIME);
@@ -160,10 +161,11 @@ class Plot {
     this.place.style.height = `${this.layout.height}px`;
   }
 
+  // Draw anew: axes keep the places that they once had.
   async refit() {
-    this.fit();
-    const { grid, height, margin, font } = this.layout;
-    await Plotly.relayout(this.place, { height, margin, font, ...(grid ? { grid } : {}) });
+    Plotly.purge(this.place);
+    this.layout = laidOut(resolved(this.figure.layout, this.arrays));
+    await this.draw();
   }
 }
 
@@ -172,7 +174,7 @@ function resolved(tree, arrays) {
   if (Array.isArray(tree)) return tree.map((branch) => resolved(branch, arrays));
   if (tree === null || typeof tree !== "object") return tree;
   const keys = Object.keys(tree);
-  if (keys.length === 1 && keys[0] === "array") return arrays[tree.array];
+  if (keys.length === 1 && typeof tree.array === "number") return arrays[tree.array];
   return Object.fromEntries(keys.map((key) => [key, resolved(tree[key], arrays)]));
 }
 
