@@ -145,7 +145,11 @@ class Bag:
         for source, records in self._records(columns):
             block = {}
             for name, column in columns.items():
-                own = np.flatnonzero(np.isin(records.channel, _numbers(source, name)))
+                numbers = _numbers(source, name)
+                is_own = records.channel == numbers[0] if numbers else np.False_
+                for number in numbers[1:]:  # np.isin would cost as much as reading
+                    is_own = is_own | (records.channel == number)
+                own = np.flatnonzero(is_own)
                 if not len(own):
                     continue
                 try:
