@@ -169,28 +169,27 @@ def _move_to_start(p: Any, s: Any) -> None:
 def _take_command(p: Any, s: Any, row: Any, dt: float) -> int:
     """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
 
-    A jump is farther from the last command than full speed reaches in the command timeout, or in
-    the time since that command: no stream can be that far.
+    A jump is farther from the command in force than full speed reaches in the command timeout, or
+    in the time since the message before: no stream can be that far.
     """
     stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
-    if s.moved_ticks < p.start_ticks:
-        s.seen_ns = max(s.seen_ns, stamp)
-        return 3
     if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
         s.refused += 1
         return 2
+    if s.moved_ticks < p.start_ticks:
+        s.seen_ns = max(s.seen_ns, stamp)
+        return 3
     if stamp > s.seen_ns:
+        period_ns = min(stamp - s.seen_ns, _SLOWEST_NS) if s.seen_ns > 0 else 0
         s.seen_ns = stamp
-        period_ns = 0
-        if s.command_stamp_ns != 0:
-            period_ns = min(stamp - s.command_stamp_ns, _SLOWEST_NS)
         far = max(p.timeout_ns, period_ns) * 1e-9
         for i in range(s.command.shape[0]):
             near = abs(row.slave_servo_jp[i] - s.target[i]) <= p.speed_limit[i] * far
             if not near:  # NaN is not near either
                 s.refused += 1
                 return 2
-        begin_way(p, s, row.slave_servo_jp, period_ns, dt)
+        # Commands whose stamps run ahead of the clock that they come by are as near as they come.
+        begin_way(p, s, row.slave_servo_jp, min(period_ns, now_ns - s.arrival_ns), dt)
         s.command_stamp_ns, s.arrival_ns = stamp, now_ns
     return 1 if now_ns - s.arrival_ns > p.timeout_ns else 0
 
