@@ -28,6 +28,7 @@ from teleop_core.topics import STREAMS
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = list(STAGES)
+HOME = load_robot("rcrt1").home.tolist()
 MS = 1_000_000
 
 
@@ -37,7 +38,8 @@ def session(peer, tmp_path):
     parameters = {
         "recorder": {"out": str(tmp_path / "bag")},
         "haptic_master": {"operator": {"approach_time": 1.0}, "patience": 0.0},
-        "slave_sim": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
+        "slave_sim": {"start": HOME},  # follows at once
+        "motion_scaling": {"reach_force": {"is_on": False}},
     }
     file = tmp_path / "session.yaml"
     file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))
@@ -89,7 +91,8 @@ def test_a_composed_session_computes_what_virtual_time_computes(peer, session, t
     assert session.wait(30) == 0
     bag = Bag(tmp_path / "bag")
     live_poses = bag.read(topics.MASTER_MEASURED_CP).values
-    settings = ["operator.approach_time=1.0"]
+    settings = ["operator.approach_time=1.0", "haptic_master.patience=0.0",
+                f"slave_sim.start={HOME}", "motion_scaling.reach_force.is_on=false"]  # fmt: skip
     virtual = VirtualTime(configure(settings=settings)).run(len(live_poses))
     # No force acts without a box, so the hand moves alike; its sample is the same, bit for bit.
     assert np.array_equal(live_poses, virtual["master_measured_cp"])
