@@ -213,7 +213,7 @@ def every(period_ns, end_ns=4_000_000_000):
     return np.arange(1_000_000_000, end_ns, period_ns, dtype=np.int64)
 
 
-@pytest.mark.parametrize("interpolation", ["off", "linear", "minimum_jerk"])
+@pytest.mark.parametrize("interpolation", ["none", "linear", "minimum_jerk"])
 @pytest.mark.parametrize("rate_hz", [10, 30, 125, 250, 500])
 def test_a_slow_master_costs_one_of_its_periods_and_no_more(rate_hz, interpolation):
     times, fast = setpoints(every(TICK_NS))
@@ -224,7 +224,7 @@ def test_a_slow_master_costs_one_of_its_periods_and_no_more(rate_hz, interpolati
     same = np.stack([np.interp(slow_times[after], times, c) for c in fast.T], axis=1)
     off = np.linalg.norm((slow[after] - slow[-1]) - (same - fast[-1]), axis=1)
     # Held for a period at most, and with interpolation reached another period later.
-    periods = 1.0 if interpolation == "off" else 2.0
+    periods = 1.0 if interpolation == "none" else 2.0
     assert off.max() < periods * period * SPEED + 1e-4
     assert np.linalg.norm(slow[-1] - slow[0]) == pytest.approx(30e-3, abs=1e-4)
 

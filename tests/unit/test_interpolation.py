@@ -6,9 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
-from teleop_core.api import configuration
 from teleop_core.robots import load_robot
-from teleop_core.session.configuration import configure
 from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.slave_sim import INTERPOLATIONS, CommandStatus, SlaveSim, SlaveSimParameters
 
@@ -75,7 +73,7 @@ def test_linear_way_is_the_straight_line_between_commands(period):
 
 def test_without_interpolation_a_command_is_in_force_at_once_and_held():
     commands = wander(6, 20)
-    found = way("off", commands, [20] * 5, after=20)
+    found = way("none", commands, [20] * 5, after=20)
     assert np.array_equal(found, np.repeat(commands, 20, axis=0))
 
 
@@ -163,15 +161,10 @@ def test_kinds_change_on_the_way_without_a_jump(first, then):
     assert np.allclose(steps, 0.2e-3 * SPEED, rtol=1e-9, atol=0)
 
 
-def test_off_is_its_name_wherever_it_is_set():
-    said = configure(settings=["interpolation=off"]), configuration(interpolation="off")
-    assert [made.group("slave_sim").interpolation for made in said] == ["off", "off"]
-
-
 def test_a_still_command_after_other_kinds_is_a_still_way():
     slave = SlaveSim(SlaveSimParameters(robot="planar_3r", interpolation="minimum_jerk"))
     row, found = slave.signals, []
-    kinds = {100: "off", 200: "linear", 300: "minimum_jerk"}
+    kinds = {100: "none", 200: "linear", 300: "minimum_jerk"}
     for tick in range(500):
         if tick in kinds:
             slave.retune(SlaveSimParameters(robot="planar_3r", interpolation=kinds[tick]))

@@ -201,7 +201,7 @@ def configured(interpolation):
 @pytest.mark.parametrize(
     ("interpolation", "period_ms", "delay_ms", "shown"),
     [("linear", 8, 8.0, "linear, 8 ms"), ("minimum_jerk", 33, 33.0, "minimum jerk, 33 ms"),
-     ("off", 8, 0.0, "off"), ("linear", 1, 0.0, "linear")],
+     ("none", 8, 0.0, "none"), ("linear", 1, 0.0, "linear")],
 )  # fmt: skip
 def test_interpolation_is_late_by_a_period_of_slow_commands(
     path, interpolation, period_ms, delay_ms, shown

@@ -233,6 +233,4 @@ def _as_element(spec: Spec, value: object) -> object:
             return float(value)
         except ValueError:
             return value
-    if isinstance(value, bool) and (word := "on" if value else "off") in spec.choices:
-        return word  # YAML 1.1 reads both as truth values
     return str(value) if spec.element is str and isinstance(value, int | float) else value

@@ -39,7 +39,7 @@ class CommandStatus(IntEnum):
     MOVING = 3  # on the way to where the slave starts: nothing is followed yet
 
 
-INTERPOLATIONS = ("off", "linear", "minimum_jerk")
+INTERPOLATIONS = ("none", "linear", "minimum_jerk")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -149,7 +149,7 @@ class ReachMetric(Metric):
     def _delay_ms(self, period_us: int | None) -> float | None:
         if self._interpolation is None or not period_us:
             return None
-        is_slow = self._interpolation != "off" and period_us > 1.5e6 * DT
+        is_slow = self._interpolation != "none" and period_us > 1.5e6 * DT
         return period_us * 1e-3 if is_slow else 0.0
 
     def rows(self) -> list[Row]:
