@@ -1,5 +1,6 @@
 """Reach: for how much of the time the slave could do what the hand asked for, and why not."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -180,7 +181,8 @@ def _way(score: ReachScore) -> str:
 
 
 def _percent(share: float | None) -> str:
-    return MISSING if share is None else f"{100.0 * share:.1f}"
+    """Text in percent, rounded down, so that 100 means always."""
+    return MISSING if share is None else f"{math.floor(1000.0 * share + 1e-9) / 10.0:.1f}"
 
 
 def _number(share: float | None) -> float | None:
