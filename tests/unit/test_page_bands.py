@@ -55,8 +55,6 @@ def test_each_cause_has_its_stretches(tmp_path):
     assert set(found) == set(expected)
     for cause, stretches in expected.items():
         assert np.allclose(found[cause].stretches, stretches, rtol=0, atol=ROUNDING), cause
-        length = np.diff(stretches).sum()
-        assert np.isclose(found[cause].share, length / 2.999)
 
 
 def test_recording_that_does_not_tell_limits_has_no_bands(tmp_path):

@@ -14,11 +14,16 @@ from teleop_core.topics import Limit
 _STRETCHES = 20_000  # per cause; more than a screen has pixels
 _FINEST_S = 1e-3
 # Told apart without seeing red or green too; none is the colour of a curve.
+LIMIT_COLORS = {
+    Limit.JOINT: "#e8590c", Limit.WORKSPACE: "#7048e8", Limit.SINGULARITY: "#d6336c",
+    Limit.SPEED: "#15aabf",
+}  # fmt: skip
+"""Colour of each cause on every page, as in CSS."""
 _COLORS = {
-    Limit.JOINT: ("joint limit", "#e8590c"),
-    Limit.WORKSPACE: ("outside of the workspace", "#7048e8"),
-    Limit.SINGULARITY: ("near a singularity", "#d6336c"),
-    Limit.SPEED: ("speed limit", "#15aabf"),
+    Limit.JOINT: ("joint limit", LIMIT_COLORS[Limit.JOINT]),
+    Limit.WORKSPACE: ("outside of the workspace", LIMIT_COLORS[Limit.WORKSPACE]),
+    Limit.SINGULARITY: ("near a singularity", LIMIT_COLORS[Limit.SINGULARITY]),
+    Limit.SPEED: ("speed limit", LIMIT_COLORS[Limit.SPEED]),
 }
 _CLUTCHED = ("clutched", "#adb5bd")
 
@@ -32,13 +37,11 @@ class Band:
         color: As in CSS.
         stretches: Begin and end of each from the start of the recording, in their order and apart
             from each other, shape (N, 2), [s].
-        share: Share of the recording, 0 to 1.
     """
 
     cause: str
     color: str
     stretches: Array
-    share: float
 
 
 def bands_of(context: Context) -> tuple[Band, ...]:
@@ -56,9 +59,7 @@ def bands_of(context: Context) -> tuple[Band, ...]:
     for (cause, color), is_so in masks:
         stretches = stretches_of(history, is_so, bag.start_ns, bag.end_ns)
         if len(stretches):
-            length = max(1e-9, (bag.end_ns - bag.start_ns) * 1e-9)
-            share = float((stretches[:, 1] - stretches[:, 0]).sum()) / length
-            found.append(Band(_named(cause, history, is_so), color, merged(stretches), share))
+            found.append(Band(_named(cause, history, is_so), color, merged(stretches)))
     return tuple(found)
 
 

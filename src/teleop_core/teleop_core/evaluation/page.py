@@ -144,13 +144,12 @@ def _section(number: int, study: Study, plots: list[Figure], places: list[str]) 
 
 
 def _legend(bands: Sequence[Band]) -> str:
-    """What the bands mean, and their share of the time."""
+    """What the bands mean; how much of the time it was stands in the table."""
     entries = "".join(
-        f'<span><i style="background:{escape(band.color)}"></i>{escape(band.cause)} '
-        f"{100.0 * band.share:.1f} %</span>"
+        f'<span><i style="background:{escape(band.color)}"></i>{escape(band.cause)}</span>'
         for band in bands
     )
-    return f'<p class="bands">{entries}</p>' if entries else ""
+    return f'<p class="bands">In the state: {entries}</p>' if entries else ""
 
 
 def _card(plot: Figure, place: str, bands: Sequence[Band]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import plotly.graph_objects as plots
 from plotly.subplots import make_subplots
 
+from teleop_core.evaluation.bands import LIMIT_COLORS
 from teleop_core.geometry import Array, rotation_vectors
 from teleop_core.planning.asked import AskedPath
 from teleop_core.planning.reach import Followed, Reach
@@ -17,13 +18,7 @@ from teleop_core.planning.walk import Walked
 from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.topics import Limit
 
-COLORS = {
-    Limit.NONE: "#1c7c54",
-    Limit.JOINT: "#e8590c",
-    Limit.WORKSPACE: "#7048e8",
-    Limit.SINGULARITY: "#d6336c",
-    Limit.SPEED: "#15aabf",
-}
+COLORS = {Limit.NONE: "#1c7c54", **LIMIT_COLORS}
 """Of samples that are followed, and of those that are not by their causes."""
 # More points than these make the page slow and the picture no clearer.
 _POINTS, _WORKSPACE, _BINS = 6_000, 3_000, 1_500
