@@ -6,8 +6,10 @@ from itertools import groupby
 import numpy as np
 import pytest
 from rich.console import Console
+from scipy.spatial.transform import Rotation
 
 from recipes import JOINTS, START_NS, Recipe, state
+from teleop_core.api import configuration
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
@@ -15,6 +17,8 @@ from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.scoring import evaluate
 from teleop_core.evaluation.table import MET, NOT_MET, score_tables
 from teleop_core.evaluation.windows import windows
+from teleop_core.mapping.motion_scaling import MotionScaling
+from teleop_core.mapping.parameters import MotionScalingParameters
 from teleop_core.signals import STATE_FIELDS, TICK_NS
 from teleop_core.topics import (
     MASTER_MEASURED_CP,
@@ -288,6 +292,54 @@ def test_an_error_against_the_setpoint_hides_what_the_asked_error_tells(path):
     score = evaluate(session.write(path))
     assert score.command_error_mm.max < EXACT_MM
     assert score.value("asked_error_mm.max") == pytest.approx(20.0, abs=EXACT_MM)
+
+
+def turned_session(cut_from=COUNT, **parameters):
+    """A session whose hand turns; from some tick on the tool no longer turns with it."""
+    rng = np.random.default_rng(9)
+    session, scaling = Session(), MotionScaling(MotionScalingParameters(**parameters))
+    row = scaling.signals
+    turns = Rotation.from_rotvec(2e-3 * rng.normal(size=(COUNT, 3)))
+    attitude, hands, commands = Rotation.identity(), np.zeros((COUNT, 7)), np.zeros((COUNT, 7))
+    row["slave_setpoint_cp"] = session.values(SLAVE_SERVO_CP)[0]
+    for i, stamp_ns in enumerate(session.stamps):
+        attitude = turns[i] * attitude
+        row["master_measured_cp"][3:] = attitude.as_quat(scalar_first=True)
+        row["master_measured_cp_ns"] = stamp_ns
+        row["slave_setpoint_cp_ns"] = stamp_ns - TICK_NS
+        scaling.step()
+        hands[i], commands[i] = row["master_measured_cp"], row["slave_servo_cp"]
+        row["slave_setpoint_cp"] = row["slave_servo_cp"]
+    commands[cut_from:] = commands[cut_from - 1]
+    session.rows[MASTER_MEASURED_CP] = (session.stamps, hands, session.stamps)
+    for topic in (SLAVE_SERVO_CP, SLAVE_MEASURED_CP):
+        session.values(topic)[:] = commands
+    texts = configuration(settings={f"motion_scaling.{n}": v for n, v in parameters.items()}).text()
+    session.metadata["configuration"] = texts
+    return session, Rotation.from_quat(hands[:, 3:], scalar_first=True)
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [{}, {"tool_roll": 0.4}, {"axes": ("+x", "+y", "+z"), "tool_axes": ("-x", "+y", "-z")}],
+)  # fmt: skip
+def test_a_tool_that_turns_as_the_hand_is_where_it_was_asked_to_be(path, parameters):
+    session, _ = turned_session(**parameters)
+    assert evaluate(session.write(path)).asked_error_deg.max < 1e-5
+
+
+def test_asked_error_of_a_tool_that_is_held_is_the_turn_of_the_hand_since(path):
+    session, hand = turned_session(cut_from=7000)
+    off = np.degrees((hand[6999].inv() * hand[6999:]).magnitude())
+    error = evaluate(session.write(path)).asked_error_deg
+    assert off.max() > 5.0
+    assert error.max == pytest.approx(off.max(), abs=1e-5)
+    assert error.rms == pytest.approx(np.sqrt(np.sum(off**2) / COUNT), abs=1e-4)
+
+
+def test_a_tool_that_turns_less_than_the_hand_has_no_asked_orientation(path):
+    session, _ = turned_session(rotation_gain=0.5)
+    assert evaluate(session.write(path)).asked_error_deg.max is None
 
 
 # -- published figures -----------------------------------------------------------------------------

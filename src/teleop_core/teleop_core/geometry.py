@@ -250,6 +250,17 @@ def rotations_from_quaternions(quaternions: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def quaternion_products(a: Array, b: Array) -> Array:
+    """Quaternions (N, 4), w, x, y, z, of rotations ``b`` followed by ``a``; either may be (4,)."""
+    w, x, y, z = np.moveaxis(np.asarray(a), -1, 0)
+    p, q, r, s = np.moveaxis(np.asarray(b), -1, 0)
+    rows = (
+        w * p - x * q - y * r - z * s, w * q + x * p + y * s - z * r,
+        w * r - x * s + y * p + z * q, w * s + x * r - y * q + z * p,
+    )  # fmt: skip
+    return np.stack(rows, axis=-1)
+
+
 def rotation_vectors(quaternions: Array) -> Array:
     """Turns since the first of a series of unit quaternions (N, 4), w, x, y, z.
 

@@ -11,7 +11,7 @@ from teleop_core.errors import ParameterError, TeleopError
 from teleop_core.geometry import Array
 from teleop_core.graph import Graph, build_graph
 from teleop_core.mapping.motion_scaling import MOTION_SCALING
-from teleop_core.mapping.parameters import AXES, MotionScalingParameters, axis_map
+from teleop_core.mapping.parameters import AXES, MotionScalingParameters, axis_map, tool_maps
 from teleop_core.master.haptic_master import HAPTIC_MASTER
 from teleop_core.parameters import build
 from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer
@@ -20,6 +20,7 @@ from teleop_core.stage import STAGES
 from teleop_core.topics import Topic
 
 _GRAPH = ("arms", "stages", "delays")
+_TOOL = ("axes", "tool_axes", "tool_roll", "rotation_gain")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +32,15 @@ class Origin:
         axes: Rotation (3, 3) from the master's base to the slave's axes.
         operator: What is stored of ``haptic_master.operator``, by names below it.
         interpolation: How the slave goes from command to command; None if it is not told.
+        tool: Quaternions (4,) of the maps from the master's base to the slave's axes, and from the
+            stylus to the tool; None where the tool does not turn as much as the stylus.
     """
 
     graph: Graph
     axes: Array
     operator: Mapping[str, object] = field(default_factory=dict)
     interpolation: str | None = None
+    tool: tuple[Array, Array] | None = None
 
     @cached_property
     def chain(self) -> tuple[tuple[str, Topic], ...]:
@@ -66,8 +70,9 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
     """
     layer = _layer(bag)
     return Origin(
-        _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm)
-    )
+        _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
+        _tool(layer, arm),
+    )  # fmt: skip
 
 
 def _layer(bag: Bag) -> Layer:
@@ -98,6 +103,18 @@ def _interpolation(layer: Layer, arm: str) -> str | None:
     name = SLAVE_SIM.name
     said = (layer.get(name, {}) | layer.get(f"{arm}/{name}", {})).get("interpolation")
     return said if isinstance(said, str) else None
+
+
+def _tool(layer: Layer, arm: str) -> tuple[Array, Array] | None:
+    """Maps of the tool's orientation, as far as they are told, of the arm or of all arms."""
+    name = MOTION_SCALING.name
+    said = layer.get(name, {}) | layer.get(f"{arm}/{name}", {})
+    try:
+        values = {key: said[key] for key in _TOOL if key in said}
+        parameters = build(MotionScalingParameters, values, f"{name}.")
+    except TeleopError:
+        parameters = MotionScalingParameters()
+    return tool_maps(parameters) if parameters.rotation_gain == 1.0 else None
 
 
 def _operator(layer: Layer, arm: str) -> Mapping[str, object]:

@@ -49,6 +49,11 @@ def pose_errors(poses: Array, references: Array) -> PoseErrors:
     return PoseErrors(distance * 1e3, difference, np.degrees(_angle(a, b)), is_degenerate)
 
 
+def angles_between(quaternions: Array, others: Array) -> Array:
+    """Angles (N,) [rad] between orientations (N, 4) of any length; NaN without a direction."""
+    return _angle(_unit(quaternions), _unit(others))
+
+
 def _unit(quaternions: Array) -> Array:
     """Quaternions of unit length; NaN for those of none."""
     norm = np.sqrt(np.einsum("ij,ij->i", quaternions, quaternions))

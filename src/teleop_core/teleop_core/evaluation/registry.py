@@ -83,6 +83,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "path": f"{_FOLDER}.path:PathMetric",
         "reach": f"{_FOLDER}.reach:ReachMetric",
         "asked_error_mm": f"{_FOLDER}.asked_error:AskedErrorMetric",
+        "asked_error_deg": f"{_FOLDER}.asked_error:AskedTurnMetric",
         "position_error_mm": f"{_FOLDER}.position_error:PositionErrorMetric",
         "orientation_error_deg": f"{_FOLDER}.orientation_error:OrientationErrorMetric",
         "command_error_mm": f"{_FOLDER}.command_error:CommandErrorMetric",

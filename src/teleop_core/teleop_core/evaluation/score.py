@@ -192,6 +192,11 @@ class Score:
         return self.record("asked_error_mm", Spread)
 
     @property
+    def asked_error_deg(self) -> Spread:
+        """Angle between the tool and how the hand would have turned it, [deg]."""
+        return self.record("asked_error_deg", Spread)
+
+    @property
     def position_error_mm(self) -> Spread:
         """Distance of the slave's tip from its reference, [mm]."""
         return self.record("position_error_mm", Spread)

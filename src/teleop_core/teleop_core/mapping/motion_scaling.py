@@ -9,9 +9,7 @@ from teleop_core.fixtures import FIXTURES, shape_of
 from teleop_core.geometry import (
     Array,
     multiply_quaternions,
-    quaternion_from_rotation,
     rotate_by_vector,
-    rotation,
     turn_within,
 )
 from teleop_core.kernels import inner, kernel, records
@@ -31,6 +29,7 @@ from teleop_core.mapping.parameters import (
     MotionScalingParameters,
     ReachForceParameters,
     axis_map,
+    tool_maps,
 )
 from teleop_core.mapping.walls import wall_force
 from teleop_core.parameters import values_of
@@ -266,12 +265,8 @@ class MotionScaling(RunningStage):
         """Take new parameters from the next sample on; nothing moves. A new mode is switched to."""
         p, fixture = self.parameters, parameters.fixture
         p["gain"] = parameters.coarse_gain, parameters.fine_gain
-        tool = axis_map("tool_axes", parameters.tool_axes).T @ rotation("z", parameters.tool_roll)
         axes = axis_map("axes", parameters.axes)
-        quaternion = np.empty(4)
-        for name, matrix in (("stylus_tool", tool), ("slave_master", axes)):
-            quaternion_from_rotation(np.ascontiguousarray(matrix), quaternion)
-            p[name] = quaternion
+        p["slave_master"], p["stylus_tool"] = tool_maps(parameters)
         p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
         self._take_fixture(fixture)
         p["stiffness"] = math.inf if fixture.wall == "hard" else fixture.stiffness

@@ -7,7 +7,7 @@ import numpy as np
 
 from teleop_core.errors import ParameterError
 from teleop_core.fixtures import FIXTURES
-from teleop_core.geometry import Array
+from teleop_core.geometry import Array, quaternion_from_rotation, rotation
 from teleop_core.parameters import Choice, choice, parameter
 
 MODES = ("coarse", "fine")
@@ -104,3 +104,16 @@ def axis_map(name: str, axes: tuple[str, ...]) -> Array:
     if not math.isclose(float(np.linalg.det(matrix)), 1.0):
         raise ParameterError(name, axes, "three axes at right angles that do not mirror")
     return matrix
+
+
+def tool_maps(parameters: MotionScalingParameters) -> tuple[Array, Array]:
+    """Quaternions (4,) from the master's base to the slave's axes, and from the stylus to the tool.
+
+    Source:
+        Vongbunyong 2008, section 6.2.
+    """
+    tool = axis_map("tool_axes", parameters.tool_axes).T @ rotation("z", parameters.tool_roll)
+    found = np.empty(4), np.empty(4)
+    for matrix, quaternion in zip((axis_map("axes", parameters.axes), tool), found, strict=True):
+        quaternion_from_rotation(np.ascontiguousarray(matrix), quaternion)
+    return found
