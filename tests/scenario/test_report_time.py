@@ -353,8 +353,8 @@ def test_every_plot_against_time_has_the_bands_of_the_state(opened, short):
         assert np.allclose(found["joint limit (joint 3)"], [[4.0, 6.5], [12.0, 15.0]], atol=1e-6)
         assert np.allclose(found["speed limit"], [[9.0, 9.25]], atol=1e-6)
     legend = tab.value("document.querySelector('.bands').textContent")
-    assert "joint limit (joint 3) 27.5 %" in legend
-    assert "speed limit 1.3 %" in legend
+    assert "joint limit (joint 3)" in legend
+    assert "speed limit" in legend
 
 
 # -- paths -----------------------------------------------------------------------------------------

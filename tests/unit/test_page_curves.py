@@ -54,7 +54,7 @@ def test_sketch_keeps_peaks_and_stays_small():
 
 
 def test_sketch_shows_bands_behind_curves():
-    band = Band("<speed> limit", "#123456", np.array([[1.0, 2.0], [5.0, 5.5]]), 0.15)
+    band = Band("<speed> limit", "#123456", np.array([[1.0, 2.0], [5.0, 5.5]]))
     svg = preview(against_time(np.sin(np.arange(10_000))), [band])
     root = ElementTree.fromstring(re.search(r"<svg.*</svg>", svg).group())
     shapes = [(shape.tag, float(shape.get("x", 0)), float(shape.get("width", 0))) for shape in root]

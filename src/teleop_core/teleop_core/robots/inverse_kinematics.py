@@ -61,6 +61,7 @@ class Solver(NamedTuple):
     seed: Array  # the last answer (n,)
     q: Array
     free: Array  # the answer if there were time enough
+    before: Array  # the slave's setpoint at the last command, as long as none is in force
     residual: Array
 
 
@@ -68,7 +69,7 @@ _STATUS, _LIMIT, _JOINT, _RESIDUAL, _CUT = 0, 1, 2, 3, 5
 _NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
 _SINGULAR, _SLOW = int(Limit.SINGULARITY), int(Limit.SPEED)
 _FOLLOWED, _NEAR_SINGULAR = int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR)
-_STATE = [(name, "i8") for name in ("first_ns", "last_ns", "asked", "limited", "limit", "joint")]
+_STATE = [(name, "i8") for name in ("last_ns", "asked", "limited", "limit", "joint")]
 # A step [rad or m] that no speed limit is: a path still, but one that has all the time it needs.
 _ANY_STEP = 1e6
 # A joint this close to its limit [rad or m] is at it.
@@ -120,6 +121,18 @@ def _explain(p: Any, solver: Any, reach: Array) -> None:
     rotation_vector_between(T, solver.reached, reach[_CUT + 3 : _CUT + 6])
 
 
+@inner
+def _has_own_way(s: Any, solver: Any, row: Any, timeout_ns: int) -> bool:
+    """Whether the slave does not follow: its setpoint is an old one, or moves by itself."""
+    if row.slave_setpoint_js_ns != 0:
+        return bool(s.last_ns - row.slave_setpoint_js_ns > timeout_ns)
+    moves = False
+    for i in range(solver.before.shape[0]):
+        moves = moves or row.slave_setpoint_js[i] != solver.before[i]
+    copy(row.slave_setpoint_js, solver.before)
+    return moves
+
+
 @kernel
 def inverse_kinematics_step(p: Any, s: Any, solver: Any, row: Any, dt: float) -> None:
     """One slave pose: write slave_servo_jp and slave_reach.
@@ -133,11 +146,7 @@ def inverse_kinematics_step(p: Any, s: Any, solver: Any, row: Any, dt: float) ->
     if s.last_ns == 0 or elapsed_ns <= 0:
         elapsed_ns = round(dt * 1e9)
     elapsed_ns = min(elapsed_ns, p.longest_ns)
-    if s.last_ns == 0:
-        s.first_ns = row.slave_servo_cp_ns
-    answered_ns = row.slave_setpoint_js_ns if row.slave_setpoint_js_ns != 0 else s.first_ns
-    is_followed = s.last_ns - answered_ns <= max(p.timeout_ns, 2 * elapsed_ns)
-    if s.last_ns == 0 or not is_followed:
+    if s.last_ns == 0 or _has_own_way(s, solver, row, max(p.timeout_ns, 2 * elapsed_ns)):
         copy(row.slave_setpoint_js, seed)
     s.last_ns = row.slave_servo_cp_ns
     for i in range(q.shape[0]):
@@ -173,7 +182,7 @@ class InverseKinematics(RunningStage):
         self._solver = Solver(
             self.robot.fk_pointer, self.robot.ik_pointer, self.robot.limits(dt).copy(),
             self.robot.geometry_row.copy(), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(n),
-            np.zeros(n), np.zeros(n), np.zeros(2),
+            np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(2),
         )  # fmt: skip
         self.kernel = inverse_kinematics_step
         self.arguments = (self.parameters, self.state, self._solver)
