@@ -86,6 +86,29 @@ def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer):
     np.testing.assert_allclose(answers.values[0], robot.ik(goal, HOME).q, atol=1e-12)
 
 
+def test_inverse_kinematics_warns_with_the_joint_that_holds_the_slave_back(peer):
+    robot, reach = load_robot("rcrt1"), peer.listen(topics.SLAVE_REACH)
+    peer.start("inverse_kinematics")
+    goal = robot.fk(HOME)
+    goal[:3, 3] += 0.01 * robot.jacobian(HOME)[:3, 2]  # 10 mm past the end of d3
+    pose, stamp = np.array([*goal[:3, 3], *_quaternion(goal)]), MS
+
+    def warned():
+        nonlocal stamp
+        stamp += MS
+        peer.send(topics.SLAVE_SETPOINT_JS, stamp - MS, HOME)
+        peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
+        status = peer.status("inverse_kinematics")
+        return status and "d3 is at its limit" in status.message and status.level == 1
+
+    peer.wait(warned, "warning")
+    assert reach.take()
+    said = dict(zip(topics.SLAVE_REACH.columns, reach.values[-1], strict=True))
+    assert (said["limit"], said["joint"]) == (topics.Limit.JOINT, 2)
+    cut = [said["cut_x"], said["cut_y"], said["cut_z"]]
+    np.testing.assert_allclose(cut, robot.fk(HOME)[:3, 3] - goal[:3, 3], atol=1e-9)
+
+
 def _quaternion(transform):
     from teleop_core.geometry import pose_from_transform
 
