@@ -82,6 +82,19 @@ def mapped_orientation(p: Any, stylus: Array, tool: Array) -> None:
 
 
 @inner
+def _take_tool(p: Any, s: Any, pose: Array, turn: Array) -> None:
+    """Take the orientation that the hand asks for, and, if only a share of it counts, its turn."""
+    if p.rotation_gain == 1.0:
+        mapped_orientation(p, pose[3:7], s.tool)
+        return
+    tool = np.empty(4)
+    mapped_orientation(p, pose[3:7], tool)
+    turn_within(s.tool, tool, turn)
+    for i in range(4):
+        s.tool[i] = tool[i]
+
+
+@inner
 def _toggle_mode(s: Any, buttons: Array) -> None:
     """Change the mode at the rising edge of its button."""
     if buttons[2] > s.buttons[2]:
@@ -198,11 +211,8 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     draw_back(s, sent, p.gain[s.is_fine], row)
     _toggle_mode(s, buttons)
     gain = p.gain[s.is_fine]
-    tool, turn = np.empty(4), np.empty(3)
-    mapped_orientation(p, pose[3:7], tool)
-    turn_within(s.tool, tool, turn)
-    for i in range(4):
-        s.tool[i] = tool[i]
+    turn = np.empty(3)
+    _take_tool(p, s, pose, turn)
     to_slave_axes(p, pose, s.hand)
     if not (is_following and s.is_engaged):
         s.must_latch = 1
