@@ -1,5 +1,9 @@
 """The operator ``human`` moves as people do, and ``random`` does not: figures of whole sessions."""
 
+import runpy
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,20 +12,10 @@ import teleop_core as tc
 pytestmark = pytest.mark.slow
 
 SEEDS = (1, 2, 3)
-# Lowest and highest of surgeons at the masters of a da Vinci and of another user of one; a minute
-# of a single hand differs from their means by up to a tenth.
-PEOPLE = {
-    "speed_median_mm_s": (12.0, 27.0),
-    "speed_p95_mm_s": (48.0, 101.0),
-    "frequency_50_hz": (0.6, 1.05),
-    "frequency_95_hz": (2.1, 7.3),
-    "power_1_3": (0.27, 0.53),
-    "peaks_per_s": (1.3, 2.8),
-    "idle_share": (0.14, 0.27),
-    "sparc": (-3.8, -3.3),
-    "acceleration_p95_m_s2": (0.35, 0.75),
-    "tremor_um": (57.0, 69.0),
-}
+EXAMPLE = Path(__file__).parents[2] / "examples" / "human_operator.py"
+# Lowest and highest of people, as the example has them; a minute of a single hand differs from
+# their means by up to a tenth, as does the one figure of tremor.
+PEOPLE = runpy.run_path(str(EXAMPLE))["PEOPLE"] | {"tremor_um": (57.0, 69.0)}
 SINGLE = 0.1
 
 
@@ -30,11 +24,9 @@ def figures(name, **changes):
     return [score.value(f"motion.hand.{name}") for score in scores(**changes)]
 
 
-def scores(cache={}, **changes):  # noqa: B006 (sessions are run once)
-    key = str(changes)
-    if key not in cache:
-        cache[key] = [tc.run("human", seed=seed, **changes).score() for seed in SEEDS]
-    return cache[key]
+@cache
+def scores(**changes):
+    return [tc.run("human", seed=seed, **changes).score() for seed in SEEDS]
 
 
 @pytest.mark.parametrize("name", PEOPLE)

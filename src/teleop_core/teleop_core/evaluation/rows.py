@@ -43,6 +43,14 @@ def spread_rows(
     ]
 
 
+def error_rows(group: str, label: str, unit: str, spread: Spread) -> list[Row]:
+    """Root mean square and maximum of a spread of which nothing was published."""
+    return [
+        row(group, f"{label}, RMS", unit, spread.rms),
+        row(group, f"{label}, max", unit, spread.max),
+    ]
+
+
 def number(value: float | None, missing: str = MISSING) -> str:
     """Text with three decimals, two significant digits for small values; ``missing`` for None."""
     if value is None:

@@ -7,7 +7,7 @@ from teleop_core.evaluation.asked import ASKED_TOPICS, Asked
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.pose_errors import angles_between
-from teleop_core.evaluation.rows import Row, row
+from teleop_core.evaluation.rows import Row, error_rows
 from teleop_core.evaluation.windows import Window
 from teleop_core.topics import SLAVE_MEASURED_CP
 
@@ -44,11 +44,7 @@ class AskedErrorMetric(Metric):
 
     def rows(self) -> list[Row]:
         """Root mean square and maximum."""
-        spread = self.values()
-        return [
-            row(GROUP, "position, RMS", "mm", spread.rms),
-            row(GROUP, "position, max", "mm", spread.max),
-        ]
+        return error_rows(GROUP, "position", "mm", self.values())
 
 
 class AskedTurnMetric(Metric):
@@ -76,8 +72,4 @@ class AskedTurnMetric(Metric):
 
     def rows(self) -> list[Row]:
         """Root mean square and maximum."""
-        spread = self.values()
-        return [
-            row(GROUP, "rotation, RMS", "deg", spread.rms),
-            row(GROUP, "rotation, max", "deg", spread.max),
-        ]
+        return error_rows(GROUP, "rotation", "deg", self.values())

@@ -3,7 +3,7 @@
 from teleop_core.evaluation.accumulators import Moments, Spread
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
-from teleop_core.evaluation.rows import Row, row
+from teleop_core.evaluation.rows import Row, error_rows
 from teleop_core.evaluation.tracking import TRACKED, tracked
 from teleop_core.evaluation.windows import Window
 
@@ -33,8 +33,4 @@ class CommandErrorMetric(Metric):
 
     def rows(self) -> list[Row]:
         """Root mean square and maximum."""
-        spread = self.values()
-        return [
-            row(GROUP, "position, RMS", "mm", spread.rms),
-            row(GROUP, "position, max", "mm", spread.max),
-        ]
+        return error_rows(GROUP, "position", "mm", self.values())

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from teleop_core.evaluation.accumulators import Integers, Moments, Spread
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
-from teleop_core.evaluation.rows import MISSING, Row, row
+from teleop_core.evaluation.rows import MISSING, Row, error_rows, row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array
@@ -164,8 +164,7 @@ class ReachMetric(Metric):
             Row(GROUP, "near a singularity", "%", _percent(score.singularity_share)),
             Row(GROUP, "joints too slow", "%", _percent(score.speed_share)),
             Row(GROUP, "aligned anew", "%", _percent(score.aligning_share)),
-            row(GROUP, "left by IK, RMS", "mm", score.residual_mm.rms),
-            row(GROUP, "left by IK, max", "mm", score.residual_mm.max),
+            *error_rows(GROUP, "left by IK", "mm", score.residual_mm),
             row(GROUP, "left by IK, max", "deg", score.residual_deg.max),
             row(GROUP, "commands", "Hz", score.master_hz),
             Row(GROUP, "interpolation", "", _way(score)),
