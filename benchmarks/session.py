@@ -55,7 +55,7 @@ def print_speed(folder: Path, long_minutes: float) -> None:
     run("sim", "--duration", "1", "--out", str(folder / "warm"))  # compile once
     run("evaluate", str(folder / "warm"))
     one, many = measure(folder, 1.0), measure(folder, long_minutes)
-    print(f"\nvirtual time, eleven topics at 1 kHz{'1 min':>18}{long_minutes:>8g} min    ratio")
+    print(f"\nvirtual time, twelve topics at 1 kHz{'1 min':>18}{long_minutes:>8g} min    ratio")
     for name, value in one.items():
         print(f"  {name:40}{value:12.2f}{many[name]:12.2f}{many[name] / value:9.2f}")
 
