@@ -16,6 +16,9 @@ Group = TypeVar("Group")
 Scalar = bool | int | float | str
 Value = Scalar | tuple[Scalar, ...]
 
+MARKS = ("published", "derived", "fitted", "assumed")
+"""How a number is known: a source prints it, follows from one, is fitted to data, is plausible."""
+
 
 def parameter(
     default: Any,
@@ -27,6 +30,7 @@ def parameter(
     choices: tuple[str, ...] = (),
     length: int | None = None,
     fixed: bool = False,
+    source: str = "",
 ) -> Any:
     """Dataclass field that describes one parameter.
 
@@ -39,13 +43,20 @@ def parameter(
         choices: Allowed names; empty for any.
         length: Number of elements of a tuple; None for any.
         fixed: Whether it can only be set before the stage is built.
+        source: Where the default comes from: a mark of :data:`MARKS`, a colon, and by whom, from
+            what, to what or why; empty for a matter of taste.
 
     Returns:
         The dataclass field.
+
+    Raises:
+        ParameterError: The source begins with no mark.
     """
+    if source and source.partition(":")[0] not in MARKS:
+        raise ParameterError("source", source, f"one of {', '.join(MARKS)}, a colon and a text")
     meta = {
         "unit": unit, "doc": doc, "lower": lower, "upper": upper,
-        "choices": choices, "length": length, "fixed": fixed,
+        "choices": choices, "length": length, "fixed": fixed, "source": source,
     }  # fmt: skip
     return field(default=default, metadata=meta)
 
@@ -117,6 +128,7 @@ class Spec:
     choices: tuple[str, ...]
     length: int | None
     fixed: bool
+    source: str = ""
 
     def check(self, value: object) -> None:
         """Refuse a value of another type, length, bound or choice.

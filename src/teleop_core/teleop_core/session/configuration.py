@@ -164,5 +164,6 @@ def parameter_rows(stages: Iterable[str]) -> list[tuple[str, str, str, str]]:
             allowed = ", ".join(spec.choices) if spec.choices else spec.bounds()
             default = spec.default if spec.kind is not tuple else list(spec.default)  # type: ignore[arg-type]
             text = spec.doc + (" (fixed)" if spec.fixed else "")
+            text += f" [{spec.source}]" if spec.source else ""
             rows.append((f"{stage}.{spec.name}", str(default), allowed, text))
     return rows
