@@ -1,0 +1,285 @@
+"""Link errors: how a built arm differs from its drawing, as deltas of Denavit-Hartenberg numbers.
+
+Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has
+theta + its error of theta and so on; joint offsets are errors of theta on turning and of d on
+sliding joints. :func:`true_chain` gives the geometry row of the arm as built, on which
+:func:`teleop_core.robots.dh_kernels.fk` says where its tip really is::
+
+    errors = LinkErrors.of(robot, {"d3": 5.5e-3})
+    dh_kernels.fk(q, true_chain(robot, errors), T_base_tip)
+
+Arms described in other conventions are brought to this one: every pair of successive axes has a
+common normal, along which a is measured, pointing to the later axis. Where axes are parallel it is
+any of them; the small turn of the later axis out of the plane of both is then no error of the four
+numbers (Hayati and Mirmirani 1985), and a pair of nearly parallel axes can be built in a way that
+they do not describe.
+
+Source:
+    Denavit and Hartenberg 1955; Mooring, Roth and Driels 1991, Fundamentals of manipulator
+    calibration, chapter 2.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.geometry import Array, rotation, transform
+from teleop_core.robots import dh_kernels
+from teleop_core.robots.drives import read_only
+
+if TYPE_CHECKING:
+    from teleop_core.robots.robot import Robot
+
+SYMBOLS = ("a", "alpha", "d", "theta")
+"""Kinds of errors, in the order of every vector of them: a1 ... an, alpha1 ... thetan."""
+# Sine of the angle between axes below which they count as parallel, and distance [m] below which
+# they count as one line.
+_PARALLEL, _ONE_LINE = 1e-9, 1e-12
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinkErrors:
+    """Deltas of each link's Denavit-Hartenberg numbers, built less drawn; read-only copies.
+
+    Args:
+        a: Along the common normal, (n,) [m].
+        alpha: Of the twist about it, (n,) [rad].
+        d: Along the joint's axis, (n,) [m]; the offset of a sliding joint.
+        theta: About the joint's axis, (n,) [rad]; the offset of a turning joint.
+
+    Raises:
+        ShapeError: Not four vectors of one length.
+        ParameterError: NaN or infinity.
+    """
+
+    a: Array
+    alpha: Array
+    d: Array
+    theta: Array
+
+    def __post_init__(self) -> None:
+        for name in SYMBOLS:
+            values = read_only(name, getattr(self, name), np.shape(self.a))
+            object.__setattr__(self, name, values)
+
+    @property
+    def n(self) -> int:
+        """Number of links."""
+        return len(self.a)
+
+    @property
+    def vector(self) -> Array:
+        """All errors (4n,) in the order of :func:`error_names`; a new array each time."""
+        return np.concatenate([getattr(self, name) for name in SYMBOLS])
+
+    def named(self) -> dict[str, float]:
+        """Errors that are not zero, by name [m, rad]."""
+        names = error_names(self.n)
+        return {k: float(v) for k, v in zip(names, self.vector, strict=True) if v != 0.0}
+
+    @staticmethod
+    def from_vector(vector: Array) -> "LinkErrors":
+        """Errors of a vector (4n,) in the order of :func:`error_names`."""
+        parts = np.asarray(vector, dtype=np.float64).reshape(4, -1)
+        return LinkErrors(a=parts[0], alpha=parts[1], d=parts[2], theta=parts[3])
+
+    @staticmethod
+    def none(n: int) -> "LinkErrors":
+        """An arm of ``n`` links that is built as drawn."""
+        return LinkErrors.from_vector(np.zeros(4 * n))
+
+    @staticmethod
+    def of(robot: "Robot", given: Mapping[str, float]) -> "LinkErrors":
+        """Errors by name, such as ``{"d3": 5.5e-3}``; all others are zero.
+
+        Raises:
+            UnknownNameError: No such error; the alternatives are listed.
+            ParameterError: A value that is not finite.
+        """
+        names = error_names(robot.n)
+        vector = np.zeros(len(names))
+        for name, value in given.items():
+            if name not in names:
+                raise UnknownNameError("link error", name, names)
+            if not isinstance(value, int | float) or not math.isfinite(value):
+                raise ParameterError(f"link error {name}", value, "a finite number [m or rad]")
+            vector[names.index(name)] = value
+        return LinkErrors.from_vector(vector)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Chain:
+    """A serial arm T_base_tip = F0 J1 F1 J2 ... Jn Fn, Ji about or along the local z axis.
+
+    Args:
+        kinds: Of each joint as in :mod:`~teleop_core.robots.dh_kernels`, (n,).
+        fixed: Transforms F0 ... Fn, (n + 1, 4, 4).
+        row: Geometry row of the kernels.
+    """
+
+    kinds: Array
+    fixed: Array
+    row: Array
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.kinds)
+
+    def built(self, errors: LinkErrors) -> Array:
+        """Geometry row of the arm with these errors; that of the drawing for none.
+
+        Link i becomes Ji Rz(theta) Tz(d) Fi Si⁻¹ Tx(a) Rx(alpha) Si with the errors alone, Si being
+        what Fi moves along the axis of the next joint.
+        """
+        row = self.row.copy()
+        for i in range(self.n):
+            before, after = _errors_of_link(errors, i)
+            S = next_axis_motion(self.fixed[i + 1])
+            link = before @ self.fixed[i + 1] @ np.linalg.inv(S) @ after @ S
+            is_drawn = not any(getattr(errors, name)[i] for name in SYMBOLS)
+            at = self.n + 7 + 12 * (i + 1)
+            row[at : at + 12] = (self.fixed[i + 1] if is_drawn else link)[:3].ravel()
+        return row
+
+
+def _errors_of_link(errors: LinkErrors, i: int) -> tuple[Array, Array]:
+    """Motions (4, 4) along and about z, and along and about x, by which a link is off."""
+    along_z = transform(rotation("z", errors.theta[i]), np.array([0.0, 0.0, errors.d[i]]))
+    along_x = transform(rotation("x", errors.alpha[i]), np.array([errors.a[i], 0.0, 0.0]))
+    return along_z, along_x
+
+
+def next_axis_motion(F: Array) -> Array:
+    """Motion S = Rz Tz (4, 4) that ends F = Rz(theta) Tz(d) Tx(a) Rx(alpha) S.
+
+    Parallel axes, whose common normal may lie anywhere, get d = 0 in S; of the two directions of
+    the normal of intersecting axes that with the smaller turn in S is taken.
+
+    Source:
+        Derived; the third row of a rotation is sin(alpha) sin(turn), sin(alpha) cos(turn), cos.
+    """
+    R, p = F[:3, :3], F[:3, 3]
+    sine = math.hypot(R[2, 0], R[2, 1])
+    if sine < _PARALLEL:
+        total = math.atan2(R[1, 0], R[0, 0])
+        theta = math.atan2(p[1], p[0]) if math.hypot(p[0], p[1]) > _ONE_LINE else 0.0
+        turn = total - theta if R[2, 2] > 0.0 else theta - total
+        return transform(rotation("z", turn), np.zeros(3))
+    turn = math.atan2(R[2, 0], R[2, 1])
+    if abs(turn) > 0.5 * math.pi + _PARALLEL:  # the normal the other way round
+        turn, sine = turn - math.copysign(math.pi, turn), -sine
+    # The first column of Rz(theta) is that of R turned back.
+    normal = R @ rotation("z", -turn)[:, 0]
+    slide = (normal[1] * p[0] - normal[0] * p[1]) / sine
+    return transform(rotation("z", turn), np.array([0.0, 0.0, slide]))
+
+
+def error_names(n: int) -> tuple[str, ...]:
+    """Names of all errors of ``n`` links: a1 ... an, alpha1 ..., d1 ..., theta1 ... thetan."""
+    return tuple(f"{symbol}{i + 1}" for symbol in SYMBOLS for i in range(n))
+
+
+def chain_of(robot: "Robot") -> Chain | None:
+    """The robot as a chain; None for one that is none, such as a parallel robot."""
+    if robot.kernels.fk is dh_kernels.fk:
+        row = robot.geometry_row
+    else:
+        table = _built_in_table(robot)
+        if table is None:
+            return None
+        from teleop_core.robots.dh import robot_from_table
+
+        row = robot_from_table(table).geometry_row
+    n = robot.n
+    fixed = np.tile(np.eye(4), (n + 1, 1, 1))
+    fixed[:, :3] = row[n + 7 :].reshape(n + 1, 3, 4)
+    return Chain(kinds=row[:n].copy(), fixed=fixed, row=row)
+
+
+def true_chain(robot: "Robot", errors: LinkErrors) -> Array | None:
+    """Geometry row of the arm as built, for the kernels of :mod:`teleop_core.robots.dh_kernels`.
+
+    Args:
+        robot: The arm as drawn.
+        errors: What its links are off, n of them.
+
+    Returns:
+        The row, a new array, on which ``dh_kernels.fk`` takes the robot's own joint vectors; None
+        for robots that are no chain.
+
+    Raises:
+        ParameterError: Errors of another number of links.
+    """
+    if errors.n != robot.n:
+        raise ParameterError("errors", f"for {errors.n} links", f"for {robot.n}, as {robot.name}")
+    chain = chain_of(robot)
+    return None if chain is None else chain.built(errors)
+
+
+def _built_in_table(robot: "Robot") -> dict[str, Any] | None:
+    """Denavit-Hartenberg table of a chain of ours that has kernels of its own."""
+    make = _TABLES.get(robot.name)
+    if make is None:
+        return None
+    module = import_module(f"teleop_core.robots.{robot.name}")
+    if robot.kernels.fk is not module.fk:
+        return None  # somebody else's robot of the same name
+    convention, rows = make(dict(robot.geometry))
+    moving = [row for row in rows if not {"q", "-q"}.isdisjoint(row.values())]
+    for i, row in enumerate(moving):
+        limits = {"lower": float(robot.lower[i]), "upper": float(robot.upper[i])}
+        row |= {"name": robot.joint_names[i], **limits}
+    return {"name": robot.name, "convention": convention, "rows": rows}
+
+
+_Table = tuple[str, list[dict[str, Any]]]
+_RIGHT = 0.5 * math.pi
+
+
+def _rcrt1(g: Mapping[str, float]) -> _Table:
+    turn: dict[str, Any] = {"theta": "q"}
+    return "standard", [
+        turn | {"alpha": -_RIGHT}, turn | {"alpha": _RIGHT, "d": g["d2"]}, {"d": "q"},
+        turn | {"alpha": -_RIGHT}, turn | {"alpha": _RIGHT}, turn | {"d": g["L6"]},
+    ]  # fmt: skip
+
+
+def _puma560(g: Mapping[str, float]) -> _Table:
+    turn: dict[str, Any] = {"theta": "q"}
+    return "modified", [
+        turn | {}, turn | {"alpha": -_RIGHT}, turn | {"a": g["a2"], "d": g["d3"]},
+        turn | {"alpha": -_RIGHT, "a": g["a3"], "d": g["d4"]}, turn | {"alpha": _RIGHT},
+        turn | {"alpha": -_RIGHT},
+    ]  # fmt: skip
+
+
+def _scara(g: Mapping[str, float]) -> _Table:
+    return "modified", [
+        {"theta": "q"}, {"theta": "q", "a": g["a1"]}, {"a": g["a2"], "d": "-q"}, {"theta": "q"},
+    ]  # fmt: skip
+
+
+def _planar_3r(g: Mapping[str, float]) -> _Table:
+    return "modified", [
+        {"theta": "q"}, {"theta": "q", "a": g["l1"]}, {"theta": "q", "a": g["l2"]}, {"a": g["l3"]},
+    ]  # fmt: skip
+
+
+def _five_axis(g: Mapping[str, float]) -> _Table:
+    turn: dict[str, Any] = {"theta": "q"}
+    return "modified", [
+        turn | {"d": g["d1"]}, turn | {"alpha": -_RIGHT}, turn | {"a": g["a2"]},
+        turn | {"a": g["a3"]}, turn | {"alpha": -_RIGHT}, {"d": g["d5"]},
+    ]  # fmt: skip
+
+
+_TABLES: dict[str, Callable[[Mapping[str, float]], _Table]] = {
+    "rcrt1": _rcrt1, "puma560": _puma560, "scara": _scara, "planar_3r": _planar_3r,
+    "five_axis": _five_axis,
+}  # fmt: skip
