@@ -51,6 +51,7 @@ setup(
             "hypothesis",
             "scipy",
             "pin",
+            "mujoco",
             "roboticstoolbox-python",
             "mcap-ros2-support",
             "ruff",

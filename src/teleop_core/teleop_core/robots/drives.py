@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
+from teleop_core.robots.inertias import LinkInertia, check_possible
 
 _ROW = types.float64[::1]
 # Signatures that let one compiled slave move any robot: see Dynamics for the arguments.
@@ -102,14 +103,22 @@ class Dynamics:
         gravity: Effort [N·m or N] that holds the arm at rest.
         parameters: Numbers that both read, in the model's own order.
         compensated: Axes (n,) whose gravity the published controller feeds forward.
+        links: Inertias of the links behind those numbers, for models that have such; () for none.
+
+    Raises:
+        ShapeError: ``parameters`` are not a vector.
+        ParameterError: ``parameters`` that are not finite, or a link whose inertia no body can
+            have.
     """
 
     acceleration: AccelerationKernel
     gravity: GravityKernel
     parameters: Array
     compensated: NDArray[np.bool_]
+    links: tuple[LinkInertia, ...] = ()
 
     def __post_init__(self) -> None:
+        check_possible(self.links)
         object.__setattr__(self, "parameters", read_only("parameters", self.parameters))
         compensated = np.array(self.compensated, dtype=np.bool_)
         compensated.setflags(write=False)
@@ -133,7 +142,13 @@ def no_gravity(q: Array, inertia: Array, effort: Array) -> None:
 
 
 def independent_axes(inertia: Array) -> Dynamics:
-    """Model of axes that do not act on each other, with these inertias (n,) [kg·m² or kg]."""
+    """Model of axes that do not act on each other, with these inertias (n,) [kg·m² or kg].
+
+    Raises:
+        ParameterError: An inertia that is not positive and finite.
+    """
+    if not (np.isfinite(inertia) & (np.asarray(inertia) > 0.0)).all():
+        raise ParameterError("inertia", np.asarray(inertia).tolist(), "> 0 for every joint")
     return Dynamics(
         acceleration=independent_acceleration,
         gravity=no_gravity,

@@ -1,24 +1,37 @@
 """Dynamics of the RCRT-1: closed form for the first three axes, drive table for all six.
 
-The wrist is dominated by its motors: its axes are independent inertias. Parameters that the
-source does not print (friction, motor inertia of the wrist) are marked *assumed*.
+The wrist is dominated by its motors: its axes are independent inertias, and link 3 carries it.
+Numbers that the source does not print (friction, motor inertia of the wrist) are marked *assumed*.
+
+Table A.1 prints no convention of the products of inertia, and no single one is possible for all
+links: a body can have the numbers of link 1 only if they are -∫yz dm (the other sign needs a
+principal moment of -0.018 kg·m²), those of link 2 only if they are +∫xz dm (else -0.0004). Link 3
+is printed with its mass 264 mm ahead of the wrist centre, where only the tool is, so its axes were
+turned by 180° about x: its centre of mass lies at -264 mm, and with it Ixz changes its sign (else
+-0.0035). Then +∫xz dm, -3.0e-3, is what a mass in its centre has, -3.06e-3. Of Ixy and Iyz of link
+2 every sign is possible; they are taken as its Ixz.
+
+Source:
+    Vongbunyong 2008, section 4.6, appendix A.3 and tables 3.6 and A.1; misprints corrected.
 """
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 from teleop_core.robots.drives import Drives, Dynamics
+from teleop_core.robots.inertias import LinkInertia
 
 # Symbols as in the source: moments about the link-frame origins [kg·m²], centres of mass G [m].
+# Published (table A.1); products as +∫xy dm, signs derived as said above.
 LINKS = {
-    "I1yy": 0.012, "I2xx": 0.011, "I2yy": 0.013, "I2zz": 0.004, "I2xz": 3.0e-3,
-    "I3xx": 0.061, "I3yy": 0.061, "I3zz": 5.378e-4, "I3xz": 3.0e-3,
-    "m2": 1.704, "m3": 0.789, "G2x": 0.031842, "G2z": 0.03594, "G3x": 0.014664,
-    # The wrist centre has only the tool ahead of it, so the mass of link 3 lies behind it.
-    "G3z": -0.264245,
+    "I1yy": 0.012, "I2xx": 0.011, "I2yy": 0.013, "I2zz": 0.004,
+    "I2xy": 6.778e-4, "I2xz": 3.0e-3, "I2yz": 2.24e-4,
+    "I3xx": 0.061, "I3yy": 0.061, "I3zz": 5.378e-4, "I3xz": -3.0e-3,
+    "m2": 1.704, "m3": 0.789, "G2x": 0.031842, "G2z": 0.03594, "G3x": 0.014664, "G3z": -0.264245,
     "m2b_L0b": 0.0,  # static moment of the four-bar's link 2b [kg·m], not given
     # Reflected motor inertias: 81.6 taken as 1e-3 kg·m² at the output, as the catalogue does.
     "J1": 0.0816, "J2": 0.0816,
@@ -26,8 +39,13 @@ LINKS = {
     "J4": 6.5e-8 * 141.0**2, "J5": 6.5e-8 * 76.0**2, "J6": 6.5e-8 * 76.0**2,  # assumed rotor
     "g": 9.81,
 }  # fmt: skip
+# What link 1 has beside I1yy does not act, for it turns about its y axis alone; Iyz is -∫yz dm.
+LINK_1 = {
+    "m1": 2.404, "G1y": -0.142342, "G1z": -0.038193, "I1xx": 0.064, "I1zz": 0.053, "I1yz": -0.011,
+}  # fmt: skip
 _ORDER = {symbol: index for index, symbol in enumerate(LINKS)}
-_I1YY, _I2XX, _I2YY, _I2ZZ, _I2XZ = (_ORDER[s] for s in ("I1yy", "I2xx", "I2yy", "I2zz", "I2xz"))
+_I1YY, _I2XX, _I2YY, _I2ZZ = (_ORDER[s] for s in ("I1yy", "I2xx", "I2yy", "I2zz"))
+_I2XY, _I2XZ, _I2YZ = (_ORDER[s] for s in ("I2xy", "I2xz", "I2yz"))
 _I3XX, _I3YY, _I3ZZ, _I3XZ = (_ORDER[s] for s in ("I3xx", "I3yy", "I3zz", "I3xz"))
 _M2, _M3, _G2X, _G2Z, _G3X, _G3Z = (_ORDER[s] for s in ("m2", "m3", "G2x", "G2z", "G3x", "G3z"))
 _M2B, _J1, _G = _ORDER["m2b_L0b"], _ORDER["J1"], _ORDER["g"]
@@ -38,19 +56,44 @@ def link_row(**symbols: float) -> Array:
     return np.array(list({**LINKS, **symbols}.values()), dtype=np.float64)
 
 
+def link_inertias(symbols: Mapping[str, float] = LINKS) -> tuple[LinkInertia, ...]:
+    """Links 1 to 3 in their frames, as table A.1 lumps them: 2a rides on 2, the wrist on 3.
+
+    Args:
+        symbols: All of :data:`LINKS`, for links 2 and 3 and the I1yy of link 1.
+    """
+    p, one, about_origin = symbols, LINK_1, LinkInertia.about_origin
+    return (
+        about_origin(
+            "link 1", one["m1"], (0.0, one["G1y"], one["G1z"]),
+            (one["I1xx"], p["I1yy"], one["I1zz"]), (0.0, 0.0, one["I1yz"]), sign=-1.0,
+        ),
+        about_origin(
+            "link 2", p["m2"], (p["G2x"], 0.0, p["G2z"]),
+            (p["I2xx"], p["I2yy"], p["I2zz"]), (p["I2xy"], p["I2xz"], p["I2yz"]),
+        ),
+        about_origin(
+            "link 3", p["m3"], (p["G3x"], 0.0, p["G3z"]),
+            (p["I3xx"], p["I3yy"], p["I3zz"]), (0.0, p["I3xz"], 0.0),
+        ),
+    )  # fmt: skip
+
+
 @kernel
 def inertia_matrix(q: Array, p: Array, D: Array) -> None:
     """Write the inertia (3, 3) of axes 1-3, reflected motors included.
 
     Source:
-        Vongbunyong 2008, eqs. 4.6.1-4.6.3, derived again; D12 = D13 = 0 for this geometry.
+        Vongbunyong 2008, eqs. 4.6.1-4.6.3, derived again with Ixy and Iyz of link 2, which alone
+        make D12; D13 = 0 for this geometry.
     """
     s2, c2, d3 = math.sin(q[1]), math.cos(q[1]), q[2]
     reach = p[_M3] * d3 * (d3 + 2.0 * p[_G3Z])
     P = p[_I2XZ] + p[_I3XZ] + p[_M3] * d3 * p[_G3X]
     D[0, 0] = p[_I1YY] + (p[_I2XX] + p[_I3XX] + reach) * s2 * s2 + p[_J1]
     D[0, 0] += (p[_I2ZZ] + p[_I3ZZ]) * c2 * c2 + 2.0 * P * s2 * c2
-    D[0, 1] = D[1, 0] = D[0, 2] = D[2, 0] = 0.0
+    D[0, 1] = D[1, 0] = p[_I2XY] * s2 - p[_I2YZ] * c2
+    D[0, 2] = D[2, 0] = 0.0
     D[1, 1] = p[_I2YY] + p[_I3YY] + reach + p[_J1 + 1]
     D[1, 2] = D[2, 1] = -p[_M3] * p[_G3X]
     D[2, 2] = p[_M3] + p[_J1 + 2]
@@ -70,6 +113,7 @@ def velocity_effort(q: Array, dq: Array, p: Array, h: Array) -> None:
     P = p[_I2XZ] + p[_I3XZ] + m3 * d3 * G3x
     radial = m3 * (lever * (1.0 - c22) + G3x * s22)
     h[0] = (B * s22 + 2.0 * P * c22) * dq[0] * dq[1] + radial * dq[0] * dq[2]
+    h[0] += (p[_I2XY] * c2 + p[_I2YZ] * s2) * dq[1] * dq[1]  # slope of D12
     h[1] = 2.0 * m3 * lever * dq[1] * dq[2] - (0.5 * B * s22 + P * c22) * dq[0] * dq[0]
     h[2] = -0.5 * radial * dq[0] * dq[0] - m3 * lever * dq[1] * dq[1]
 
@@ -93,16 +137,21 @@ def gravity_effort(q: Array, p: Array, c: Array) -> None:
 
 @kernel
 def acceleration(q: Array, dq: Array, effort: Array, p: Array, ddq: Array) -> None:
-    """Write joint accelerations (6,) under the net joint effort (drive less friction)."""
+    """Write joint accelerations (6,) under the net joint effort (drive less friction).
+
+    Axes 1 and 3 act on each other through axis 2 alone, which is solved first.
+    """
     D, h, c = np.empty((3, 3)), np.empty(3), np.empty(6)
     inertia_matrix(q, p, D)
     velocity_effort(q, dq, p, h)
     gravity_effort(q, p, c)
-    ddq[0] = (effort[0] - h[0] - c[0]) / D[0, 0]
-    a, b = effort[1] - h[1] - c[1], effort[2] - h[2] - c[2]
-    determinant = D[1, 1] * D[2, 2] - D[1, 2] * D[1, 2]
-    ddq[1] = (D[2, 2] * a - D[1, 2] * b) / determinant
-    ddq[2] = (D[1, 1] * b - D[1, 2] * a) / determinant
+    first, second = effort[0] - h[0] - c[0], effort[1] - h[1] - c[1]
+    third = effort[2] - h[2] - c[2]
+    share1, share3 = D[0, 1] / D[0, 0], D[1, 2] / D[2, 2]
+    alone = D[1, 1] - share1 * D[0, 1] - share3 * D[1, 2]
+    ddq[1] = (second - share1 * first - share3 * third) / alone
+    ddq[0] = first / D[0, 0] - share1 * ddq[1]
+    ddq[2] = third / D[2, 2] - share3 * ddq[1]
     for i in range(3, 6):
         ddq[i] = effort[i] / p[_J1 + i]
 
@@ -112,12 +161,13 @@ DYNAMICS = Dynamics(
     gravity=gravity_effort,
     parameters=link_row(),
     compensated=np.array([False, True, False, False, False, False]),
+    links=link_inertias(),
 )
 
 _RPM = 2.0 * math.pi / 60.0
 DRIVES = Drives(
     # Motors plus, at home, the links on axes 1-3.
-    inertia=np.array([0.117, 0.12, 26.95, LINKS["J4"], LINKS["J5"], LINKS["J6"]]),
+    inertia=np.array([0.1213, 0.1199, 26.95, LINKS["J4"], LINKS["J5"], LINKS["J6"]]),
     viscous=np.array([0.4, 0.4, 30.0, 0.004, 0.002, 0.002]),  # assumed
     coulomb=np.array([0.15, 0.15, 1.0, 0.010, 0.005, 0.005]),  # assumed
     friction_speed=np.array([2e-3, 2e-3, 2e-4, 2e-2, 2e-2, 2e-2]),  # assumed

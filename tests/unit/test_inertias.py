@@ -1,0 +1,149 @@
+"""Inertias of links: what a body can have, for every robot and for made-up ones."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pinocchio
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from teleop_core.errors import ParameterError, ShapeError
+from teleop_core.robots import list_robots, load_robot, rcrt1_dynamics
+from teleop_core.robots.drives import Dynamics, independent_axes
+from teleop_core.robots.inertias import LinkInertia, check_possible
+from teleop_core.robots.rcrt1_dynamics import LINKS, link_inertias
+
+points = st.lists(
+    st.tuples(st.floats(0.01, 2.0), *[st.floats(-1.0, 1.0)] * 3), min_size=4, max_size=12
+)
+
+
+def of_points(cloud):
+    """Link of point masses (mass, x, y, z): sums over the points, as the definition says."""
+    masses, places = np.array([p[0] for p in cloud]), np.array([p[1:] for p in cloud])
+    tensor = sum(
+        m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, places, strict=True)
+    )
+    center = masses @ places / masses.sum()
+    return LinkInertia(name="cloud", mass=masses.sum(), center=center, inertia=tensor)
+
+
+def principal(moments, name="box"):
+    return LinkInertia(name=name, mass=1.0, center=np.zeros(3), inertia=np.diag(moments))
+
+
+@given(points)
+def test_every_cloud_of_masses_has_a_possible_inertia_or_is_flat(cloud):
+    link = of_points(cloud)
+    second = np.linalg.eigvalsh(link.pseudo)
+    # Sums of squares: no eigenvalue is negative, whatever the cloud; rounding of 24 kg in 2 m.
+    assert second[0] > -1e-13
+    if np.linalg.eigvalsh(link.central)[0] > 1e-9:
+        check_possible([link])
+
+
+@given(points)
+def test_central_inertia_is_that_of_pinocchio(cloud):
+    link = of_points(cloud)
+    pseudo = pinocchio.PseudoInertia.FromMatrix(link.pseudo)
+    theirs = pinocchio.Inertia.FromPseudoInertia(pseudo)
+    assert np.allclose(theirs.lever, link.center, rtol=0, atol=1e-12)
+    assert np.allclose(theirs.inertia, link.central, rtol=0, atol=1e-12)
+
+
+@given(st.tuples(*[st.floats(0.01, 1.0)] * 3))
+def test_the_triangle_inequality_is_the_pseudo_inertias_sign(moments):
+    link = principal(moments)
+    least = np.linalg.eigvalsh(link.pseudo)[0]
+    if least > 1e-6:
+        check_possible([link])
+    elif least < -1e-6:
+        with pytest.raises(ParameterError, match="second moment"):
+            check_possible([link])
+
+
+@pytest.mark.parametrize("name", list_robots())
+def test_every_robot_has_possible_inertias(name):
+    robot = load_robot(name)
+    check_possible(robot.dynamics.links)
+    for link in robot.dynamics.links:
+        assert np.linalg.eigvalsh(link.pseudo)[0] > 0.0
+    assert (robot.drives.inertia > 0.0).all()
+
+
+def test_the_rcrt1_states_its_links():
+    assert [link.name for link in load_robot("rcrt1").dynamics.links] == [
+        "link 1", "link 2", "link 3",
+    ]  # fmt: skip
+
+
+def test_link_3_with_the_printed_product_and_the_mended_centre_is_refused():
+    with pytest.raises(ParameterError, match=r"'link 3' is -0\.0035.*> 0") as refused:
+        check_possible(link_inertias({**LINKS, "I3xz": 3.0e-3}))
+    assert refused.value.value == pytest.approx(-0.0035226, abs=1e-7)
+    # As printed throughout, ahead of the wrist, a body could have the numbers.
+    check_possible(link_inertias({**LINKS, "I3xz": 3.0e-3, "G3z": 0.264245}))
+
+
+def test_no_one_sign_of_the_products_fits_links_1_and_2():
+    first, second, _ = link_inertias()
+    for link in (first, second):
+        products = np.diag(np.diag(link.inertia)) - link.inertia
+        turned = replace(link, inertia=np.diag(np.diag(link.inertia)) + products)
+        with pytest.raises(ParameterError, match=link.name):
+            check_possible([turned])
+
+
+def test_every_sign_of_the_other_products_of_link_2_is_possible():
+    for xy, yz in itertools.product((1.0, -1.0), repeat=2):
+        signs = {"I2xy": xy * LINKS["I2xy"], "I2yz": yz * LINKS["I2yz"]}
+        check_possible(link_inertias({**LINKS, **signs}))
+
+
+def test_a_robot_with_an_impossible_link_is_refused_when_it_is_made():
+    bad = principal((1.0, 1.0, 2.5), name="forearm")
+    with pytest.raises(ParameterError, match="forearm") as refused:
+        Dynamics(
+            acceleration=rcrt1_dynamics.acceleration,
+            gravity=rcrt1_dynamics.gravity_effort,
+            parameters=rcrt1_dynamics.link_row(),
+            compensated=np.zeros(6, np.bool_),
+            links=(bad,),
+        )
+    assert refused.value.value == pytest.approx(-0.25)
+
+
+def test_a_flat_plate_is_possible_and_a_rod_without_thickness_is_not():
+    check_possible([principal((0.1, 0.2, 0.1 + 0.2))])
+    with pytest.raises(ParameterError, match="smallest principal moment"):
+        check_possible([principal((0.1, 0.1, 0.0))])
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0])
+def test_a_link_without_mass_is_refused(mass):
+    link = replace(principal((1.0, 1.0, 1.0)), mass=mass)
+    with pytest.raises(ParameterError) as refused:
+        check_possible([link])
+    assert refused.value.name == "mass of link 'box'"
+    assert refused.value.value == mass
+
+
+def test_values_that_are_no_inertia_are_refused_by_name():
+    with pytest.raises(ShapeError, match="center of link 'box'"):
+        replace(principal((1.0, 1.0, 1.0)), center=np.zeros(2))
+    with pytest.raises(ParameterError, match=r"inertia of link 'box'.*finite"):
+        principal((1.0, 1.0, np.nan))
+    skew = np.eye(3)
+    skew[0, 1] = 0.1
+    with pytest.raises(ParameterError, match="symmetric"):
+        replace(principal((1.0, 1.0, 1.0)), inertia=skew)
+    with pytest.raises(ParameterError, match="mass of link 'box'"):
+        replace(principal((1.0, 1.0, 1.0)), mass=np.inf)
+
+
+@pytest.mark.parametrize("inertia", [0.0, -0.1, np.nan])
+def test_axes_without_links_still_need_inertia(inertia):
+    with pytest.raises(ParameterError, match="inertia"):
+        independent_axes(np.array([1.0, inertia]))

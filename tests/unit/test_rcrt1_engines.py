@@ -1,0 +1,236 @@
+"""The RCRT-1 of table A.1, mended, in engines by others: sympy's Lagrangian, MuJoCo, pinocchio."""
+
+import math
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+import sympy
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from teleop_core.robots import rcrt1_dynamics
+from teleop_core.robots.rcrt1_dynamics import LINKS, link_inertias, link_row
+
+ROW = link_row()
+MOTORS = [LINKS["J1"], LINKS["J2"], LINKS["J3"]]
+# Accelerations up to some 100 rad/s²: twelve digits of them.
+AGREE = 1e-10
+
+# Table A.1, typed again: mass, centre, Ixx Iyy Izz, and the products as ∫xy, ∫xz, ∫yz dm. Frame 1
+# of the source stands on its side (z along -y0); link 1 turns about its y alone.
+TABLE = (
+    (2.404, (0.0, -0.142342, -0.038193), (0.064, 0.012, 0.053), (0.0, 0.0, 0.011)),
+    (1.704, (0.031842, 0.0, 0.03594), (0.011, 0.013, 0.004), (6.778e-4, 3.0e-3, 2.24e-4)),
+    (0.789, (0.014664, 0.0, -0.264245), (0.061, 0.061, 5.378e-4), (0.0, -3.0e-3, 0.0)),
+)
+
+states = st.tuples(
+    st.floats(-1.4, 1.4), st.floats(0.9, 2.8), st.floats(0.1, 0.42),
+    *[st.floats(-3.0, 3.0)] * 3,
+    st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(-25.0, 25.0),
+)  # fmt: skip
+
+
+def central(mass, center, moments, products):
+    """Tensor (3, 3) about the centre of mass, by the parallel-axis theorem."""
+    c, (xy, xz, yz) = np.array(center), products
+    tensor = np.diag(moments) - np.array([[0, xy, xz], [xy, 0, yz], [xz, yz, 0]])
+    return tensor - mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+
+def ours(state):
+    q, dq, effort, out = np.zeros(6), np.zeros(6), np.zeros(6), np.empty(6)
+    q[:3], dq[:3], effort[:3] = state[:3], state[3:6], state[6:]
+    rcrt1_dynamics.acceleration(q, dq, effort, ROW, out)
+    return out[:3]
+
+
+# --- MuJoCo ----------------------------------------------------------------------------------
+
+BODY = """
+<body name="{name}" {frame}>
+  <joint type="{kind}" axis="{axis}" armature="{armature!r}"/>
+  <inertial pos="{center}" mass="{mass!r}" fullinertia="{inertia}"/>
+  {child}
+</body>"""
+
+
+def numbers(values):
+    return " ".join(repr(float(value)) for value in values)
+
+
+def mujoco_xml(table):
+    """The arm as nested bodies; body 1 keeps axes along the base's, so its row is turned."""
+    # Frame 1 to base axes at rest: x1 = x0, y1 = -z0, z1 = y0.
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    child = ""
+    for index in (2, 1, 0):
+        mass, center, *_ = table[index]
+        tensor = central(*table[index])
+        if index == 0:
+            center, tensor = turn @ center, turn @ tensor @ turn.T
+        upper = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
+        child = BODY.format(
+            name=f"link{index + 1}", frame="", kind=("hinge", "hinge", "slide")[index],
+            axis=("0 0 1", "0 1 0", "0 0 1")[index], armature=MOTORS[index],
+            center=numbers(center), mass=mass, inertia=numbers(upper), child=child,
+        )  # fmt: skip
+    return f"""<mujoco>
+  <option gravity="0 0 {-LINKS["g"]!r}"/>
+  <compiler angle="radian"/>
+  <worldbody>{child}</worldbody>
+</mujoco>"""
+
+
+MODEL = mujoco.MjModel.from_xml_string(mujoco_xml(TABLE))
+
+
+def mujoco_acceleration(state):
+    data = mujoco.MjData(MODEL)
+    data.qpos[:], data.qvel[:], data.qfrc_applied[:] = state[:3], state[3:6], state[6:]
+    mujoco.mj_forward(MODEL, data)
+    return data.qacc.copy()
+
+
+@given(states)
+def test_accelerations_are_mujocos(state):
+    assert np.allclose(ours(state), mujoco_acceleration(state), rtol=0, atol=AGREE)
+
+
+def test_mujoco_refuses_link_3_with_the_product_as_printed():
+    printed = (*TABLE[:2], (*TABLE[2][:3], (0.0, 3.0e-3, 0.0)))
+    with pytest.raises(ValueError, match=r"(?s)positive eigenvalues.*link3"):
+        mujoco.MjModel.from_xml_string(mujoco_xml(printed))
+
+
+# --- pinocchio -------------------------------------------------------------------------------
+
+
+def pinocchio_model():
+    """Joints in the source's own frames: standard Denavit-Hartenberg transforms after each."""
+    model, parent, place = pinocchio.Model(), 0, pinocchio.SE3.Identity()
+    model.gravity.linear = np.array([0.0, 0.0, -LINKS["g"]])
+    joints = (pinocchio.JointModelRZ(), pinocchio.JointModelRZ(), pinocchio.JointModelPZ())
+    for joint, twist, (mass, center, *rest) in zip(
+        joints, (-math.pi / 2, math.pi / 2, 0.0), TABLE, strict=True
+    ):
+        parent = model.addJoint(parent, joint, place, f"joint{parent + 1}")
+        place = pinocchio.SE3(pinocchio.utils.rotate("x", twist), np.zeros(3))
+        body = pinocchio.Inertia(mass, np.array(center), central(mass, center, *rest))
+        model.appendBodyToJoint(parent, body, place)
+    model.armature = np.array(MOTORS)
+    return model
+
+
+PINOCCHIO = pinocchio_model()
+
+
+@given(states)
+def test_accelerations_are_pinocchios_in_the_frames_of_the_source(state):
+    q, dq, effort = np.array(state[:3]), np.array(state[3:6]), np.array(state[6:])
+    expected = pinocchio.aba(PINOCCHIO, PINOCCHIO.createData(), q, dq, effort)
+    assert np.allclose(ours(state), expected, rtol=0, atol=AGREE)
+
+
+# --- sympy -----------------------------------------------------------------------------------
+
+
+def symbolic_lagrangian():
+    """D, h and c (3 entries) of the kinetic and potential energy of three rigid bodies."""
+    q = sympy.symbols("q1:4")
+    dq = sympy.symbols("v1:4")
+    c1, s1, c2, s2 = sympy.cos(q[0]), sympy.sin(q[0]), sympy.cos(q[1]), sympy.sin(q[1])
+    rz = sympy.Matrix([[c1, -s1, 0], [s1, c1, 0], [0, 0, 1]])
+    ry = sympy.Matrix([[c2, 0, s2], [0, 1, 0], [-s2, 0, c2]])
+    side = sympy.Matrix([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    poses = (
+        (rz * side, sympy.zeros(3, 1)),
+        (rz * ry, sympy.zeros(3, 1)),
+        (rz * ry, rz * ry * sympy.Matrix([0, 0, q[2]])),
+    )
+    kinetic = sum(J * v**2 for J, v in zip(map(sympy.Rational, MOTORS), dq, strict=True)) / 2
+    height = sympy.Integer(0)
+    for (R, origin), (mass, center, *rest) in zip(poses, TABLE, strict=True):
+        p = origin + R * sympy.Matrix(list(map(sympy.Rational, center)))
+        rate = sum((p.diff(x) * v for x, v in zip(q, dq, strict=True)), sympy.zeros(3, 1))
+        spin = R.T * sum((R.diff(x) * v for x, v in zip(q, dq, strict=True)), sympy.zeros(3, 3))
+        w = sympy.Matrix([spin[2, 1], spin[0, 2], spin[1, 0]])
+        tensor = sympy.Matrix(central(mass, center, *rest)).applyfunc(sympy.Rational)
+        kinetic += (sympy.Rational(mass) * rate.dot(rate) + w.dot(tensor * w)) / 2
+        height += sympy.Rational(mass) * p[2]
+    D = sympy.hessian(kinetic, dq)
+    momentum = D * sympy.Matrix(dq)
+    h = momentum.jacobian(q) * sympy.Matrix(dq) - sympy.Matrix([kinetic.diff(x) for x in q])
+    c = sympy.Matrix([sympy.Rational(LINKS["g"]) * height.diff(x) for x in q])
+    return sympy.lambdify((q, dq), (D, h, c), "numpy", cse=True)
+
+
+LAGRANGIAN = symbolic_lagrangian()
+
+
+@given(states)
+def test_closed_form_is_the_lagrangian_of_three_rigid_bodies(state):
+    D, h, c = LAGRANGIAN(state[:3], state[3:6])
+    joints, speed = np.array([*state[:3], 0.0, 0.0, 0.0]), np.array([*state[3:6], 0.0, 0.0, 0.0])
+    inertia, velocity, gravity = np.empty((3, 3)), np.empty(3), np.empty(6)
+    rcrt1_dynamics.inertia_matrix(joints, ROW, inertia)
+    rcrt1_dynamics.velocity_effort(joints, speed, ROW, velocity)
+    rcrt1_dynamics.gravity_effort(joints, ROW, gravity)
+    # Sums of some tens of products of numbers up to 27 (inertia of axis 3) and 10.
+    assert np.allclose(inertia, D, rtol=0, atol=2e-14)
+    assert np.allclose(velocity, np.ravel(h), rtol=0, atol=1e-13)
+    assert np.allclose(gravity[:3], np.ravel(c), rtol=0, atol=1e-13)
+
+
+# --- laws ------------------------------------------------------------------------------------
+
+
+def test_axes_1_and_2_act_on_each_other_as_much_as_the_table_says():
+    angles = np.radians(np.linspace(50.0, 160.0, 1001))
+    D, coupling = np.empty((3, 3)), []
+    for angle in angles:
+        rcrt1_dynamics.inertia_matrix(np.array([0, angle, 0.3, 0, 0, 0.0]), ROW, D)
+        coupling.append(D[0, 1])
+    assert math.isclose(max(coupling), math.hypot(6.778e-4, 2.24e-4), rel_tol=1e-5)
+    assert math.isclose(max(coupling), 7.1e-4, abs_tol=5e-6)
+
+
+def test_the_mended_sign_raises_the_inertia_of_axis_1_at_home():
+    D, home = np.empty((3, 3)), np.array([0.0, math.radians(113.4), 0.421, 0, 0, 0])
+    rcrt1_dynamics.inertia_matrix(home, ROW, D)
+    mended = D[0, 0]
+    rcrt1_dynamics.inertia_matrix(home, link_row(I3xz=3.0e-3), D)
+    assert math.isclose(mended / D[0, 0] - 1.0, 0.037, abs_tol=5e-4)
+
+
+def test_free_motion_keeps_energy_and_the_momentum_of_axis_1():
+    def rate(_, y):
+        return np.concatenate((y[3:], ours([*y, 0.0, 0.0, 0.0])))
+
+    def conserved(y):
+        D, _, _ = LAGRANGIAN(y[:3], y[3:])
+        height = TABLE[1][0] * potential_height(y[1], TABLE[1][1])
+        height += TABLE[2][0] * potential_height(y[1], np.add(TABLE[2][1], (0, 0, y[2])))
+        return 0.5 * y[3:] @ D @ y[3:] + LINKS["g"] * height, (D @ y[3:])[0]
+
+    start = np.array([0.0, 1.2, 0.3, 1.5, -1.0, 0.05])
+    path = solve_ivp(rate, (0.0, 0.4), start, method="DOP853", rtol=1e-12, atol=1e-13)
+    end = path.y[:, -1]
+    assert np.allclose(conserved(end), conserved(start), rtol=0, atol=1e-10)
+    # The arm swings for real.
+    assert abs(end[4] - start[4]) > 0.1
+
+
+def potential_height(angle, point):
+    return -math.sin(angle) * point[0] + math.cos(angle) * point[2]
+
+
+def test_links_of_the_robot_are_those_of_the_table():
+    for link, row in zip(link_inertias(), TABLE, strict=True):
+        mass, center, *rest = row
+        assert link.mass == mass
+        assert np.array_equal(link.center, center)
+        assert np.allclose(link.central, central(mass, center, *rest), rtol=0, atol=1e-16)
