@@ -9,7 +9,7 @@ import warnings
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.commands import exchange, reach
+from teleop_core.commands import calibrate, exchange, experiment, reach
 from teleop_core.commands.arguments import (
     command,
     configured,
@@ -97,6 +97,8 @@ def _parser() -> argparse.ArgumentParser:
         add(commands)
     exchange.add(commands)
     reach.add(commands)
+    calibrate.add(commands)
+    experiment.add(commands)
     return parser
 
 

@@ -41,17 +41,17 @@ def evaluate_bags(
     """
     for file in (json_file, html_file):
         if file is not None:
-            _check_place(file)
+            check_place(file)
     found = [study for path in paths for study in studies(Bag(path), span=span)]
     scores = [study.score for study in found]
     for table in score_tables(scores, console.width):
         console.print(table)
     if json_file is not None:
         text = json.dumps([score.to_json() for score in scores], indent=2, allow_nan=False)
-        _write(json_file, text + "\n")
+        write_whole(json_file, text + "\n")
         console.print(f"scores: {json_file}", markup=False, highlight=False, soft_wrap=True)
     if html_file is not None:
-        _write(html_file, _page(found))
+        write_whole(html_file, _page(found))
         console.print(f"page: {html_file}", markup=False, highlight=False, soft_wrap=True)
     return scores
 
@@ -62,15 +62,30 @@ def _page(found: Sequence[Study]) -> str:
     return report_page(found)
 
 
-def _check_place(file: Path) -> None:
+def check_place(file: Path) -> None:
+    """Refuse a place where no file can be written, before there is anything to write.
+
+    Raises:
+        EvaluationError: The directory is missing, the place is one, or nothing can be made there.
+    """
     if not file.parent.is_dir():
         raise EvaluationError(f"{file}: the directory {file.parent} does not exist; make it first")
     if file.is_dir():
         raise EvaluationError(f"{file}: is a directory, must be a file")
+    part = file.with_name(file.name + ".part")
+    try:
+        part.touch()
+        part.unlink()
+    except OSError as error:
+        raise EvaluationError(f"{file}: cannot be written: {error.strerror}") from error
 
 
-def _write(file: Path, text: str) -> None:
-    """Write a file whole or not at all."""
+def write_whole(file: Path, text: str) -> None:
+    """Write a file whole or not at all.
+
+    Raises:
+        EvaluationError: It cannot be written.
+    """
     part = file.with_name(file.name + ".part")
     try:
         part.write_text(text, encoding="utf-8")

@@ -31,7 +31,7 @@ def report_page(studies: Sequence[Study]) -> str:
     It works offline and asks for nothing: plotly.js is inside, once. All plots against time of a
     recording show the same time, down to single samples. Texts from recordings are escaped.
     """
-    sections, drawn, arrays = [], [], _Arrays(len(studies))
+    sections, drawn, arrays = [], [], Arrays(len(studies))
     for number, study in enumerate(studies):
         plots = study.figures()
         places = [f"plot-{number}-{i}" for i in range(len(plots))]
@@ -59,8 +59,12 @@ def report_page(studies: Sequence[Study]) -> str:
     )
 
 
-class _Arrays:
-    """Arrays of a page, each packed once."""
+class Arrays:
+    """Arrays of a page, each packed once.
+
+    Args:
+        recordings: How many sections share the room of the page.
+    """
 
     def __init__(self, recordings: int) -> None:
         self._room = _ROOM * recordings

@@ -131,6 +131,7 @@ OPERATORS: Registry[Operator] = Registry(
     {
         **{kind: f"teleop_core.operators.shapes:{kind.upper()}"
            for kind in ("random", "line", "circle", "points", "hold")},
+        "tour": "teleop_core.operators.tour:TOUR",
         "human": "teleop_core.operators.human:HUMAN",
         "bag": "teleop_core.operators.recorded:BAG",
         "file": "teleop_core.operators.recorded:FILE",

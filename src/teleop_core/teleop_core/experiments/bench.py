@@ -1,0 +1,141 @@
+"""Bench: runs the sessions that experiments ask for, each once."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.evaluation import Score
+from teleop_core.geometry import Array
+from teleop_core.recording import Stream
+
+Setting = float | str | bool | tuple[float, ...]
+Settings = Mapping[str, Setting]
+Progress = Callable[[int, int], None]
+SEEDS = 3
+"""Sessions with different hands of which figures are the mean."""
+# What experiments look at; the rest of a recording, most of its memory, is let go.
+_KEPT = (
+    "master/measured_cp", "slave/servo_cp", "slave/servo_jp", "slave/setpoint_js",
+    "slave/setpoint_cp", "slave/measured_js", "slave/measured_cp", "teleop/state",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """One session: its score, and the streams that experiments look at.
+
+    Attributes:
+        name: Scenario.
+        seed: Its seed.
+        score: What it is worth.
+        streams: Streams by topic.
+    """
+
+    name: str
+    seed: int
+    score: Score
+    streams: Mapping[str, Stream]
+
+    def __getitem__(self, topic: str) -> Stream:
+        """A stream by its topic.
+
+        Raises:
+            UnknownNameError: It was not recorded, or is not kept.
+        """
+        if topic not in self.streams:
+            raise UnknownNameError("topic", topic, self.streams)
+        return self.streams[topic]
+
+    def places_mm(self, topic: str) -> Array:
+        """Positions (N, 3) [mm] of a stream of poses, in the slave's base."""
+        return 1e3 * self[topic][["x", "y", "z"]]
+
+    @property
+    def time(self) -> Array:
+        """Times (N,) [s] of the slave's poses since the recording began."""
+        return self["slave/measured_cp"].time
+
+    @property
+    def is_followed(self) -> NDArray[np.bool_]:
+        """Whether the slave follows the hand, for each of its poses (N,): not on its way there."""
+        return self["slave/setpoint_cp"].stamp_ns > 0
+
+
+def _silent(done: int, total: int) -> None:
+    """Show no progress."""
+
+
+class Bench:
+    """Runs sessions in virtual time, and remembers them.
+
+    Args:
+        seed: First seed; sessions of several hands take those after it too.
+        progress: Told how far the session that is running is.
+        settings: Parameters of every session, over its scenario.
+
+    Raises:
+        ParameterError: The seed is negative.
+    """
+
+    def __init__(
+        self, seed: int = 1, progress: Progress = _silent, settings: Settings | None = None
+    ) -> None:
+        if seed < 0:
+            raise ParameterError("seed", seed, "0 or more")
+        self.seed, self.progress = seed, progress
+        self._settings = dict(settings or {})
+        self._known: dict[object, Session] = {}
+
+    @property
+    def seeds(self) -> range:
+        """Seeds of several hands."""
+        return range(self.seed, self.seed + SEEDS)
+
+    @property
+    def runs(self) -> int:
+        """How many sessions ran so far."""
+        return len(self._known)
+
+    def session(
+        self, scenario: str, seed: int | None = None, settings: Settings | None = None
+    ) -> Session:
+        """Run a session, unless the same one ran before.
+
+        Args:
+            scenario: One of ``teleop scenarios``.
+            seed: Seed of everything random in it; None for the first of the bench.
+            settings: Parameters over the scenario and the bench's settings.
+
+        Raises:
+            TeleopError: A setting or the scenario is wrong.
+        """
+        number = self.seed if seed is None else seed
+        given = self._settings | dict(settings or {})
+        key = (scenario, number, tuple(sorted(given.items(), key=lambda item: item[0])))
+        if key not in self._known:
+            self._known[key] = self._run(scenario, number, given)
+        return self._known[key]
+
+    def sessions(self, scenario: str, settings: Settings | None = None) -> list[Session]:
+        """The same session by several hands; see :meth:`session`."""
+        return [self.session(scenario, seed, settings) for seed in self.seeds]
+
+    def _run(self, scenario: str, seed: int, settings: Settings) -> Session:
+        from teleop_core.api import run
+
+        recording = run(scenario, seed=seed, settings=settings, progress=self.progress)
+        streams = {name: recording[name] for name in _KEPT}
+        return Session(scenario, seed, recording.score(), streams)
+
+
+def mean(values: Iterable[float]) -> float:
+    """Mean of some numbers, at least one."""
+    return float(np.mean(list(values)))
+
+
+def pooled(values: Iterable[float]) -> float:
+    """Root mean square of the root mean squares of sessions of equal length."""
+    return float(np.sqrt(np.mean(np.square(list(values)))))
