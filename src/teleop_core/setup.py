@@ -26,7 +26,7 @@ setup(
     description="Master-slave teleoperation stack for ROS 2 Jazzy",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_core", "teleop_core.*"]),
-    package_data={"teleop_core": ["py.typed", "evaluation/report/*"]},
+    package_data={"teleop_core": ["py.typed", "evaluation/report/*", "fitting/*.csv"]},
     python_requires=">=3.11",
     install_requires=[
         "numpy",
@@ -40,6 +40,7 @@ setup(
         "pyyaml",
         "plotly",
         "rich",
+        "scipy",
     ],
     extras_require={
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
@@ -49,7 +50,6 @@ setup(
             "pytest-rerunfailures",
             "pytest-xdist",
             "hypothesis",
-            "scipy",
             "pin",
             "mujoco",
             "roboticstoolbox-python",

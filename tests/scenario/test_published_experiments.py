@@ -11,7 +11,8 @@ from teleop_core.session.configuration import configure
 from teleop_core.session.runner import session_ticks, simulate
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.signals import STATE, TICK_NS
-from teleop_core.slave.slave_sim import CommandStatus, SlaveSim, SlaveSimParameters
+from teleop_core.slave.commands import CommandStatus
+from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 from teleop_core.topics import SLAVE_REACH, STREAMS
 

@@ -8,7 +8,8 @@ from scipy.interpolate import BPoly
 
 from teleop_core.robots import load_robot
 from teleop_core.signals import DT, TICK_NS
-from teleop_core.slave.slave_sim import INTERPOLATIONS, CommandStatus, SlaveSim, SlaveSimParameters
+from teleop_core.slave.commands import CommandStatus
+from teleop_core.slave.slave_sim import INTERPOLATIONS, SlaveSim, SlaveSimParameters
 
 ROBOT = load_robot("planar_3r")  # it starts at home, with room on all sides
 HOME, SPEED = ROBOT.home, ROBOT.drives.speed_limit

@@ -1,18 +1,16 @@
 """Published precision and accuracy tables: our forward kinematics reproduces their errors."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from teleop_core.fitting.table import PUBLISHED
 from teleop_core.robots import load_robot
 
 ARM = load_robot("rcrt1")
 # Tables 7.1-7.6 as printed: ten runs to each of six points.
-TABLE = np.genfromtxt(
-    Path(__file__).parents[1] / "data" / "rcrt1_precision.csv", delimiter=",", names=True
-)
+TABLE = np.genfromtxt(PUBLISHED, delimiter=",", names=True)
 # Joint targets that reproduce the tables (spec section 8, case 13): rad, mm.
 QUARTER, DEGREE = math.pi / 4, math.pi / 180
 TARGETS = {
@@ -42,12 +40,11 @@ CUT = 1.05e-3
 def errors(point, target=None):
     """Printed and recomputed errors (10,) of one point [mm]."""
     rows = TABLE[TABLE["point"] == point]
-    columns = ("theta1_rad", "theta2_rad", "d3_mm", "theta4_rad", "theta5_rad", "theta6_rad")
-    joints = np.stack([rows[name] for name in columns], axis=1)
+    joints = np.stack([rows[name] for name in ARM.joint_names], axis=1)
     wanted = np.array(TARGETS[point] if target is None else target)
-    joints[:, 2], wanted[2] = joints[:, 2] * 1e-3, wanted[2] * 1e-3
+    wanted[2] *= 1e-3
     off = ARM.fk(joints)[:, :3, 3] - ARM.fk(wanted)[:3, 3]
-    printed = rows["printed_error_mm"].copy()
+    printed = rows["printed_error"] * 1e3
     if point == 4:
         printed[4] = 0.100  # printed 0.010; the printed statistics need 0.100
     return printed, np.linalg.norm(off, axis=1) * 1e3
@@ -66,7 +63,7 @@ def test_joint_logs_give_the_printed_errors(point):  # case 13
 
 def test_row_5_of_table_7_4_is_printed_ten_times_too_small():  # misprint 19
     row = TABLE[(TABLE["point"] == 4) & (TABLE["run"] == 5)]
-    assert row["printed_error_mm"][0] == 0.010
+    assert row["printed_error"][0] == 0.010e-3
     assert abs(errors(4)[1][4] - 0.099) < PRINTED
 
 

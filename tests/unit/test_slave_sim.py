@@ -16,9 +16,9 @@ from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ACCELERATION, independent_acceleration
 from teleop_core.signals import DT, TICK_NS
+from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.slave_sim import (
-    CommandStatus,
     ControllerParameters,
     ReferenceFilterParameters,
     SlaveSim,

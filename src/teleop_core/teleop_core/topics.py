@@ -196,6 +196,13 @@ MASTER_MEASURED_CP = Topic("master/measured_cp", Kind.POSE, SAMPLED, "master_bas
 MASTER_MEASURED_CV = Topic("master/measured_cv", Kind.TWIST, SAMPLED, "master_base")
 MASTER_MEASURED_CF = Topic("master/measured_cf", Kind.WRENCH, SAMPLED, "master_base")
 MASTER_BUTTONS = Topic("master/buttons", Kind.BUTTONS, SAMPLED, "master_base")
+MASTER_CONTACT = Topic(
+    "master/contact", Kind.NUMBERS, SAMPLED, "master_base",
+    columns=("number", "taken", "returned", "friction", "largest_force"),
+)
+"""Energy of the present contact, or the last one: how many there were, what the device's force took
+from the hand and gave back, what its dry friction took meanwhile [J], of the true tip, which a
+simulator knows; and the largest force that the warmth of its motors allows [N]."""
 MASTER_SERVO_CF = Topic(
     "master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base"
 )
@@ -218,6 +225,8 @@ SLAVE_SETPOINT_JS = Topic(
 SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, in_force("slave/servo_jp"), "slave_base")
 SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, SAMPLED, "slave_base")
 SLAVE_MEASURED_CP = Topic("slave/measured_cp", Kind.POSE, SAMPLED, "slave_base")
+SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
+"""Where the tip really is, which no encoder sees: only a simulator knows, or a tracker."""
 TELEOP_STATE = Topic(
     "teleop/state", Kind.REPORT, passed_on("master/measured_cp"), quality=Quality.LATCHED,
     columns=(
@@ -229,9 +238,10 @@ TELEOP_STATE = Topic(
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (
-    MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_SERVO_CF,
+    MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT,
+    MASTER_SERVO_CF,
     SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_REACH, SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP,
-    SLAVE_MEASURED_JS, SLAVE_MEASURED_CP,
+    SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_TRUE_CP,
 )  # fmt: skip
 """Topics of the built-in stages that carry one message per tick."""
 ALL = (*STREAMS, TELEOP_STATE, DIAGNOSTICS)

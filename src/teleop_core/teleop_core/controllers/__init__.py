@@ -145,7 +145,11 @@ def _tried_effort(part: Controller, gains: Array, home: Array) -> tuple[Array, b
 CONTROLLERS: Registry[Controller] = Registry(
     "controller",
     "controllers",
-    {"pid": "teleop_core.controllers.pid:PID", "pd": "teleop_core.controllers.pd:PD"},
+    {
+        "pid": "teleop_core.controllers.pid:PID",
+        "pd": "teleop_core.controllers.pd:PD",
+        "source_pid": "teleop_core.controllers.source_pid:SOURCE_PID",
+    },
     _checked,
     _try,
 )

@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterable
 
 from teleop_core.nodes.ticking import TickingNode
-from teleop_core.slave.slave_sim import CommandStatus
+from teleop_core.slave.commands import CommandStatus
 from teleop_core.topics import SLAVE_SERVO_JP
 
 

@@ -1,7 +1,7 @@
 """Drives and dynamics of slaves; the motors at the end are assumed, for sources that name none."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -104,6 +104,8 @@ class Dynamics:
         parameters: Numbers that both read, in the model's own order.
         compensated: Axes (n,) whose gravity the published controller feeds forward.
         links: Inertias of the links behind those numbers, for models that have such; () for none.
+        unknown: Names of numbers that the source does not state, to their places in the row; the
+            real arm may differ in them (:mod:`teleop_core.fitting`).
 
     Raises:
         ShapeError: ``parameters`` are not a vector.
@@ -116,6 +118,7 @@ class Dynamics:
     parameters: Array
     compensated: NDArray[np.bool_]
     links: tuple[LinkInertia, ...] = ()
+    unknown: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_possible(self.links)

@@ -15,7 +15,7 @@ import numpy as np
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
-from teleop_core.robots import rcrt1_dynamics
+from teleop_core.robots import rcrt1_dynamics, rcrt1_hardware
 from teleop_core.robots.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped
 from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.robot import Robot, geometry_of
@@ -300,4 +300,5 @@ def make(**geometry: float) -> Robot:
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=rcrt1_dynamics.DRIVES,
         dynamics=rcrt1_dynamics.DYNAMICS,
+        hardware=rcrt1_hardware.HARDWARE,
     )

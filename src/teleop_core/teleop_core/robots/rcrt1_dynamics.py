@@ -162,6 +162,7 @@ DYNAMICS = Dynamics(
     parameters=link_row(),
     compensated=np.array([False, True, False, False, False, False]),
     links=link_inertias(),
+    unknown={"m2b_L0b": _M2B},
 )
 
 _RPM = 2.0 * math.pi / 60.0

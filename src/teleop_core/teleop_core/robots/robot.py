@@ -12,12 +12,17 @@ import numpy as np
 from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import Array, checked_array, is_rigid
 from teleop_core.kernels import pointer, raise_pending
-from teleop_core.robots import kinematics
+from teleop_core.robots import forward_kinematics, kinematics
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
+from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.kinematics import (
+    ASSEMBLE,
     FK,
     IK,
     MAX_BRANCHES,
+    AssembleKernel,
+    FkBatch,
+    FkOne,
     IkBatch,
     IkKernel,
     IkOne,
@@ -69,6 +74,7 @@ class Robot:
         kernels: Compiled functions.
         drives: Drive table, None for robots that are not used as slaves.
         dynamics: Rigid-body model; None for axes that do not act on each other.
+        hardware: What the real arm does beside its model; None where nobody knows.
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
 
     Raises:
@@ -85,6 +91,7 @@ class Robot:
     kernels: Kernels
     drives: Drives | None = None
     dynamics: Dynamics | None = None
+    hardware: Hardware | None = None
     task_mask: tuple[bool, ...] = (True,) * 6
     start: _Start = _Start()
     # Writable copies for the kernels, which are compiled for such arrays alone.
@@ -106,6 +113,8 @@ class Robot:
                 raise ShapeError("drives", shape, self.drives.inertia.shape)
             model = self.dynamics or independent_axes(self.drives.inertia)
             object.__setattr__(self, "dynamics", model)
+        if self.hardware is not None and self.hardware.coulomb.shape != shape:
+            raise ShapeError("hardware", shape, self.hardware.coulomb.shape)
         geometry = MappingProxyType(dict(self.geometry))
         object.__setattr__(self, "geometry", geometry)
         object.__setattr__(self, "_row", np.array(list(geometry.values()), dtype=np.float64))
@@ -151,6 +160,13 @@ class Robot:
         return cast("WriteKernel", pointer(self.kernels.fk, FK))
 
     @cached_property
+    def assemble_pointer(self) -> AssembleKernel | None:
+        """Forward kinematics with its status as an argument for other kernels; None without."""
+        if self.kernels.assemble is None:
+            return None
+        return cast("AssembleKernel", pointer(self.kernels.assemble, ASSEMBLE))
+
+    @cached_property
     def ik_pointer(self) -> IkKernel:
         """Inverse kinematics as an argument for other kernels."""
         return cast("IkKernel", pointer(self.kernels.ik, IK))
@@ -166,7 +182,11 @@ class Robot:
         return np.ascontiguousarray(np.stack((self.lower, self.upper, step)))
 
     def fk(self, q: object) -> Array:
-        """Pose of the tip in the base.
+        """Pose of the tip in the base, in which all loops close.
+
+        Where a robot with loops has several, it is the one next to home if that closes, else the
+        nearest to home of those that a search finds. Joints that say more than the pose, as those
+        of a hand on an object, may contradict each other by 0.1 mm.
 
         Args:
             q: Joint vector (n,) or batch (N, n) [rad, m]; limits are not applied.
@@ -177,8 +197,11 @@ class Robot:
         Raises:
             ShapeError: Another shape.
             ParameterError: NaN or infinity.
+            ClosureError: No assembly has these joints; :meth:`solve_fk` answers all the same.
         """
         joints = checked_array("q", q, (self.n,))
+        if self.kernels.assemble is not None:
+            return forward_kinematics.closed_poses(self, joints)
         if joints.ndim == 1:
             transform = np.empty((4, 4))
             self.kernels.fk(joints, self._row, transform)
@@ -187,6 +210,77 @@ class Robot:
         kinematics.fk_batch(self.fk_pointer, joints, self._row, transforms)
         raise_pending()
         return transforms
+
+    def solve_fk(self, q: object, seed: object = None, *, search: bool = True) -> FkOne:
+        """Pose of the tip in the base, and whether the loops close there.
+
+        Args:
+            q: Joint vector (n,) [rad, m]; limits are not applied. Several of them, (N, n), are
+                answered as by :meth:`solve_fk_batch`, which has the type for it.
+            seed: ``T_base_tip`` (4, 4) whose assembly to stay in; None for home's.
+            search: Whether to look for another assembly where that next to the seed does not
+                close; a tick of a session does not.
+
+        Returns:
+            :class:`FkResult`. Joints that do not assemble are not an error: the pose of least
+            error comes back with its status and residual.
+
+        Raises:
+            ShapeError: Another shape.
+            ParameterError: NaN, infinity, or a seed that is not a rigid transform.
+        """
+        joints = checked_array("q", q, (self.n,))
+        if joints.ndim != 1:
+            return cast("FkOne", self.solve_fk_batch(joints, seed, search=search))
+        return forward_kinematics.solved_one(self, joints, seed, search=search)
+
+    def solve_fk_batch(self, q: object, seed: object = None, *, search: bool = True) -> FkBatch:
+        """Poses of joint vectors (N, n), each on its own; seed (4, 4) or one for each (N, 4, 4).
+
+        Arguments and errors as :meth:`solve_fk`.
+
+        Returns:
+            :class:`FkResult` with a leading axis; its status holds values of :class:`FkStatus`.
+        """
+        joints = checked_array("q", q, (self.n,)).reshape(-1, self.n)
+        return forward_kinematics.solved(self, joints, seed, search=search)
+
+    def follow_fk(self, q: object, seed: object = None) -> FkBatch:
+        """Poses along a path of joint vectors, which stays in its assembly as long as that closes.
+
+        Args:
+            q: Joint vectors (N, n) [rad, m], near one another.
+            seed: ``T_base_tip`` (4, 4) before the first; None for home's assembly.
+
+        Returns:
+            :class:`FkResult` with a leading axis. Where the path leaves the assembly, beyond a
+            singular pose, the status is NOT_CLOSED, and no other assembly is looked for; what
+            comes after starts from the last pose that closed.
+
+        Raises:
+            ShapeError: Another shape.
+            ParameterError: NaN, infinity, or a seed that is not a rigid transform.
+        """
+        joints = checked_array("q", q, (self.n,)).reshape(-1, self.n)
+        return forward_kinematics.solved(self, joints, seed, search=False, is_path=True)
+
+    def fk_all(self, q: object) -> Array:
+        """All poses that a joint vector can have, that of :meth:`fk` first, then by distance.
+
+        Args:
+            q: Joint vector (n,) [rad, m]; limits are not applied.
+
+        Returns:
+            ``T_base_tip`` (k, 4, 4); k = 0 when nothing closes, 1 for a robot without loops.
+
+        Raises:
+            ShapeError: Another shape.
+            ParameterError: NaN or infinity.
+        """
+        joints = checked_array("q", q, (self.n,))
+        if joints.ndim != 1:
+            raise ShapeError("q", (self.n,), joints.shape)
+        return forward_kinematics.all_poses(self, joints)
 
     def jacobian(self, q: object) -> Array:
         """Geometric Jacobian of the tip in base axes.
@@ -201,10 +295,13 @@ class Robot:
         Raises:
             ShapeError: Another shape.
             ParameterError: NaN or infinity.
+            ClosureError: No assembly has these joints.
         """
         joints = checked_array("q", q, (self.n,))
         if joints.ndim != 1:
             raise ShapeError("q", (self.n,), joints.shape)
+        if self.kernels.assemble is not None:
+            forward_kinematics.closed_poses(self, joints)
         out = np.empty((6, self.n))
         self.kernels.jacobian(joints, self._row, out)
         return out

@@ -1,8 +1,7 @@
 """Slave simulator: the 1 kHz arm that follows joint references under a control law."""
 
 import math
-from dataclasses import dataclass, field
-from enum import IntEnum
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,15 +10,23 @@ from teleop_core.controllers import CONTROLLERS, per_joint
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array, pose_from_transform
 from teleop_core.kernels import inner, kernel, pointer, records
-from teleop_core.mapping.filters import lag_step
 from teleop_core.parameters import Choice, choice, parameter
-from teleop_core.robots import load_robot_set
+from teleop_core.plants import PER_JOINT, PLANTS, Physics
+from teleop_core.robots import dh_kernels, load_robot_set
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
+from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.signals import DT, copy
-from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way, begin_way
+from teleop_core.slave.commands import (
+    advance_setpoint,
+    move_to_start,
+    take_command,
+)
+from teleop_core.slave.friction import bristle_damping, wander
+from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.trajectory import shortest_move_time
+from teleop_core.slave.transmission import follow_encoders
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
     SLAVE_MEASURED_CP,
@@ -27,17 +34,8 @@ from teleop_core.topics import (
     SLAVE_SERVO_JP,
     SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
+    SLAVE_TRUE_CP,
 )
-
-
-class CommandStatus(IntEnum):
-    """How the slave took the command of this tick."""
-
-    FRESH = 0  # followed
-    STALE = 1  # none came for longer than the command timeout: the last one is held
-    REFUSED = 2  # too far from the one in force to be the same motion: the last one is held
-    MOVING = 3  # on the way to where the slave starts: nothing is followed yet
-
 
 INTERPOLATIONS = ("none", "linear", "minimum_jerk")
 
@@ -65,8 +63,17 @@ class ControllerParameters:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlantParameters:
+    """What the simulator moves."""
+
+    kind: Choice = choice(PLANTS, "ideal", fixed=True, doc="what the simulator moves")
+
+
+@dataclass(frozen=True, kw_only=True)
 class SlaveSimParameters(RobotParameters):
     """Parameters of :class:`SlaveSim`."""
+
+    seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
 
     command_timeout: float = parameter(
         0.1, unit="s", lower=0.002, upper=5.0,
@@ -91,51 +98,49 @@ class SlaveSimParameters(RobotParameters):
         2, lower=1, upper=50, doc="Runge-Kutta steps in each control tick"
     )
     viscous: tuple[float, ...] = parameter(
-        (), unit="N·m·s/rad or N·s/m", lower=0.0, doc="friction of each joint; empty: the robot's"
+        (), unit="N·m·s/rad or N·s/m", lower=0.0, doc="friction of each joint; empty: the plant's"
     )
     coulomb: tuple[float, ...] = parameter(
-        (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the robot's"
+        (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the plant's"
     )
+    plant: PlantParameters = field(default_factory=PlantParameters)
     controller: ControllerParameters = field(default_factory=ControllerParameters)
     reference_filter: ReferenceFilterParameters = field(default_factory=ReferenceFilterParameters)
 
 
 def _records(n: int) -> tuple[Any, Any]:
     """Parameter and state record of an arm with ``n`` joints."""
-    joints = ("lower", "upper", "effort_limit", "speed_limit", "encoder_step", "viscous", "coulomb",
-              "friction_speed", "compensated")  # fmt: skip
-    parameters = [(name, "f8", (n,)) for name in joints]
-    scalars = [(name, "f8") for name in ("filter_gain", "filter_zero", "filter_pole")]
-    counts = [
-        (name, "i8")
-        for name in ("is_filtered", "steps", "timeout_ns", "interpolation", "start_ticks")
-    ]
-    parameters += [("home", "f8", (n,)), ("start", "f8", (n,))]
-    state = [
-        (name, "f8", (n,))
-        for name in ("command", "filtered", "setpoint", "measured", "speed", "target", *WAY_FIELDS)
-    ]
-    stamps = [
-        (name, "i8")
-        for name in (
-            "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "moved_ticks", "ticks", "span"
-        )
-    ]  # fmt: skip
-    return records([*parameters, *scalars, *counts])[0], records([*state, *stamps])[0]
+    joints = (*PER_JOINT, "bristle_damping", "lower", "upper", "effort_limit", "speed_limit",
+              "compensated", "home", "start")  # fmt: skip
+    scalars = ("filter_gain", "filter_zero", "filter_pole", "wander_rate")
+    counts = ("is_filtered", "steps", "timeout_ns", "interpolation", "start_ticks")
+    rows = [(name, "f8", (n,)) for name in joints]
+    numbers = [(name, "f8") for name in scalars] + [(name, "i8") for name in counts]
+    moved = ("command", "filtered", "setpoint", "target", *WAY_FIELDS)
+    plant = ("measured", "speed", "bent", "grip", "astray", "carried")
+    state = [(name, "f8", (n,)) for name in (*moved, *plant)] + [("noise", "i8", (n,))]
+    stamps = (
+        "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "moved_ticks", "ticks", "span"
+    )  # fmt: skip
+    return records([*rows, *numbers])[0], records([*state, *((name, "i8") for name in stamps)])[0]
 
 
 class Arm(NamedTuple):
     """Model, control law and motion of the arm: pointers and plain arrays, which kernels take."""
 
     fk: Any
+    tip_fk: Any  # of the links as they were made
     acceleration: Any
     gravity: Any
     control: Any
     geometry: Array
+    tip_geometry: Array
+    coupling: Array
     dynamics: Array
+    model: Array  # the dynamics that the control law knows
     gains: Array
     memory: Array  # of the control law
-    q: Array  # true joint positions (n,)
+    q: Array  # joint positions (n,) at the encoders, unrounded
     dq: Array
     effort: Array
     setpoint: Array
@@ -143,71 +148,8 @@ class Arm(NamedTuple):
     feedforward: Array
     limit: Array
     joints: Array  # room for joints
+    tip: Array  # true joint positions (n,), behind the transmission
     T: Array
-
-
-# Stamps this far ahead of the slave's clock are an error, not a clock that is a little ahead.
-_FUTURE_NS = 1_000_000_000
-# Commands that are further apart than this are no stream [ns].
-_SLOWEST_NS = 500_000_000
-
-
-@inner
-def _move_to_start(p: Any, s: Any) -> None:
-    """Make a tick of the cubic move from home to where the slave starts."""
-    s.moved_ticks += 1
-    share = s.moved_ticks / p.start_ticks
-    share = share * share * (3.0 - 2.0 * share)
-    for i in range(p.home.shape[0]):
-        place = p.start[i] if s.moved_ticks == p.start_ticks else (
-            p.home[i] + share * (p.start[i] - p.home[i])
-        )  # fmt: skip
-        s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i] = place
-
-
-@inner
-def _take_command(p: Any, s: Any, row: Any, dt: float) -> int:
-    """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
-
-    A jump is farther from the command in force than full speed reaches in the command timeout, or
-    in the time since the message before: no stream can be that far.
-    """
-    stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
-    if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
-        s.refused += 1
-        return 2
-    if s.moved_ticks < p.start_ticks:
-        s.seen_ns = max(s.seen_ns, stamp)
-        return 3
-    if stamp > s.seen_ns:
-        period_ns = min(stamp - s.seen_ns, _SLOWEST_NS) if s.seen_ns > 0 else 0
-        s.seen_ns = stamp
-        far = max(p.timeout_ns, period_ns) * 1e-9
-        for i in range(s.command.shape[0]):
-            near = abs(row.slave_servo_jp[i] - s.target[i]) <= p.speed_limit[i] * far
-            if not near:  # NaN is not near either
-                s.refused += 1
-                return 2
-        # Commands whose stamps run ahead of the clock that they come by are as near as they come.
-        begin_way(p, s, row.slave_servo_jp, min(period_ns, now_ns - s.arrival_ns), dt)
-        s.command_stamp_ns, s.arrival_ns = stamp, now_ns
-    return 1 if now_ns - s.arrival_ns > p.timeout_ns else 0
-
-
-@inner
-def _advance_setpoint(p: Any, s: Any, before: Array, dt: float) -> None:
-    """Filter the command and move the setpoint there, never faster than the drive can."""
-    for i in range(before.shape[0]):
-        if p.is_filtered:
-            s.filtered[i] = lag_step(
-                s.command[i], before[i], s.filtered[i], p.filter_gain, p.filter_zero,
-                p.filter_pole, dt,
-            )  # fmt: skip
-        else:
-            s.filtered[i] = s.command[i]
-        reach = p.speed_limit[i] * dt
-        step = min(max(s.filtered[i] - s.setpoint[i], -reach), reach)
-        s.setpoint[i] = min(max(s.setpoint[i] + step, p.lower[i]), p.upper[i])
 
 
 @inner
@@ -222,18 +164,26 @@ def _measure(p: Any, s: Any, q: Array, dt: float) -> None:
 
 @inner
 def _control(p: Any, s: Any, arm: Any, dt: float) -> None:
-    """Write the drive effort of this tick."""
+    """Write the effort that the control law asks for."""
     copy(s.setpoint, arm.setpoint)
     copy(s.measured, arm.measured)
-    arm.gravity(arm.measured, arm.dynamics, arm.feedforward)
+    arm.gravity(arm.measured, arm.model, arm.feedforward)
     for i in range(arm.q.shape[0]):
         arm.feedforward[i] *= p.compensated[i]
     arm.control(
         arm.gains, arm.memory, arm.setpoint, arm.measured, arm.feedforward, arm.limit, dt,
         arm.effort,
     )  # fmt: skip
+
+
+@inner
+def _drive(p: Any, arm: Any) -> None:
+    """Make of the effort asked for the one that the motors give."""
     for i in range(arm.q.shape[0]):
-        arm.effort[i] = min(max(arm.effort[i], -arm.limit[i]), arm.limit[i])
+        asked, limit, step = arm.effort[i], arm.limit[i], p.effort_step[i]
+        if step > 0.0:
+            asked = round(asked / step) * step
+        arm.effort[i] = min(max(asked + p.bias[i], -limit), limit)
         # The motor gives no drive beyond its rated speed, fading out over the next tenth.
         over = abs(arm.dq[i]) / p.speed_limit[i] - 1.0
         if over > 0.0 and arm.effort[i] * arm.dq[i] > 0.0:
@@ -242,7 +192,7 @@ def _control(p: Any, s: Any, arm: Any, dt: float) -> None:
 
 @kernel
 def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
-    """One control tick: write the slave's setpoint and measured topics, and command_status.
+    """One control tick: write the slave's setpoint, measured and true topics, and command_status.
 
     What is measured is sampled at the start of the tick, together with the setpoint it is held
     against; then the arm moves on under constant effort.
@@ -256,14 +206,15 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     """
     joints, n = arm.joints, arm.q.shape[0]
     copy(s.command, joints)
-    row.command_status = _take_command(p, s, row, dt)
+    row.command_status = take_command(p, s, row, dt)
     if s.moved_ticks < p.start_ticks:
-        _move_to_start(p, s)
+        move_to_start(p, s)
     else:
         advance_on_way(p, s)
-        _advance_setpoint(p, s, joints, dt)
+        advance_setpoint(p, s, joints, dt)
     _measure(p, s, arm.q, dt)
     _control(p, s, arm, dt)
+    _drive(p, arm)
     for i in range(n):
         row.slave_setpoint_js[i] = s.setpoint[i]
         row.slave_measured_js[i] = s.measured[i]
@@ -273,11 +224,12 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     pose_from_transform(arm.T, row.slave_setpoint_cp)
     arm.fk(arm.measured, arm.geometry, arm.T)
     pose_from_transform(arm.T, row.slave_measured_cp)
+    follow_encoders(p, s, arm.q, arm.coupling, arm.tip)
+    arm.tip_fk(arm.tip, arm.tip_geometry, arm.T)
+    pose_from_transform(arm.T, row.slave_true_cp)
     row.slave_setpoint_js_ns = row.slave_setpoint_cp_ns = s.command_stamp_ns
-    integrate(
-        arm.acceleration, arm.dynamics, p.viscous, p.coulomb, p.friction_speed, p.steps,
-        arm.effort, arm.q, arm.dq, dt,
-    )  # fmt: skip
+    wander(p, s)
+    integrate(arm.acceleration, arm.dynamics, p, s, p.steps, arm.effort, arm.q, arm.dq, dt)
 
 
 class SlaveSim(RunningStage):
@@ -298,19 +250,27 @@ class SlaveSim(RunningStage):
         super().__init__(SLAVE_SIM, n, dt)
         self.parameters, self.state = _records(n)
         self._law = CONTROLLERS.find(parameters.controller.kind.kind)
-        gains = self._gains(parameters, self.robot.drives.viscous)
+        self._seed, physics = parameters.seed, self._physics(parameters)
+        gains = self._gains(parameters, physics.viscous)
+        is_as_drawn = len(physics.tip_geometry) == 0
         self.arm = Arm(
             fk=self.robot.fk_pointer,
+            tip_fk=self.robot.fk_pointer if is_as_drawn else pointer(dh_kernels.fk, FK),
             acceleration=pointer(model.acceleration, ACCELERATION),
             gravity=pointer(model.gravity, GRAVITY),
             control=self._law.control_pointer,
             geometry=self.robot.geometry_row.copy(),
-            dynamics=model.parameters.copy(),
+            tip_geometry=(
+                self.robot.geometry_row if is_as_drawn else physics.tip_geometry
+            ).copy(),
+            coupling=np.array(physics.coupling, dtype=np.float64, order="C"),
+            dynamics=self._dynamics(physics).copy(),
+            model=model.parameters.copy(),
             gains=gains,
             memory=np.zeros((n, max(self._law.memory, 1))),
             q=np.zeros(n), dq=np.zeros(n), effort=np.zeros(n), setpoint=np.zeros(n),
             measured=np.zeros(n), feedforward=np.zeros(n), limit=np.zeros(n),
-            joints=np.zeros(n), T=np.zeros((4, 4)),
+            joints=np.zeros(n), tip=np.zeros(n), T=np.zeros((4, 4)),
         )  # fmt: skip
         self.kernel, self.arguments = slave_step, (self.parameters, self.state, self.arm)
         self._take_start(parameters)
@@ -327,6 +287,10 @@ class SlaveSim(RunningStage):
         s["measured"], s["speed"] = np.round(home / step) * step, 0.0
         s["command_stamp_ns"] = s["arrival_ns"] = s["seen_ns"] = s["refused"] = 0
         arm.q[:], arm.dq[:], arm.effort[:], arm.memory[:] = home, 0.0, 0.0, 0.0
+        s["bent"], s["astray"], s["grip"], s["carried"] = 0.0, 0.0, 1.0, home
+        s["noise"] = (
+            np.random.SeedSequence(self._seed).generate_state(self.robot.n) % 2147483646 + 1
+        )
         held = self._gravity() * (1.0 - self.parameters["compensated"])
         self._law.begin(arm.memory, np.array(s["measured"]), held)
         row, transform = self.signals, np.empty((4, 4))
@@ -344,13 +308,14 @@ class SlaveSim(RunningStage):
         robot, p, drives = self.robot, self.parameters, self.robot.drives
         assert drives is not None
         assert robot.dynamics is not None
-        viscous = per_joint(robot, "viscous", parameters.viscous, drives.viscous)
-        coulomb = per_joint(robot, "coulomb", parameters.coulomb, drives.coulomb)
-        self.arm.gains[:] = self._gains(parameters, viscous)
-        p["viscous"], p["coulomb"] = viscous, coulomb
+        physics = self._physics(parameters)
+        self.arm.gains[:] = self._gains(parameters, physics.viscous)
+        for name in PER_JOINT:
+            p[name] = getattr(physics, name)
+        p["bristle_damping"] = bristle_damping(physics.bristle, drives.inertia)
+        p["wander_rate"] = self.dt / physics.wander_time
         p["lower"], p["upper"] = robot.lower, robot.upper
-        for name in ("effort_limit", "speed_limit", "encoder_step", "friction_speed"):
-            p[name] = getattr(drives, name)
+        p["effort_limit"], p["speed_limit"] = drives.effort_limit, drives.speed_limit
         self.arm.limit[:] = drives.effort_limit
         compensated = {
             "published": robot.dynamics.compensated, "all": 1.0, "none": 0.0
@@ -388,6 +353,20 @@ class SlaveSim(RunningStage):
         """Ticks of the move from home to where the slave starts; nothing is followed before."""
         return int(self.parameters["start_ticks"])
 
+    def _physics(self, parameters: SlaveSimParameters) -> Physics:
+        """Numbers of the plant, with the friction that the slave's own parameters give."""
+        chosen, robot = parameters.plant.kind, self.robot
+        made = PLANTS.find(chosen.kind).physics(chosen.parameters, robot)
+        viscous = per_joint(robot, "viscous", parameters.viscous, made.viscous)
+        coulomb = per_joint(robot, "coulomb", parameters.coulomb, made.coulomb)
+        return replace(made, viscous=viscous, coulomb=coulomb)
+
+    def _dynamics(self, physics: Physics) -> Array:
+        """Parameter row of the true dynamics."""
+        model = self.robot.dynamics
+        assert model is not None
+        return physics.dynamics if len(physics.dynamics) else model.parameters
+
     def _gains(self, parameters: SlaveSimParameters, viscous: Array) -> Array:
         table = self._law.gains(parameters.controller.kind.parameters, self.robot, viscous)
         return np.array(table, dtype=np.float64, order="C")
@@ -409,7 +388,13 @@ SLAVE_SIM = Stage(
     "slave_sim",
     SlaveSimParameters,
     reads=(SLAVE_SERVO_JP,),
-    writes=(SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP, SLAVE_MEASURED_JS, SLAVE_MEASURED_CP),
+    writes=(
+        SLAVE_SETPOINT_JS,
+        SLAVE_SETPOINT_CP,
+        SLAVE_MEASURED_JS,
+        SLAVE_MEASURED_CP,
+        SLAVE_TRUE_CP,
+    ),
     notes=(("command_status", "i8"),),
     make=SlaveSim,
     node="teleop_core.nodes.slave_sim:SlaveSimNode",

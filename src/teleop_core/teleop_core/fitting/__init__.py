@@ -1,0 +1,1 @@
+"""Fitting: numbers of a plant from what was measured on the machine."""

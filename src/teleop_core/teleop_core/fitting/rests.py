@@ -1,0 +1,117 @@
+"""Rests: where the slave comes to rest when it is moved to joint targets again and again."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.hardware import Hardware
+from teleop_core.signals import TICK_NS
+from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters, slave_step
+from teleop_core.slave.trajectory import cubic_move, shortest_move_time
+
+_FINE = 1e-4  # of an encoder step
+
+
+@kernel
+def _drive(p: Any, s: Any, arm: Any, row: Any, way: Array, begin_ns: int, dt: float) -> None:
+    """Command a way (N, n), a joint vector a tick, from the tick after ``begin_ns`` on."""
+    for k in range(way.shape[0]):
+        row.now_ns = begin_ns + (k + 1) * TICK_NS
+        row.slave_servo_jp_ns = row.now_ns
+        for i in range(way.shape[1]):
+            row.slave_servo_jp[i] = way[k, i]
+        slave_step(p, s, arm, row, dt)
+
+
+class Mover:
+    """A slave that is moved from target to target by cubics, as in the published precision test.
+
+    Args:
+        parameters: Its parameters; it starts at home whatever they say.
+        faults: The arm's faults in place of its own; None for its own.
+        speed: Share of the speed limits that the moves use.
+        settle: Time at rest after each move [s].
+        is_smooth: Whether encoders and drives have no steps, for a fit needs slopes.
+    """
+
+    def __init__(
+        self,
+        parameters: SlaveSimParameters,
+        faults: Hardware | None = None,
+        speed: float = 0.5,
+        settle: float = 1.0,
+        *,
+        is_smooth: bool = False,
+    ) -> None:
+        home = load_robot_set(parameters.robot, parameters.geometry).home
+        self.slave = SlaveSim(replace(parameters, start=tuple(home.tolist())))
+        if faults is not None:
+            for name in ("coulomb", "bias", "wander"):
+                self.slave.parameters[name] = getattr(faults, name)
+            if len(faults.dynamics):
+                self.slave.arm.dynamics[:] = faults.dynamics
+        if is_smooth:
+            self.slave.parameters["encoder_step"] *= _FINE
+            self.slave.parameters["effort_step"] = 0.0
+        self._speed, self._settle, self._now_ns = speed, settle, 0
+        self.goal = self.slave.robot.home.copy()
+        assert self.slave.robot.drives is not None
+        self._limit = self.slave.robot.drives.speed_limit * speed
+
+    def move(self, target: Array) -> Array:
+        """Joints (n,) that the encoders show when the slave has come to rest at a target (n,).
+
+        A target outside the joint limits is approached as far as they allow.
+        """
+        slave, goal = self.slave, np.asarray(target, dtype=np.float64)
+        time = shortest_move_time(self.goal, goal, self._limit)
+        count = math.ceil((time + self._settle) / slave.dt)
+        way = cubic_move(self.goal, goal, time, slave.dt * np.arange(1.0, count + 1.0))[0]
+        p, s, arm = slave.arguments
+        _drive(p, s, arm, slave.signals, np.ascontiguousarray(way), self._now_ns, slave.dt)
+        self._now_ns += count * TICK_NS
+        self.goal = goal
+        return np.array(slave.signals["slave_measured_js"][: len(goal)])
+
+    def true_pose(self) -> Array:
+        """Where the tip really is: x, y, z [m] and a quaternion, (7,)."""
+        return np.array(self.slave.signals["slave_true_cp"])
+
+
+def rest_positions(
+    parameters: SlaveSimParameters,
+    targets: Array,
+    runs: int,
+    faults: Hardware | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+    *,
+    is_smooth: bool = False,
+) -> Array:
+    """Joints at rest (k, runs, n) [rad or m] of ``runs`` moves from home to each target (k, n).
+
+    The slave goes home after each move, as in Vongbunyong 2008, section 7.3.
+
+    Args:
+        parameters: Of the slave.
+        targets: Joint targets; what lies outside the limits is taken to them.
+        runs: Moves to each.
+        faults: The arm's faults in place of its own.
+        progress: Hears the share that is done.
+        is_smooth: Whether encoders and drives have no steps.
+    """
+    mover = Mover(parameters, faults, is_smooth=is_smooth)
+    robot = mover.slave.robot
+    home, inside = mover.goal.copy(), np.clip(targets, robot.lower, robot.upper)
+    rests = np.empty((len(targets), runs, len(home)))
+    for k, target in enumerate(inside):
+        for run in range(runs):
+            rests[k, run] = mover.move(target)
+            mover.move(home)
+            progress((k * runs + run + 1) / (len(targets) * runs))
+    return rests

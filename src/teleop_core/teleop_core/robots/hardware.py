@@ -1,0 +1,79 @@
+"""Hardware: what a real arm does beside its ideal model, as measured or fitted."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.geometry import Array
+from teleop_core.parameters import MARKS
+from teleop_core.robots.drives import read_only
+from teleop_core.robots.link_errors import LinkErrors
+
+NUMBERS = ("coulomb", "bias", "wander", "play")
+ENTRIES = (*NUMBERS, "coupling", "links", "dynamics")
+NOT_NEGATIVE = ("coulomb", "wander", "play")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hardware:
+    """Faults of a real arm, one number per joint, (n,) each; the arrays are read-only copies.
+
+    Args:
+        coulomb: Dry friction that holds a joint at rest [N·m or N], >= 0.
+        bias: Effort that the amplifier gives when none is asked for [N·m or N].
+        wander: Standard deviation of dry friction over its mean, >= 0.
+        play: Half width of the play between encoder and joint [rad or m], >= 0: backlash, and
+            friction behind an elastic tendon, which moves the joint alike.
+        coupling: (n, n), zero on and above the diagonal: what a joint moves per lag of an earlier
+            one behind its encoder.
+        links: How the links, and the zeros of the joints, differ from the drawing; None: not.
+        dynamics: Parameter row of the true dynamics; empty when they are as the control law knows.
+        sources: Each name above to how its numbers are known, as of
+            :func:`teleop_core.parameters.parameter`.
+
+    Raises:
+        ShapeError: An array has another shape than ``coulomb`` asks for.
+        ParameterError: A number is not possible, or a source names no mark.
+        UnknownNameError: A source of what is no number.
+    """
+
+    coulomb: Array
+    bias: Array
+    wander: Array
+    play: Array
+    coupling: Array
+    links: LinkErrors | None = None
+    dynamics: Array = field(default_factory=lambda: np.zeros(0))
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in NUMBERS:
+            array = read_only(name, getattr(self, name), np.shape(self.coulomb))
+            if name in NOT_NEGATIVE and not (array >= 0.0).all():
+                raise ParameterError(f"hardware.{name}", array.tolist(), ">= 0 for every joint")
+            object.__setattr__(self, name, array)
+        n = len(self.coulomb)
+        coupling = np.array(self.coupling, dtype=np.float64)
+        if coupling.shape != (n, n):
+            raise ShapeError("hardware.coupling", (n, n), coupling.shape)
+        if np.triu(coupling).any():
+            raise ParameterError(
+                "hardware.coupling", coupling.tolist(), "zero but of earlier joints"
+            )
+        coupling.setflags(write=False)
+        object.__setattr__(self, "coupling", coupling)
+        if self.links is not None and self.links.n != n:
+            raise ShapeError("hardware.links", n, self.links.n)
+        object.__setattr__(self, "dynamics", read_only("dynamics", self.dynamics))
+        self._check_sources()
+
+    def _check_sources(self) -> None:
+        for name, text in self.sources.items():
+            if name not in ENTRIES:
+                raise UnknownNameError("hardware source", name, ENTRIES)
+            if text.partition(":")[0] not in MARKS:
+                raise ParameterError(f"source of {name}", text, f"one that begins with {MARKS}")
+        object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))

@@ -1,0 +1,47 @@
+"""Hardware of the RCRT-1: what the built arm does beside its model.
+
+Encoders sit on the motors, so whatever lies behind them is in none of the published errors of
+chapters 7 and 8; the accuracy test, with a ruler at the tip, is the only one that saw it.
+
+Source:
+    Vongbunyong 2008, sections 3.4, 7.3 and appendix E; what is fitted or assumed is marked.
+"""
+
+import numpy as np
+
+from teleop_core.robots.hardware import Hardware
+from teleop_core.robots.link_errors import LinkErrors
+from teleop_core.robots.rcrt1_dynamics import link_row
+
+_FIT = "fitted: to tables 7.1-7.6 with the gains of source_pid, by `teleop fit`"
+# What is left of the accuracy test once d3 is mended, 0.352 mm, over the 37 mm from wrist to tip
+# is a play of the tendons of ±9.5 mrad; half of it is taken, for the ruler has its share.
+_PLAY = 0.5 * 0.352e-3 / 0.037
+_COUPLING = np.zeros((6, 6))
+_COUPLING[5, 4] = 2.5 / 2.5  # r5 / r6: the tendon of joint 6 runs over the idler of axis 5
+# One draw of the tolerances: ±20 µm of machined lengths (links 1-3), ±100 µm of printed ones
+# (links 4-6), and angles as such steps give them over a bearing 50 mm wide.
+_LENGTH = np.array([20e-6, 20e-6, 20e-6, 100e-6, 100e-6, 100e-6])
+_DRAWN = np.random.default_rng(2008).uniform(-1.0, 1.0, (4, 6)) * np.stack(
+    [_LENGTH, _LENGTH / 0.05, _LENGTH, np.zeros(6)]
+)
+_DRAWN[2, 2] = 5.5e-3  # d3
+
+HARDWARE = Hardware(
+    coulomb=np.array([0.0842, 0.231, 1.0, 6.08e-3, 5.61e-4, 5.00e-4]),
+    bias=np.array([0.0408, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    wander=np.array([0.37, 0.21, 0.21, 0.42, 0.68, 0.78]),
+    play=np.array([0.0, 0.0, 0.0, 0.0, _PLAY, _PLAY]),
+    coupling=_COUPLING,
+    links=LinkErrors.from_vector(_DRAWN.ravel()),
+    dynamics=link_row(m2b_L0b=0.0125),
+    sources={
+        "coulomb": f"{_FIT}; of d3, which an integrator brings to its target: assumed",
+        "bias": _FIT,
+        "wander": f"{_FIT}; of d3 as of theta2",
+        "play": "assumed: half of what the accuracy test leaves once d3 is mended",
+        "coupling": "derived: radii r5 / r6 of the tendons' pulleys",
+        "links": "fitted: d3 to tables E.1-E.3; the others assumed, one draw of the tolerances",
+        "dynamics": f"{_FIT}; m2b L0b of the four-bar, which the published controller neglects",
+    },
+)
