@@ -58,7 +58,8 @@ def test_residual_is_what_forward_kinematics_leaves(name, geometry):
     for _ in range(100):
         T = any_pose(rng)
         result = robot.ik(T, seed=rng.uniform(robot.lower, robot.upper))
-        gap = np.linalg.norm(robot.fk(result.q)[:3, 3] - T[:3, 3])
+        reached = robot.solve_fk(result.q, search=False).T
+        gap = np.linalg.norm(reached[:3, 3] - T[:3, 3])
         # Legs that hide the turn of a level platform put the tip of the tool elsewhere.
         assert abs(gap - result.residual[0]) < 1e-6
 
@@ -68,11 +69,12 @@ def test_a_batch_is_the_same_as_its_single_questions(name, geometry):
     robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(3)
     poses = np.array([any_pose(rng) for _ in range(20)])
     batch = robot.ik(poses)
+    reached = robot.solve_fk_batch(batch.q).T
     for k, T in enumerate(poses):
         single = robot.ik(T)
         assert np.array_equal(single.q, batch.q[k])
         assert single.status == batch.status[k]
-        assert np.array_equal(robot.fk(batch.q)[k], robot.fk(single.q))
+        assert np.array_equal(reached[k], robot.solve_fk(single.q).T)
 
 
 @pytest.mark.parametrize(("name", "geometry"), ROBOTS)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import roboticstoolbox as rtb
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import rotation, transform
-from teleop_core.robots import IkStatus, list_robots, load_robot
+from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
 from teleop_core.robots.rps3 import Assembly, assembly_modes, joint_points, leg_coordinates
 from teleop_core.robots.rps3_loop import constraints
 
@@ -126,11 +126,15 @@ def test_no_assembly_mode_is_missed(lengths):
     assert reached > 100
 
 
-def test_legs_that_cannot_meet_are_a_status_with_a_finite_pose():
+def test_legs_that_cannot_meet_are_a_status_with_a_finite_pose_and_no_pose_of_fk():
     modes = assembly_modes([0.1, 0.1, 5.0], b=B, a=A)
     assert modes.status == Assembly.CANNOT_ASSEMBLE
     assert modes.angles.shape == (0, 3)
-    assert np.isfinite(load_robot("rps3").fk([0.1, 0.1, 5.0])).all()
+    answer = load_robot("rps3").solve_fk([0.1, 0.1, 5.0])
+    assert answer.status == FkStatus.NOT_CLOSED
+    assert np.isfinite(answer.T).all()
+    with pytest.raises(ClosureError):
+        load_robot("rps3").fk([0.1, 0.1, 5.0])
 
 
 def test_the_robot_reaches_height_and_tilt_and_leaves_the_rest_as_residual():

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
 from teleop_core.geometry import rotation, transform
-from teleop_core.robots import IkStatus, list_robots, load_robot
+from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
 from teleop_core.robots.stewart import PAIRED, DirectStatus, Layout
 
 SIXTHS = np.radians([0.0, 60.0, 120.0, 180.0, 240.0, 300.0])
@@ -175,7 +175,7 @@ def test_along_a_path_through_the_singularity_the_legs_keep_their_step_and_go_on
     assert np.allclose(q, robot.ik_all(T)[0], atol=1e-12)
 
 
-def test_any_layout_loads_as_a_robot_and_the_singular_one_refuses_by_nan():
+def test_any_layout_loads_as_a_robot_and_the_singular_one_refuses():
     rng = np.random.default_rng(7)
     crooked = Layout(PAIRED.base + rng.normal(0, 0.02, (6, 3)), PAIRED.platform)
     robot = load_robot("stewart", **crooked.symbols())
@@ -186,8 +186,11 @@ def test_any_layout_loads_as_a_robot_and_the_singular_one_refuses_by_nan():
     result = robot.ik(T)
     assert np.allclose(result.q, hexagons.legs(T))
     assert result.status == IkStatus.NEAR_SINGULAR
-    assert np.isnan(robot.fk(result.q)[:3]).all()
-    assert np.isnan(robot.jacobian(result.q)).all()
+    assert robot.solve_fk(result.q).status == FkStatus.UNDETERMINED
+    assert robot.fk_all(result.q).shape == (0, 4, 4)
+    for question in (robot.fk, robot.jacobian):
+        with pytest.raises(ClosureError, match="architecturally singular"):
+            question(result.q)
 
 
 def test_bad_layouts_and_questions_are_refused():

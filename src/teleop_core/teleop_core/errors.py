@@ -36,6 +36,14 @@ class UnknownNameError(ParameterError):
         super().__init__(kind, value, "one of: " + ", ".join(shown))
 
 
+class ClosureError(ParameterError):
+    """Joints with which a robot's loops do not close: carries the ``residual`` that is left [m]."""
+
+    def __init__(self, name: str, value: object, requirement: str, residual: float) -> None:
+        self.residual = residual
+        super().__init__(name, value, requirement)
+
+
 class PartError(TeleopError):
     """A part cannot be used: carries its ``kind``, its ``name`` and what was ``expected``."""
 

@@ -23,7 +23,17 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from teleop_core.errors import ParameterError
-from teleop_core.robots.kinematics import IkBatch, IkOne, IkResult, IkStatus, Kernels
+from teleop_core.robots.kinematics import (
+    FkBatch,
+    FkOne,
+    FkResult,
+    FkStatus,
+    IkBatch,
+    IkOne,
+    IkResult,
+    IkStatus,
+    Kernels,
+)
 from teleop_core.robots.parts import ROBOTS, Part, RobotPart, built, from_file, part_name
 from teleop_core.robots.robot import Robot
 
@@ -33,6 +43,10 @@ if TYPE_CHECKING:
 __all__ = [
     "ROBOTS",
     "DhTable",
+    "FkBatch",
+    "FkOne",
+    "FkResult",
+    "FkStatus",
     "IkBatch",
     "IkOne",
     "IkResult",

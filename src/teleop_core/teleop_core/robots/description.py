@@ -29,7 +29,7 @@ def text(robot: Robot) -> str:
     lines.append(f"drives: {drives(robot)}")
     if _OF_CHAINS not in robot.geometry:
         lines.append("geometry: " + ", ".join(f"{k} = {v:g}" for k, v in robot.geometry.items()))
-    tip = np.array2string(robot.fk(robot.home), precision=4, suppress_small=True)
+    tip = np.array2string(robot.solve_fk(robot.home).T, precision=4, suppress_small=True)
     return "\n".join([*lines, "T_base_tip at home:", tip])
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
+from teleop_core.robots.kinematics import FkStatus
 from teleop_core.robots.robot import Robot
 
 COLUMNS = ("x_m", "y_m", "z_m", "manipulability")
@@ -26,12 +27,27 @@ def controlled_jacobian(robot: Robot, q: object, length: float = 1.0) -> Array:
     Raises:
         ShapeError: ``q`` has another shape.
         ParameterError: NaN or infinity; or the length is not above 0.
+        ClosureError: The loops do not close with these joints.
     """
+    _check_length(length)
+    return _controlled(robot, robot.jacobian(q), length)
+
+
+def _check_length(length: float) -> None:
     if not (math.isfinite(length) and length > 0.0):
         raise ParameterError("length", length, "finite and above 0 m")
-    jacobian = robot.jacobian(q)
+
+
+def _controlled(robot: Robot, jacobian: Array, length: float) -> Array:
     jacobian[:3] /= length
     return jacobian[np.array(robot.task_mask)]
+
+
+def _kernel_jacobian(robot: Robot, q: Array) -> Array:
+    """Jacobian (6, n) where loops may be open, too."""
+    jacobian = np.empty((6, robot.n))
+    robot.kernels.jacobian(q, robot.geometry_row, jacobian)
+    return jacobian
 
 
 def singular_values(robot: Robot, q: object, length: float = 1.0) -> Array:
@@ -48,6 +64,7 @@ def singular_values(robot: Robot, q: object, length: float = 1.0) -> Array:
     Raises:
         ShapeError: ``q`` has another shape.
         ParameterError: NaN or infinity; or the length is not above 0.
+        ClosureError: The loops do not close with these joints.
     """
     jacobian = controlled_jacobian(robot, q, length)
     return np.asarray(np.linalg.svd(jacobian, compute_uv=False), dtype=np.float64)
@@ -80,7 +97,9 @@ def sample_workspace(
     """Tip positions and manipulability of joint vectors drawn evenly inside the limits.
 
     Even in the joints is not even in space: the density of points says how many postures reach a
-    place.
+    place. Joints with which a robot's loops do not close next to home are left out; where no draw
+    closes, as with the joints of a hand, which hold an object by no chance, all count with their
+    pose of least error.
 
     Args:
         robot: The arm.
@@ -89,16 +108,22 @@ def sample_workspace(
         length: Distance [m] that counts as much as one radian in the manipulability.
 
     Returns:
-        Points in the base (count, 3) [m], and manipulability (count,).
+        Points in the base (k, 3) [m], and manipulability (k,); k is the count without loops.
 
     Raises:
         ParameterError: The count is below 1, or the length is not above 0.
     """
     if count < 1:
         raise ParameterError("count", count, "at least 1")
+    _check_length(length)
     joints = rng.uniform(robot.lower, robot.upper, (count, robot.n))
-    points = np.ascontiguousarray(robot.fk(joints)[:, :3, 3])
-    jacobians = np.stack([controlled_jacobian(robot, q, length) for q in joints])
+    answer = robot.solve_fk_batch(joints, search=False)
+    is_closed = answer.status < FkStatus.NOT_CLOSED
+    kept = is_closed if is_closed.any() else np.ones(count, dtype=bool)
+    points = np.ascontiguousarray(answer.T[kept, :3, 3])
+    jacobians = np.stack(
+        [_controlled(robot, _kernel_jacobian(robot, q), length) for q in joints[kept]]
+    )
     values = np.linalg.svd(jacobians, compute_uv=False).prod(axis=-1)
     return points, np.asarray(values, dtype=np.float64)
 

@@ -3,8 +3,9 @@
 q is the crank angle theta1 alone; the tip is the point of the coupler at distance ``a`` from the
 crank, with x along the coupler. ``ik`` takes the point of its curve nearest to the wanted x and
 y, and everything else is residual. ``mode``, 1 or -1, is the sign in front of the arc cosine of
-the closure. Outside its range a crank is drawn with the loop torn as little as possible;
-:class:`FourBar` answers with a status instead, for both modes and in all forms of the closure.
+the closure. Outside its range :meth:`Robot.fk` refuses a crank, and :meth:`Robot.solve_fk` says
+NOT_CLOSED and gives the loop torn as little as possible; :class:`FourBar` answers for both modes
+and in all forms of the closure.
 
 Source:
     Ghosal 2020, lecture 11, section on the planar 4-bar; Freudenstein 1954.
@@ -21,7 +22,14 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import bounded, turned, wrapped
 from teleop_core.robots.drives import geared_motors, independent_axes
 from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar
-from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.kinematics import (
+    REACHED,
+    FkStatus,
+    IkStatus,
+    Kernels,
+    is_askable,
+    pose_residual,
+)
 from teleop_core.robots.robot import Robot, geometry_of
 
 __all__ = ["GEOMETRY", "Assembly", "Closure", "FourBar", "make"]
@@ -35,6 +43,8 @@ _NEAR = 0.02
 _ROUNDING = 1e-12
 _CLOSE = 1e-15  # m, where going further down makes no difference
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
+_CLOSED, _NOT_CLOSED = int(FkStatus.CLOSED), int(FkStatus.NOT_CLOSED)
+_NEAR_SINGULAR_FK = int(FkStatus.NEAR_SINGULAR)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
@@ -79,6 +89,44 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     T[:] = 0.0
     T[0, 0], T[0, 1], T[1, 0], T[1, 1], T[2, 2], T[3, 3] = c, -s, s, c, 1.0, 1.0
     T[0, 3], T[1, 3] = l1 * links.crank_x + a * c, l1 * links.crank_y + a * s
+
+
+@kernel
+def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
+    """Write ``T_base_tip`` of theta1 (1,); see :class:`kinematics.Kernels`.
+
+    From a seed it is the mode whose point is nearer to the seed's; both have one angle at the end
+    of the range. Two modes need no search.
+    """
+    g = geometry.copy()
+    if ask[1] > 0.0:
+        seed, other = T.copy(), np.empty((4, 4))
+        g[5] = -geometry[5]
+        fk(q, g, other)
+        fk(q, geometry, T)
+        if np.abs(other - seed).max() >= np.abs(T - seed).max():
+            g[5] = geometry[5]
+    fk(q, g, T)
+    links = _links(q[0], g)
+    x = g[0] + g[3] * links.rocker_x - g[1] * links.crank_x
+    y = g[3] * links.rocker_y - g[1] * links.crank_y
+    out[0] = abs(math.sqrt(x * x + y * y) - g[2])
+    out[1] = g[5] * geometry[5]
+    if out[0] > REACHED:
+        return _NOT_CLOSED
+    sine = links.rocker_y * links.coupler_x - links.rocker_x * links.coupler_y
+    return _NEAR_SINGULAR_FK if abs(sine) < _NEAR else _CLOSED
+
+
+@kernel
+def assemblies(q: Array, geometry: Array, found: Array) -> int:
+    """Write both ``T_base_tip`` of theta1 (1,); see :class:`kinematics.Kernels`."""
+    g, out = geometry.copy(), np.empty(2)
+    if assemble(q, g, np.zeros(2), found[0], out) >= _NOT_CLOSED:
+        return 0
+    g[5] = -g[5]
+    fk(q, g, found[1])
+    return 2 if np.abs(found[0] - found[1]).max() > REACHED else 1
 
 
 @inner
@@ -234,7 +282,14 @@ def make(**geometry: float | str) -> Robot:
         upper=np.array([upper]),
         home=np.array([0.5 * (lower + upper)]),
         geometry=row,
-        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        kernels=Kernels(
+            fk=fk,
+            jacobian=jacobian,
+            ik=ik,
+            ik_all=ik_all,
+            assemble=assemble,
+            assemblies=assemblies,
+        ),
         drives=drives,
         dynamics=independent_axes(drives.inertia),
         task_mask=(True, True, False, False, False, False),

@@ -16,17 +16,28 @@ from teleop_core.kernels import inner, kernel
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
 # Signatures that let one compiled graph run any robot: see Kernels for the arguments.
 FK = types.void(_ROW, _ROW, _TABLE)
+ASSEMBLE = types.int64(_ROW, _ROW, _ROW, _TABLE, _ROW)
 IK = types.int64(_TABLE, _ROW, _TABLE, _ROW, _ROW, _ROW)
 WriteKernel: TypeAlias = Callable[[Array, Array, Array], None]
 IkKernel: TypeAlias = Callable[[Array, Array, Array, Array, Array, Array], int]
 IkAllKernel: TypeAlias = Callable[[Array, Array, Array], int]
+AssembleKernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], int]
+AssembliesKernel: TypeAlias = Callable[[Array, Array, Array], int]
 
 # Directions of the tip in base axes, in the order of every task mask.
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # A pose counts as reached within this distance [m] and angle [rad].
 REACHED = 1e-9
+# Joints that say more than the pose may contradict each other by so much [m]: encoders, play.
+AGREED = 1e-4
 # Most joint vectors that one pose can have: the three-fingered hand, four for each finger.
 MAX_BRANCHES = 64
+# Most poses that one joint vector can have: a platform on six legs has 40 (Dietmaier 1998).
+MAX_ASSEMBLIES = 64
+# Starts of the search for an assembly where the one next to the seed does not close, and of the
+# search for all of them. Of the leg sets that have an assembly, a quarter of the starts and more
+# end in one.
+SEARCH, SEARCH_ALL = 64, 384
 
 
 class IkStatus(IntEnum):
@@ -38,7 +49,42 @@ class IkStatus(IntEnum):
     UNREACHABLE = 3  # no joint vector reaches the position; the nearest one is returned
 
 
+class FkStatus(IntEnum):
+    """Whether forward kinematics found a pose with which the loops of a robot close."""
+
+    CLOSED = 0  # the loops close, in the assembly next to the seed
+    NEAR_SINGULAR = 1  # they close there, but the joints hardly fix the tip, and assemblies meet
+    OTHER_MODE = 2  # they close, but not next to the seed: the nearest assembly that was found
+    NOT_CLOSED = 3  # no assembly was found; the pose of least error next to the seed is returned
+    UNDETERMINED = 4  # joints of this layout never fix a pose; the seed is returned
+
+
+_NOT_CLOSED = int(FkStatus.NOT_CLOSED)
+
 Status = TypeVar("Status")
+Number = TypeVar("Number")
+Sign = TypeVar("Sign")
+
+
+class FkResult(NamedTuple, Generic[Status, Number, Sign]):
+    """Answer of forward kinematics: for one q, or for N with a leading axis in each entry."""
+
+    T: Array
+    """``T_base_tip`` (4, 4) or (N, 4, 4), always finite; closed loops only where status says so."""
+    status: Status
+    """:class:`FkStatus` of one q; for N an integer array (N,) of its values."""
+    residual: Number
+    """Largest error of loop closure [m], a float or (N,); exactly 0 for a robot without loops."""
+    mode: Sign
+    """Side of the singular poses: 1 as at home, -1 the other, 0 without loops; for N (N,).
+
+    Between two poses of different sign every path meets a singular pose. Assemblies of one sign
+    are told apart by their place in :meth:`~teleop_core.robots.robot.Robot.fk_all`.
+    """
+
+
+FkOne: TypeAlias = FkResult[FkStatus, float, int]
+FkBatch: TypeAlias = FkResult[NDArray[np.int64], Array, NDArray[np.int64]]
 
 
 class IkResult(NamedTuple, Generic[Status]):
@@ -69,6 +115,15 @@ class Kernels:
     ``ik_all(T, geometry, solutions)`` fills rows of ``solutions`` (:data:`MAX_BRANCHES`, n) and
     returns how many, without regard to limits.
 
+    Robots with loops have two more. ``assemble(q, geometry, ask, T, out)`` writes the pose T, and
+    ``out`` (2,): residual and mode of :class:`FkResult`; it returns an :class:`FkStatus`. ``ask``
+    (2,) is how many starts a search may take where the assembly next to the seed does not close,
+    0 for none, and 1 if T holds the seed, 0 if home is meant: then T is what ``fk`` writes, unless
+    that does not close and the search finds another. ``assemblies(q, geometry, found)`` fills
+    ``found`` (:data:`MAX_ASSEMBLIES`, 4, 4) with all poses it finds and returns how many. ``fk``
+    itself never searches, so that it takes microseconds in a tick, and never fails: where nothing
+    closes next to home it writes the pose of least error.
+
     Shapes: ``q`` and ``seed`` (n,), ``T`` (4, 4), ``J`` (6, n), ``residual`` (2,), all float64 in
     C order and writable: for read-only arrays numba would compile a second time.
     """
@@ -77,6 +132,8 @@ class Kernels:
     jacobian: WriteKernel
     ik: IkKernel
     ik_all: IkAllKernel
+    assemble: AssembleKernel | None = None
+    assemblies: AssembliesKernel | None = None
 
 
 @inner
@@ -114,6 +171,31 @@ def fk_batch(fk: WriteKernel, q: Array, geometry: Array, transforms: Array) -> N
     """Write transforms (N, 4, 4) of joint vectors (N, n)."""
     for i in range(q.shape[0]):
         fk(q[i], geometry, transforms[i])
+
+
+@kernel
+def assemble_batch(
+    assemble: AssembleKernel,
+    q: Array,
+    geometry: Array,
+    ask: Array,
+    is_path: bool,
+    transforms: Array,
+    numbers: Array,
+    statuses: NDArray[np.int64],
+) -> None:
+    """Write transforms (N, 4, 4), residuals and modes (N, 2), statuses (N,) of joints (N, n).
+
+    Each from the seed that stands in its place, or from home, as ``ask`` says; in a path all but
+    the first from the last before it that closed.
+    """
+    seed = np.empty((4, 4))
+    for i in range(q.shape[0]):
+        if is_path:
+            if i == 0 or statuses[i - 1] < _NOT_CLOSED:
+                seed[:] = transforms[max(i - 1, 0)]
+            transforms[i] = seed
+        statuses[i] = assemble(q[i], geometry, ask, transforms[i], numbers[i])
 
 
 @kernel

@@ -70,7 +70,7 @@ def lever(robot: Robot) -> float:
     The reach is the largest distance of the tip from the base's origin over the postures that are
     looked at.
     """
-    return float(np.linalg.norm(robot.fk(samples(robot))[:, :3, 3], axis=1).max()) / math.pi
+    return float(np.linalg.norm(_poses(robot, samples(robot))[:, :3, 3], axis=1).max()) / math.pi
 
 
 def samples(robot: Robot) -> Array:
@@ -113,7 +113,7 @@ def start_posture(robot: Robot) -> Array:
     if moves[0] >= round(ENOUGH_MOVE / STEP) and turns[0] >= round(ENOUGH / STEP):
         return robot.home
     spread = samples(robot)
-    held = robot.fk(spread)
+    held = _poses(robot, spread)
     held[:, :3, :3] = robot.fk(robot.home)[:3, :3]
     answer = robot.ik_batch(held)
     postures = np.vstack((robot.home, answer.q[answer.status == _FOLLOWED]))
@@ -143,6 +143,11 @@ def roomy_postures(robot: Robot, count: int) -> Array:
     return np.vstack((robot.start, wide[: count - 1]))
 
 
+def _poses(robot: Robot, postures: Array) -> Array:
+    """Poses (N, 4, 4) next to home, of least error where joints spread evenly do not assemble."""
+    return robot.solve_fk_batch(postures, search=False).T
+
+
 def _steps(robot: Robot, postures: Array) -> tuple[Array, Array]:
     """Steps (N,) that every posture has in its worst direction: of moving, of turning; or inf."""
     mask = np.array(robot.task_mask)
@@ -166,9 +171,11 @@ def _walk(robot: Robot, postures: Array, directions: Array, *, is_turn: bool) ->
         return np.full(count, np.inf)
     slide = STEP * lever(robot)
     limits, unit = robot.limits(), STEP if is_turn else slide
-    is_sliding = np.abs(robot.jacobian(robot.home)[3:]).max(axis=0) < 1e-9
+    jacobian = np.empty((6, robot.n))
+    robot.kernels.jacobian(robot.home.copy(), robot.geometry_row, jacobian)
+    is_sliding = np.abs(jacobian[3:]).max(axis=0) < 1e-9
     limits[2] = SWIFT * np.where(is_sliding, slide, STEP)
-    begin, alive, steps = robot.fk(postures), np.arange(count), np.zeros(count)
+    begin, alive, steps = _poses(robot, postures), np.arange(count), np.zeros(count)
     seeds = np.repeat(postures, fan, axis=0)
     for step in range(1, STEPS + 1):
         poses = _moved(begin[alive], step * unit * directions, is_turn)

@@ -9,8 +9,10 @@ plane, which makes the turn about the normal nothing (zero torsion) and moves th
 with R12 = R21, x = a/2 (R11 - R22) and y = -a R21. So ``task_mask`` is z and two tilts, and ``ik``
 leaves the rest as residual.
 
-Direct kinematics has up to 16 assembly modes, in pairs above and below the base;
-:func:`assembly_modes` finds all, ``fk`` the one next to legs that lean in to the platform.
+Direct kinematics has up to 16 assembly modes, in pairs above and below the base:
+:func:`assembly_modes` and :meth:`Robot.fk_all` find all. ``fk`` takes the one next to legs that
+lean in to the platform; nearly half of the legal leg triples have that. The others have modes
+that are tilted by more, and :meth:`Robot.fk` searches for the nearest of them.
 
 Source:
     Lee and Shah 1988; Ghosal 2020, lectures 6 and 11; inverse and modes derived from them.
@@ -25,15 +27,29 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.drives import electric_cylinders, independent_axes
-from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.kinematics import (
+    REACHED,
+    SEARCH,
+    IkStatus,
+    Kernels,
+    is_askable,
+    pose_residual,
+)
 from teleop_core.robots.robot import Robot, geometry_of
-from teleop_core.robots.rps3_loop import COSINES, SINES, constraints, frame, loop, points, settle
+from teleop_core.robots.rps3_loop import COSINES, SINES, constraints, frame, points, settle
 from teleop_core.robots.rps3_modes import (
     Assembly,
     AssemblyModes,
     assembly_modes,
     joint_points,
     leg_coordinates,
+)
+from teleop_core.robots.rps3_search import (
+    angles_of,
+    assemble,
+    assemblies,
+    is_near_singular,
+    lean,
 )
 from teleop_core.robots.stewart_legs import invert
 
@@ -49,45 +65,44 @@ __all__ = [
 
 # No lengths are published: hinges, ball joints, legs at home [m].
 GEOMETRY = {"b": 1.0, "a": 0.5, "l_home": 1.2}
-# Volume of the three unit rows of the loop equations under which the legs hardly fix the platform.
-_NEAR = 1e-3
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
 @inner
-def _lean(q: Array, geometry: Array, theta: Array) -> None:
+def _close(q: Array, geometry: Array, theta: Array) -> None:
     """Write leg angles (3,) of the assembly next to legs that lean in by b - a."""
-    b, a = geometry[0], geometry[1]
-    for i in range(3):
-        theta[i] = math.acos(min(max((b - a) / max(q[i], 1e-9), -1.0), 1.0))
-    settle(q, b, a, theta)
+    lean(q, geometry, theta)
+    settle(q, geometry[0], geometry[1], theta)
 
 
 @kernel
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip`` (4, 4) of leg lengths (3,) [m], found from the legs' even lean.
 
-    Where none is found (none closes, or all modes are far, tilted by 70 degrees and more) it is
-    the one of least error.
+    Of 46 % of the leg triples in the legal range it closes. Of the others, whose modes are all
+    far from there, it is the frame on the ball joints of least error: :func:`assemble` says so.
     """
     theta, S = np.empty(3), np.empty((3, 3))
-    _lean(q, geometry, theta)
+    _close(q, geometry, theta)
     points(q, theta, geometry[0], S)
     frame(S, T)
 
 
 @kernel
 def jacobian(q: Array, geometry: Array, J: Array) -> None:
-    """Write the Jacobian (6, 3): leg angles follow from the loop equations G dθ + H dl = 0."""
+    """Write the Jacobian (6, 3) at the pose of :func:`assemble`, search included.
+
+    Leg angles follow from the loop equations G dθ + H dl = 0.
+    """
     theta, S, T = np.empty(3), np.empty((3, 3)), np.empty((4, 4))
     gap, G, H, inverse = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     b, a = geometry[0], geometry[1]
-    _lean(q, geometry, theta)
+    assemble(q, geometry, np.array((float(SEARCH), 0.0)), T, np.empty(2))
+    angles_of(T, b, a, gap, theta)
     constraints(q, theta, b, a, gap, G, H)
     invert(G, inverse)
     points(q, theta, b, S)
-    frame(S, T)
     J[:] = 0.0
     for k in range(3):
         for i in range(3):
@@ -127,19 +142,6 @@ def _legs(T: Array, geometry: Array, q: Array) -> None:
         q[i] = math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@inner
-def _is_near_singular(q: Array, theta: Array, geometry: Array) -> bool:
-    """Whether the legs hardly fix the platform: unit rows of the loop equations span little."""
-    gap, G = np.empty(3), np.empty((3, 3))
-    loop(q, theta, geometry[0], geometry[1], gap, G)
-    volume = 1.0
-    for k in range(3):
-        volume *= math.sqrt(G[k, k] ** 2 + G[k, (k + 1) % 3] ** 2)
-    # Row k has no slope along angle k + 2: two products are left of the determinant's six.
-    determinant = G[0, 0] * G[1, 1] * G[2, 2] + G[0, 1] * G[1, 2] * G[2, 0]
-    return bool(abs(determinant) < _NEAR * volume)
-
-
 @kernel
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write leg lengths (3,) [m]; see :class:`teleop_core.robots.robot.Kernels`."""
@@ -148,7 +150,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     _legs(T, geometry, q)
     is_there = slowed(q, seed, limits, q)
     theta, S, reached = np.empty(3), np.empty((3, 3)), np.empty((4, 4))
-    _lean(q, geometry, theta)
+    _close(q, geometry, theta)
     points(q, theta, geometry[0], S)
     frame(S, reached)
     pose_residual(reached, T, residual)
@@ -156,7 +158,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     is_up = reached[2, 2] * T[2, 2] >= 0.0
     if abs(reached[2, 3] - T[2, 3]) > REACHED or tilt > REACHED or not is_up:
         return _UNREACHABLE if is_there else _LIMITED
-    return _NEAR_SINGULAR if _is_near_singular(q, theta, geometry) else _FOLLOWED
+    is_near = is_near_singular(q, theta, geometry[0], geometry[1])
+    return _NEAR_SINGULAR if is_near else _FOLLOWED
 
 
 @kernel
@@ -183,7 +186,14 @@ def make(**geometry: float | str) -> Robot:
         upper=home * 1.5,
         home=home,
         geometry=row,
-        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        kernels=Kernels(
+            fk=fk,
+            jacobian=jacobian,
+            ik=ik,
+            ik_all=ik_all,
+            assemble=assemble,
+            assemblies=assemblies,
+        ),
         drives=drives,
         dynamics=independent_axes(drives.inertia),
         task_mask=(False, False, True, True, True, False),

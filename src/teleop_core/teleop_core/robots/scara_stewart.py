@@ -24,12 +24,21 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots import scara_stewart_drives
 from teleop_core.robots.branches import bounded, hold, is_allowed, move_cost, slowed, turned
-from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.kinematics import (
+    SEARCH_ALL,
+    FkStatus,
+    IkStatus,
+    Kernels,
+    is_askable,
+    pose_residual,
+)
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_core.robots.scara_stewart_legs import (
     TILT,
+    close_platform,
     is_blind,
     is_similar,
+    layout,
     leg_lengths,
     leg_slopes,
     platform_pose,
@@ -37,6 +46,7 @@ from teleop_core.robots.scara_stewart_legs import (
     wanted_platform,
 )
 from teleop_core.robots.stewart_legs import invert
+from teleop_core.robots.stewart_search import closing_poses
 
 JOINTS = ("theta1", "theta2", "d3", "leg1", "leg2", "leg3", "leg4", "leg5", "leg6")
 # r_b to sigma_m are handed to the leg kernels as they stand here.
@@ -57,6 +67,7 @@ _NEAR = 0.02  # sine of the elbow under which small moves need large joint moves
 _SWING = 1.25 * math.pi  # rad, of a joint that a path sends round the other way
 # Sine of the elbow of a straight arm: shortens it by less than rounding, and has a sign.
 _STRAIGHT = 1e-8
+_NOT_CLOSED = int(FkStatus.NOT_CLOSED)
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
@@ -87,6 +98,53 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     """
     platform_pose(q[3:], geometry[_LEGS:_CARRIED], T)
     _place(q, geometry, T, T)
+
+
+@kernel
+def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
+    """Write ``T_base_tip``, (4, 4), of joints (9,); see :class:`kinematics.Kernels`.
+
+    Similar hexagons: the turn about the held centre, which six legs may contradict by
+    :data:`AGREED`. Other layouts: all six freedoms, from the seed if there is one.
+    """
+    g, platform = geometry[_LEGS:_CARRIED], np.empty((4, 4))
+    if ask[1] > 0.0:
+        _platform_of(q, geometry, T, platform)
+    status = close_platform(q[3:], g, ask, platform, out)
+    _place(q, geometry, platform, T)
+    return status
+
+
+@kernel
+def assemblies(q: Array, geometry: Array, found: Array) -> int:
+    """Write all ``T_base_tip`` of joints (9,); see :class:`kinematics.Kernels`.
+
+    One at most with similar hexagons, whose centre is held.
+    """
+    g, joints, out = geometry[_LEGS:_CARRIED], np.empty((2, 6, 3)), np.empty(2)
+    if is_similar(g[3], g[4]):
+        return 1 if assemble(q, geometry, np.zeros(2), found[0], out) < _NOT_CLOSED else 0
+    layout(g, joints)
+    count = closing_poses(q[3:], joints[0], joints[1], g[1], SEARCH_ALL, found)
+    for k in range(count):
+        _place(q, geometry, found[k].copy(), found[k])
+    return count
+
+
+@inner
+def _platform_of(q: Array, g: Array, T: Array, platform: Array) -> None:
+    """Write the platform's pose (4, 4) in the Stewart base of a tip (4, 4): undo `_place`."""
+    heading = g[_CARRIED] * (q[0] + q[1])
+    c, s = math.cos(heading), math.sin(heading)
+    dx = T[0, 3] - g[_L1] * math.cos(q[0]) - g[_L2] * math.cos(q[0] + q[1]) - g[_E] * T[0, 2]
+    dy = T[1, 3] - g[_L1] * math.sin(q[0]) - g[_L2] * math.sin(q[0] + q[1]) - g[_E] * T[1, 2]
+    platform[2, 3] = T[2, 3] - g[_H1] - q[2] - g[_E] * T[2, 2]
+    platform[0, 3], platform[1, 3] = c * dx + s * dy, c * dy - s * dx
+    for j in range(3):
+        x, y = T[0, j], T[1, j]
+        platform[0, j], platform[1, j], platform[2, j] = c * x + s * y, c * y - s * x, T[2, j]
+        platform[3, j] = 0.0
+    platform[3, 3] = 1.0
 
 
 @inner
@@ -306,7 +364,14 @@ def make(*, heading: str = "fixed", **geometry: float | str) -> Robot:
         home=np.concatenate((HOME_JOINTS, legs)),
         start=START.copy() if is_published else None,
         geometry=row,
-        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        kernels=Kernels(
+            fk=fk,
+            jacobian=jacobian,
+            ik=ik,
+            ik_all=ik_all,
+            assemble=assemble,
+            assemblies=assemblies,
+        ),
         drives=scara_stewart_drives.DRIVES,
         dynamics=scara_stewart_drives.DYNAMICS,
     )

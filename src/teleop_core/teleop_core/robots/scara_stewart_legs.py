@@ -18,7 +18,9 @@ import numpy as np
 
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
+from teleop_core.robots.kinematics import AGREED, FkStatus
 from teleop_core.robots.stewart_legs import direct, leg_system
+from teleop_core.robots.stewart_search import close_legs, side_of
 
 # Sine of sigma_b + sigma_m under which the layout counts as similar hexagons.
 _SIMILAR = 1e-9
@@ -29,6 +31,8 @@ _SINES = (0.0, math.sqrt(0.75), math.sqrt(0.75), 0.0, -math.sqrt(0.75), -math.sq
 _AGREED = 1e-29
 # Sine of the largest tilt of the platform, 75°: its ball joints' assumed limit.
 TILT = math.sin(math.radians(75.0))
+_CLOSED, _NEAR_SINGULAR = int(FkStatus.CLOSED), int(FkStatus.NEAR_SINGULAR)
+_OTHER_MODE, _NOT_CLOSED = int(FkStatus.OTHER_MODE), int(FkStatus.NOT_CLOSED)
 
 
 @inner
@@ -193,6 +197,48 @@ def platform_pose(legs: Array, g: Array, T: Array) -> None:
     joints = np.empty((2, 6, 3))
     layout(g, joints)
     direct(legs, joints[0], joints[1], g[1], is_similar(g[3], g[4]), T)
+
+
+@inner
+def home_side(g: Array) -> float:
+    """Sign of the leg Jacobian's determinant on a level platform."""
+    T, J = np.empty((4, 4)), np.empty((6, 6))
+    turned_and_tilted(0.0, 0.0, 0.0, T)
+    T[0, 3] = T[1, 3] = T[3, 0] = T[3, 1] = T[3, 2] = 0.0
+    T[2, 3], T[3, 3] = g[2], 1.0
+    leg_slopes(T, g, J)
+    return float(side_of(J))
+
+
+@inner
+def close_platform(legs: Array, g: Array, ask: Array, T: Array, out: Array) -> int:
+    """Write the platform pose (4, 4) that legs (6,) [m] close on, from a seed in T if there is one.
+
+    Args:
+        legs: Leg lengths (6,) [m].
+        g: r_b, r_m, w_z [m], sigma_b, sigma_m [rad].
+        ask: Starts of the search where no pose closes next to the seed, and whether T is a seed.
+        T: Seed, and platform in the Stewart base (4, 4).
+        out: Largest error of a leg [m], side of the singular poses (2,).
+
+    Returns:
+        :class:`FkStatus`.
+    """
+    found, joints = np.empty(6), np.empty((2, 6, 3))
+    layout(g, joints)
+    if is_similar(g[3], g[4]):
+        platform_pose(legs, g, T)
+        turning, out[0], out[1] = leg_lengths(T, g, found), 0.0, 1.0
+        for i in range(6):
+            out[0] = max(out[0], abs(found[i] - legs[i]))
+        if out[0] > AGREED:
+            return _NOT_CLOSED
+        return _NEAR_SINGULAR if is_blind(T, turning, g) else _CLOSED
+    if ask[1] == 0.0:
+        platform_pose(legs, g, T)
+    status = close_legs(legs, joints[0], joints[1], g[1], int(ask[0]), T, out)
+    out[1] *= home_side(g)
+    return _OTHER_MODE if status == _CLOSED and ask[1] == 0.0 and out[1] < 0.0 else status
 
 
 @inner

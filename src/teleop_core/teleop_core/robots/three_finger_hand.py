@@ -2,9 +2,10 @@
 
 The hand has six freedoms (nine joints less three distances between contacts). As a robot, q is
 all nine joints, theta, psi, phi of each finger; ``fk`` is the object's frame at the three contact
-points; ``ik`` keeps every finger on the contact point of the wanted object pose, so it only
-returns joints that hold the object unless a finger cannot follow. :class:`Hand` answers for
-contact points, single fingers, and the three joints that follow from six actuated ones.
+points, if the joints hold the object to 0.1 mm; ``ik`` keeps every finger on the contact point of
+the wanted object pose, so it only returns joints that hold the object unless a finger cannot
+follow. :class:`Hand` answers for contact points, single fingers, and the three joints that follow
+from six actuated ones.
 
 Source:
     Ghosal 2020, lectures 6 and 11, after Salisbury 1982; six freedoms, not three as spoken.
@@ -33,7 +34,15 @@ from teleop_core.robots.hand_grasp import (
     local_point,
     wanted_contact,
 )
-from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.robots.kinematics import (
+    AGREED,
+    REACHED,
+    FkStatus,
+    IkStatus,
+    Kernels,
+    is_askable,
+    pose_residual,
+)
 from teleop_core.robots.robot import Robot
 from teleop_core.robots.rps3_loop import frame
 
@@ -41,6 +50,7 @@ __all__ = ["GEOMETRY", "Grasp", "GraspResult", "Hand", "make"]
 
 _LIMITS = np.radians([80.0, 110.0, 150.0])  # assumed, either way
 _NEAR = 0.02  # sine of phi, and reach over full reach, that count as near singular
+_CLOSED, _NOT_CLOSED = int(FkStatus.CLOSED), int(FkStatus.NOT_CLOSED)
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
@@ -51,6 +61,26 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     points = np.empty((3, 3))
     contacts(q, geometry, points)
     frame(points, T)
+
+
+@kernel
+def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
+    """Write ``T_base_object`` of nine joints; see :class:`kinematics.Kernels`.
+
+    The pose is that of the contact points, whatever the seed; the residual is the largest slip
+    between two of them, which may be :data:`AGREED`.
+    """
+    points = np.empty((3, 3))
+    contacts(q, geometry, points)
+    frame(points, T)
+    out[0], out[1] = 0.0, 1.0
+    for i in range(FINGERS):
+        j = (i + 1) % FINGERS
+        square = 0.0
+        for r in range(3):
+            square += (points[i, r] - points[j, r]) ** 2
+        out[0] = max(out[0], abs(math.sqrt(square) - geometry[SIDE]))
+    return _CLOSED if out[0] <= AGREED else _NOT_CLOSED
 
 
 @kernel
@@ -155,7 +185,7 @@ def make(**geometry: float | str) -> Robot:
         upper=np.tile(_LIMITS, FINGERS),
         home=home,
         geometry=row,
-        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
+        kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble),
         drives=drives,
         dynamics=independent_axes(drives.inertia),
     )
