@@ -71,13 +71,11 @@ def _outcomes(names: tuple[str, ...], seed: int) -> "list[Outcome]":
 
 
 def _show(outcomes: "list[Outcome]") -> None:
-    from rich.console import Console
+    from teleop_core.experiments.table import show, summary, terminal
 
-    from teleop_core.experiments.table import outcome_table, summary
-
-    console = Console()
+    console = terminal()
     for outcome in outcomes:
-        console.print(outcome_table(outcome))
+        show(outcome, console)
     print(summary(outcomes))
 
 

@@ -2,7 +2,7 @@
 
 from teleop_core.experiments.bench import Settings
 
-PREDICTED: Settings = {}
-"""Scenarios as they are: the plant and the controller of the source."""
-OURS: Settings | None = None
-"""The same plant under another controller; None as long as there is none."""
+PREDICTED: Settings = {"plant": "hardware", "controller": "source_pid"}
+"""The source's machine under the source's controller."""
+OURS: Settings = {"plant": "hardware", "controller": "pid"}
+"""The same machine under our controller."""

@@ -25,16 +25,14 @@ def _measure(bench: Bench) -> Findings:
         group = f"position error, RMS, {printed.mode}"
         on, off = bench.sessions(name, PREDICTED), bench.sessions(name, {**PREDICTED, **_OFF})
         with_it, without = _rms(on), _rms(off)
-        ours = ours_off = None
-        if OURS is not None:
-            ours = _rms(bench.sessions(name, OURS))
-            ours_off = _rms(bench.sessions(name, {**OURS, **_OFF}))
+        ours = _rms(bench.sessions(name, OURS))
+        ours_off = _rms(bench.sessions(name, {**OURS, **_OFF}))
         rows += [
             Row(quantity="with compensation", unit="mm", published=printed.position_mm[0],
                 predicted=with_it, ours=ours, within=percent(15.0), group=group),
             Row(quantity="without", unit="mm", predicted=without, ours=ours_off, group=group),
             Row(quantity="without over with", predicted=without / with_it,
-                ours=ours_off / ours if ours and ours_off is not None else None, group=group),
+                ours=ours_off / ours, group=group),
         ]  # fmt: skip
         figures.append(_figure(printed.mode, on[0], off[0]))
     return Findings((*rows, *_effort_rows()), tuple(figures), _NOTES)

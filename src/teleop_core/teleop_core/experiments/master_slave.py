@@ -70,7 +70,7 @@ def _row(
     together = pooled if is_rms else mean
     return Row(
         quantity=quantity, unit=unit, published=published, predicted=together(found),
-        ours=together(ours) if ours else None, within=within, lowest=min(found),
+        ours=together(ours), within=within, lowest=min(found),
         highest=max(found), group=group, note=note,
     )  # fmt: skip
 
@@ -100,9 +100,7 @@ def _mode_rows(name: str, found: list[Figures], ours: list[Figures]) -> list[Row
 def _measure(bench: Bench) -> Findings:
     sessions = {name: bench.sessions(name, PREDICTED) for name in MODES}
     found = {name: [figures_of(s) for s in several] for name, several in sessions.items()}
-    ours: dict[str, list[Figures]] = {name: [] for name in MODES}
-    if OURS is not None:
-        ours = {n: [figures_of(s) for s in bench.sessions(n, OURS)] for n in MODES}
+    ours = {name: [figures_of(s) for s in bench.sessions(name, OURS)] for name in MODES}
     rows = [row for name in MODES for row in _mode_rows(name, found[name], ours[name])]
     ratios, others = (_ratios(which) for which in (found, ours))
     rows.append(

@@ -22,7 +22,8 @@ table.rows td:first-child { white-space: normal; min-width: 9em; max-width: 22em
 table.rows td:first-child small { color: var(--soft); display: block; }
 td.within { color: var(--soft); font-weight: normal; }
 p.note { margin: 6px 0; color: var(--soft); font-size: 0.93rem; }
-@media (max-width: 640px) { table.rows .wide { display: none; }
+@media (max-width: 640px) { table.rows td.title { white-space: normal; }
+  table.rows .wide { display: none; }
   table.rows td:first-child { min-width: 7em; } }
 """
 
@@ -74,7 +75,7 @@ def _head(outcomes: Sequence[Outcome]) -> str:
     rows = "".join(
         f'<tr><td><a href="#{escape(o.name)}">{escape(o.name)}</a></td>'
         f'<td class="value {_CLASSES[_verdict(o)]}">{o.agreeing} of {o.judged}</td>'
-        f'<td class="unit">{escape(o.title)}</td></tr>'
+        f'<td class="unit title">{escape(o.title)}</td></tr>'
         for o in outcomes
     )
     head = "<thead><tr><th>experiment</th><th>agree</th><th></th></tr></thead>"

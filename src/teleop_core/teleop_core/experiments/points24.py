@@ -8,7 +8,7 @@ import numpy as np
 from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure
 from teleop_core.experiments.bench import Bench, Session, Settings, mean
 from teleop_core.experiments.conditions import OURS, PREDICTED
-from teleop_core.experiments.drawing import PUBLISHED, axis, line
+from teleop_core.experiments.drawing import axis, line
 from teleop_core.experiments.experiment import Experiment
 from teleop_core.experiments.outcome import EXACT, Findings, Row
 from teleop_core.geometry import Array
@@ -114,7 +114,7 @@ def _measure(bench: Bench) -> Findings:
     rows: list[Row] = []
     blind = _visits(bench, PREDICTED, seeing=False)
     seen = _visits(bench, PREDICTED, seeing=True)
-    ours = {"blind": [], "seen": []} if OURS is None else {
+    ours = {
         "blind": _visits(bench, OURS, seeing=False), "seen": _visits(bench, OURS, seeing=True)
     }  # fmt: skip
 
@@ -126,7 +126,7 @@ def _measure(bench: Bench) -> Findings:
         others = [value(v) for v in ours[which]]
         rows.append(
             Row(quantity=text, unit=unit, published=published, predicted=mean(values),
-                ours=mean(others) if others else None, lowest=min(values), highest=max(values),
+                ours=mean(others), lowest=min(values), highest=max(values),
                 within=EXACT if published is not None else None, group=_GROUPS[which])
         )  # fmt: skip
 
@@ -146,7 +146,7 @@ def _measure(bench: Bench) -> Findings:
         Row(quantity="time for points and line", unit="s", published=_TIME_S, predicted=_TIME_S,
             note="about; the scenario is made to take it", group="task")
     )  # fmt: skip
-    figures = _figure("which sees", seen[0]), _figure("which does not", blind[0])
+    figures = _figure(seen[0], seeing=True), _figure(blind[0], seeing=False)
     return Findings(tuple(rows), figures, _NOTES)
 
 
@@ -168,21 +168,23 @@ def _circles(targets: Array, radius: float) -> Array:
     return np.vstack([np.vstack((target + ring, gap)) for target in targets])
 
 
-def _figure(whose: str, visits: Visits) -> Figure:
+def _figure(visits: Visits, *, seeing: bool) -> Figure:
     rings = _circles(visits.targets, INNER_MM)
-    drawn = (
-        (rings, "inner circles", PUBLISHED, 1.5),
-        (visits.visiting[::5], "stops", COMMAND, 1.0),
-        (visits.tracing[::5], "line", MEASURED, 1.5),
-    )
+    drawn = [
+        (rings, "inner circles", FIRST, 1.5),
+        (visits.visiting[::5], "stops", MEASURED if seeing else COMMAND, 1.2),
+    ]
+    if not seeing:  # one that sees corrects each stop, of which the line knows nothing
+        drawn.append((visits.tracing[::5], "line", MEASURED, 1.5))
     traces = [
         line(-path[:, 1], path[:, 0], name, color, width) for path, name, color, width in drawn
     ]
     for trace in traces:
         trace["hovertemplate"] = "%{x:.3f}, %{y:.3f} mm"
-    traces[0]["line"]["color"] = FIRST
     layout = {"xaxis": axis("-y", "mm"), "yaxis": axis("x", "mm", scaleanchor="x")}
-    sentence = "The board from above: stops at each point, then the line back through all."
+    sentence = "The board from above: stops at each point"
+    sentence += "." if seeing else ", then the line back through all."
+    whose = "which sees" if seeing else "which does not see"
     return Figure(f"24 points, by a hand {whose}", sentence, traces, layout, 420)
 
 

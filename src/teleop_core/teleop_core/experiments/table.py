@@ -38,7 +38,7 @@ def _beside(value: float | None, published: float) -> str:
         return f"{value:.4g}"
     printed = len(f"{published:.9g}".partition(".")[2])
     size = 0 if abs(value) < 1e-9 else math.floor(math.log10(abs(value)))
-    return f"{value + 0.0:.{max(printed + 1, min(3 - size, printed + 3))}f}"
+    return f"{value + 0.0:.{max(printed + 1, min(3 - size, printed + 2))}f}"
 
 
 def _plain(value: float | None) -> str:
@@ -78,8 +78,7 @@ def outcome_table(outcome: Outcome) -> Table:
     has_spread = any(spread(row) for row in outcome.rows)
     table = Table(
         box=SIMPLE, title=f"[bold]{escape(outcome.name)}[/bold]: {escape(outcome.title)}",
-        title_justify="left", caption=_caption(outcome), caption_justify="left", pad_edge=False,
-        padding=(0, 1, 0, 0),
+        title_justify="left", pad_edge=False, padding=(0, 1, 0, 0),
     )  # fmt: skip
     table.add_column("", min_width=20)
     table.add_column("unit", style="dim", no_wrap=True)
@@ -104,15 +103,25 @@ def outcome_table(outcome: Outcome) -> Table:
     return table
 
 
-def _caption(outcome: Outcome) -> str:
-    lines = [f"{MARKS[True]} agrees, {MARKS[False]} does not; {outcome.source}", *outcome.notes]
-    return escape("\n".join(lines))
+def show(outcome: Outcome, console: Console) -> None:
+    """Print the table of an outcome, and what must be known to read it."""
+    console.print(outcome_table(outcome))
+    told = f"{MARKS[True]} agrees, {MARKS[False]} does not; {outcome.source}"
+    for line in (told, *outcome.notes):
+        console.print(line, markup=False, highlight=False, style="dim")
+    console.print()
+
+
+def terminal() -> Console:
+    """Console on standard output; as wide as a table needs where it is no terminal."""
+    console = Console(legacy_windows=False)
+    return console if console.is_terminal else Console(width=_WIDTH, legacy_windows=False)
 
 
 def text(outcome: Outcome) -> str:
     """The table as plain text."""
     console = Console(file=io.StringIO(), width=_WIDTH, color_system=None, legacy_windows=False)
-    console.print(outcome_table(outcome))
+    show(outcome, console)
     out = console.file
     assert isinstance(out, io.StringIO)
     return "\n".join(line.rstrip() for line in out.getvalue().splitlines()).strip("\n")
