@@ -200,9 +200,9 @@ MASTER_CONTACT = Topic(
     "master/contact", Kind.NUMBERS, SAMPLED, "master_base",
     columns=("number", "taken", "returned", "friction", "largest_force"),
 )
-"""Energy of the present contact, or the last one: how many there were, what the device's force took
-from the hand and gave back, what its dry friction took meanwhile [J], of the true tip, which a
-simulator knows; and the largest force that the warmth of its motors allows [N]."""
+"""Energy of the present contact, or the last one: how many there were, what the motors' force took
+from the hand and gave back, what dry friction took meanwhile [J], all of the true motion, which a
+simulator knows; and the largest force that the warmth of the motors allows [N]."""
 MASTER_SERVO_CF = Topic(
     "master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base"
 )

@@ -1,6 +1,5 @@
 """Motion scaling: from the master's pose to the slave's, with modes, clutch and fixture."""
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +30,14 @@ from teleop_core.mapping.parameters import (
     axis_map,
     tool_maps,
 )
-from teleop_core.mapping.walls import wall_force
+from teleop_core.mapping.walls import (
+    WALL_PARAMETERS,
+    WALL_STATE,
+    WALLS,
+    damped_wall,
+    forget_wall,
+    wall_force,
+)
 from teleop_core.parameters import values_of
 from teleop_core.signals import DT, STATE, assign
 from teleop_core.stage import RunningStage, Stage
@@ -48,14 +54,15 @@ from teleop_core.topics import (
 _PARAMETERS = [
     ("gain", "f8", (2,)), ("stylus_tool", "f8", (4,)), ("slave_master", "f8", (4,)),
     ("axis", "i8", (3,)), ("sign", "f8", (3,)),
-    ("size", "f8", (3,)), ("stiffness", "f8"), ("max_force", "f8"), ("timeout_ns", "i8"),
-    ("pause_ns", "i8"), ("rotation_gain", "f8"), ("reach_stiffness", "f8"), ("reach_depth", "f8"),
+    ("size", "f8", (3,)), *WALL_PARAMETERS, ("timeout_ns", "i8"), ("pause_ns", "i8"),
+    ("rotation_gain", "f8"), ("reach_stiffness", "f8"), ("reach_depth", "f8"),
 ]  # fmt: skip
 _STATE = [
     ("buttons", "f8", (3,)), ("is_fine", "i8"), ("is_engaged", "i8"), ("must_latch", "i8"),
     ("is_fixture_on", "i8"), ("last_ns", "i8"),
     ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
     ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
+    *WALL_STATE,
 ]  # fmt: skip
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
@@ -63,6 +70,8 @@ _CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
 _LIMIT, _JOINT = STATE["limit"], STATE["limited_joint"]
 # Depth [m] up to which the hand's stand against a limit is measured, where no force is felt.
 _SHALLOW = 2e-3
+# Period [s] that the first sample is taken to have.
+_LONG = 1e-3
 
 
 @kernel
@@ -156,6 +165,23 @@ def _follows(p: Any, s: Any, row: Any) -> bool:
 
 
 @inner
+def _wall(p: Any, s: Any, fixture: Any, period: float, pose: Array, force: Array) -> None:
+    """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
+    length = 0.0
+    if s.is_fixture_on:
+        for i in range(3):
+            fixture.offset[i] = pose[i] - s.center[i]
+        length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
+    if p.is_damped == 0:
+        wall_force(fixture.out, length, p.stiffness, p.max_force, force)
+        return
+    if period <= 0.0 or period > 1e-9 * p.pause_ns:
+        forget_wall(s, pose)
+        period = _LONG
+    damped_wall(p, s, pose, fixture.out, length, period, force)
+
+
+@inner
 def _push_back(p: Any, s: Any, force: Array) -> None:
     """Add the push of the slave's limit, in the master's base, to the force (3,) [N]."""
     push = p.reach_stiffness * s.depth
@@ -207,6 +233,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
         Vongbunyong 2008, sections 6.2-6.3.
     """
     pose, buttons = row.master_measured_cp, row.master_buttons
+    period = 1e-9 * (row.master_measured_cp_ns - s.last_ns)
     is_following = _follows(p, s, row)
     draw_back(s, sent, p.gain[s.is_fine], row)
     _toggle_mode(s, buttons)
@@ -229,12 +256,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
         s.master[i], s.buttons[i] = pose[i], buttons[i]
     s.last_ns = row.master_measured_cp_ns
     remember(s, sent, s.last_ns)
-    length = 0.0
-    if s.is_fixture_on:
-        for i in range(3):
-            fixture.offset[i] = pose[i] - s.center[i]
-        length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
-    wall_force(fixture.out, length, p.stiffness, p.max_force, row.master_servo_cf)
+    _wall(p, s, fixture, period, pose, row.master_servo_cf)
     _push_back(p, s, row.master_servo_cf)
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
@@ -279,8 +301,10 @@ class MotionScaling(RunningStage):
         p["slave_master"], p["stylus_tool"] = tool_maps(parameters)
         p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
         self._take_fixture(fixture)
-        p["stiffness"] = math.inf if fixture.wall == "hard" else fixture.stiffness
-        p["max_force"] = fixture.max_force
+        wall = WALLS[fixture.wall]
+        p["stiffness"] = wall.spring(fixture.stiffness, fixture.max_force)
+        p["max_force"], p["damping"] = fixture.max_force, fixture.damping
+        p["is_damped"] = wall.is_damped
         p["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
         p["pause_ns"] = round(parameters.longest_pause * 1e9)
         p["rotation_gain"] = parameters.rotation_gain

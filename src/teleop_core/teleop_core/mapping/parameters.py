@@ -8,6 +8,7 @@ import numpy as np
 from teleop_core.errors import ParameterError
 from teleop_core.fixtures import FIXTURES
 from teleop_core.geometry import Array, quaternion_from_rotation, rotation
+from teleop_core.mapping.walls import WALLS
 from teleop_core.parameters import Choice, choice, parameter
 
 MODES = ("coarse", "fine")
@@ -20,14 +21,25 @@ class FixtureParameters:
 
     kind: Choice = choice(FIXTURES, "box", doc="shape of the fixture")
     wall: str = parameter(
-        "soft", choices=("soft", "hard"), doc="spring up to max_force, or max_force at once"
-    )
+        "damped", choices=tuple(WALLS),
+        doc="damped: spring and damper up to max_force, gives back less energy than it took; "
+        "hard: the same, as steep as sampling allows; source: the published spring, full after "
+        "1 mm; soft: a spring; step: max_force at once, which buzzes",
+    )  # fmt: skip
     stiffness: float = parameter(
-        1000.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring of the soft wall"
-    )
+        1000.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring of the damped and the soft wall",
+        source="assumed: below the least stiffness of the device, 1020 N/m; none is published",
+    )  # fmt: skip
+    damping: float = parameter(
+        6.0, unit="N·s/m", lower=0.0, upper=50.0,
+        doc="damper of the damped and the hard wall; at least stiffness times period is taken",
+        source="assumed: six times what 1000 N/m at 1 kHz needs (Colgate and Schenkel 1997), and "
+        "below what the device's structure damps",
+    )  # fmt: skip
     max_force: float = parameter(
-        3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further"
-    )
+        3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further",
+        source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,8 +47,14 @@ class ReachForceParameters:
     """The push that the hand feels where the slave cannot follow."""
 
     is_on: bool = parameter(True, doc="whether the hand feels the slave's limits as a wall")
-    stiffness: float = parameter(500.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring of it")
-    max_force: float = parameter(1.5, unit="N", lower=0.0, upper=10.0, doc="largest push")
+    stiffness: float = parameter(
+        500.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring of it",
+        source="assumed: half of the fixture's, so that one feels which of the two it is",
+    )  # fmt: skip
+    max_force: float = parameter(
+        1.5, unit="N", lower=0.0, upper=10.0, doc="largest push",
+        source="assumed: half of the fixture's, for the same reason",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,69 @@
-"""Walls: how a fixture pushes back on the hand that is beyond it."""
+"""Walls: how a fixture pushes back on the hand that is beyond it.
+
+The source's wall is a spring that ends in a constant force (:func:`wall_force`). Sampled, it gives
+back more energy than it took: its force is that of the place at the beginning of a period and is
+held for all of it, so it is too small on the way in and too large on the way out, by half a
+period's way. A damped wall (:func:`damped_wall`) makes up for it.
+
+A passivity controller (Hannaford and Ryu 2002), which cuts the force where the energy that a
+contact took is used up, was tried on top and left out: with a reading in steps and a device that
+bends it switches on and off, and contacts that the damper alone makes passive gave energy.
+"""
+
+import math
+from typing import Any, NamedTuple
 
 from teleop_core.geometry import Array
-from teleop_core.kernels import kernel
+from teleop_core.kernels import inner, kernel
+
+WALL_PARAMETERS = [
+    ("stiffness", "f8"), ("max_force", "f8"), ("damping", "f8"), ("is_damped", "i8"),
+]  # fmt: skip
+WALL_STATE = [("felt", "f8", (3,)), ("rate", "f8", (3,))]
+# Of the last sample: place [m], and its rate through a first-order lag of this time [s], for a step
+# of the reading within a period would else be a blow.
+_SMOOTHING = 1e-3
+# The damper sets in over this depth [m], a step of the reading, so that the surface is no edge.
+_RAMP = 0.05e-3
+# On the way out this share of the spring's force stays: beyond a wall there is always some.
+_LEAST = 0.05
+SOFT_ZONE = 1e-3
+"""Depth over which the source's wall reaches its full force [m] (Vongbunyong 2008, section 7.6)."""
+HARD_STIFFNESS = 5000.0
+"""Stiffness of the hard wall [N/m]: dry friction of 0.26 N keeps steps of the reading of 0.055 mm
+from ringing up to 2 · 0.26 / 0.055e-3 = 9500 N/m (Abbott and Okamura 2005, K <= 2 f / step), and
+the damping that it needs at 1 kHz is no more than the device's structure bears."""
+
+
+class Wall(NamedTuple):
+    """A wall by name.
+
+    Attributes:
+        stiffness: Of the spring [N/m]; None for that of the parameters.
+        is_full_at: In place of it: depth at which the force is full [m]; 0 for the stiffness.
+        is_damped: Whether it is damped, and so gives back less than it took.
+    """
+
+    stiffness: float | None
+    is_full_at: float
+    is_damped: bool
+
+    def spring(self, stiffness: float, max_force: float) -> float:
+        """Its stiffness [N/m], for the parameters' stiffness [N/m] and largest force [N]."""
+        if self.is_full_at > 0.0:
+            return max_force / self.is_full_at
+        return stiffness if self.stiffness is None else self.stiffness
+
+
+WALLS = {
+    "damped": Wall(None, 0.0, is_damped=True),
+    "hard": Wall(HARD_STIFFNESS, 0.0, is_damped=True),
+    "source": Wall(None, SOFT_ZONE, is_damped=False),
+    "soft": Wall(None, 0.0, is_damped=False),
+    "step": Wall(math.inf, 0.0, is_damped=False),
+}
+"""Walls by name. ``damped`` and ``hard`` hold the hand without feeding it; ``source`` is what the
+source built, ``soft`` the same with a stiffness of one's own, ``step`` its limit without a zone."""
 
 
 @kernel
@@ -9,7 +71,7 @@ def wall_force(depth: Array, length: float, stiffness: float, largest: float, fo
     """Write the wall's push (3,) [N] back into the fixture; zero inside.
 
     A soft wall is a spring of ``stiffness`` [N/m] until it reaches the ``largest`` force [N],
-    which stays constant deeper in; a hard wall has infinite stiffness.
+    which stays constant deeper in; a wall of infinite stiffness is a step of force.
 
     Source:
         Vongbunyong 2008, eqs. 6.3.1-6.3.2, with the interval and the sign put right and the
@@ -18,3 +80,46 @@ def wall_force(depth: Array, length: float, stiffness: float, largest: float, fo
     push = min(stiffness * length, largest) if length > 0.0 else 0.0
     for i in range(3):
         force[i] = -push * depth[i] / length if length > 0.0 else 0.0
+
+
+@kernel
+def damped_wall(
+    p: Any, s: Any, place: Array, depth: Array, length: float, period: float, force: Array
+) -> None:
+    """Write the push (3,) [N] of a wall that gives back less than it took.
+
+    Spring and damper, together between a twentieth of the spring's force and the largest force. The
+    damping is at least stiffness times period: twice what a force lacks that is held for a period.
+    The rest takes what the energy of steps of the reading and a bending device needs.
+
+    Args:
+        p: Record with :data:`WALL_PARAMETERS`.
+        s: Record with :data:`WALL_STATE`; written.
+        place: Reading of the hand (3,) [m].
+        depth: Vector (3,) [m] from the nearest point of the fixture to it.
+        length: Its length [m]; 0 inside.
+        period: Time since the last sample [s], for which the push will be held too.
+        force: Written.
+
+    Source:
+        Colgate and Schenkel 1997, b > K T / 2 + |B|: the damping b that a wall of stiffness K needs
+        when sampled with period T, part of which the wall itself gives here.
+    """
+    share, speed = period / (period + _SMOOTHING), 0.0
+    for i in range(3):
+        s.rate[i] += ((place[i] - s.felt[i]) / period - s.rate[i]) * share
+        s.felt[i] = place[i]
+        if length > 0.0:
+            speed += s.rate[i] * depth[i] / length
+    damping = max(p.damping, p.stiffness * period) * min(length / _RAMP, 1.0)
+    spring = p.stiffness * length
+    push = min(max(spring + damping * speed, _LEAST * spring), p.max_force)
+    for i in range(3):
+        force[i] = -push * depth[i] / length if length > 0.0 else 0.0
+
+
+@inner
+def forget_wall(s: Any, place: Array) -> None:
+    """Begin at rest at a reading (3,) [m]."""
+    for i in range(3):
+        s.felt[i], s.rate[i] = place[i], 0.0

@@ -17,28 +17,60 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.parameters import parameter
 from teleop_core.robots import load_robot_set
 
+_OMNI = "published: Vongbunyong 2008, table 5.1"
+
 
 @dataclass(frozen=True, kw_only=True)
 class DeviceParameters:
-    """The Phantom Omni as its maker publishes it (Vongbunyong 2008, table 5.1)."""
+    """The Phantom Omni: what its maker publishes, and what follows or is assumed beside it."""
 
     workspace: tuple[float, ...] = parameter(
         (0.16, 0.12, 0.07), unit="m", lower=0.01, upper=1.0, length=3,
-        doc="width, height, depth within which the tip can move",
+        doc="width, height, depth within which the tip can move", source=_OMNI,
     )  # fmt: skip
     start: tuple[float, ...] = parameter(
         (0.0, 0.0, -0.03), unit="m", lower=-0.5, upper=0.5, length=3, fixed=True,
         doc="place of the inkwell relative to the middle of the workspace",
+        source="assumed: the inkwell is behind the middle; no source says how far",
     )  # fmt: skip
     position_resolution: float = parameter(
-        0.055e-3, unit="m", lower=0.0, upper=1e-2, doc="step of the position reading; 0: none"
-    )
+        0.055e-3, unit="m", lower=0.0, upper=1e-2, doc="step of the position reading; 0: none",
+        source=_OMNI,
+    )  # fmt: skip
     gimbal_noise: float = parameter(
-        2e-3, unit="rad", lower=0.0, upper=0.1, doc="largest noise of each gimbal potentiometer"
+        2e-3, unit="rad", lower=0.0, upper=0.1, doc="largest noise of each gimbal potentiometer",
+        source="derived: raw fluctuation of the slave's reference at rest (Vongbunyong 2008, "
+        "section 6.2), not a specification of the potentiometers",
+    )  # fmt: skip
+    peak_force: float = parameter(
+        3.3, unit="N", lower=0.0, upper=50.0, doc="largest force, for a short time", source=_OMNI
     )
-    peak_force: float = parameter(3.3, unit="N", lower=0.0, upper=50.0, doc="largest force")
-    apparent_mass: float = parameter(0.045, unit="kg", lower=1e-3, upper=5.0, doc="mass at the tip")
-    friction: float = parameter(0.26, unit="N", lower=0.0, upper=5.0, doc="backdrive friction")
+    continuous_force: float = parameter(
+        0.88, unit="N", lower=1e-3, upper=50.0,
+        doc="root mean square of the force that its motors bear; peak_force or more: no limit",
+        source=_OMNI,
+    )  # fmt: skip
+    thermal_time: float = parameter(
+        60.0, unit="s", lower=0.1, upper=1e4, doc="time constant with which its motors grow warm",
+        source="assumed: between the winding (some 10 s) and the housing (some 100 s) of coreless "
+        "motors of this size, by their makers' data sheets",
+    )  # fmt: skip
+    stiffness: tuple[float, ...] = parameter(
+        (1260.0, 2310.0, 1020.0), unit="N/m", lower=10.0, upper=1e7, length=3,
+        doc="of the tip against its motors and encoders, on x, y, z; in series with every wall",
+        source=_OMNI,
+    )  # fmt: skip
+    structure_damping: float = parameter(
+        5.0, unit="N·s/m", lower=0.0, upper=1e4, doc="of the same, beside the stiffness",
+        source="assumed: a quarter to a third of critical for apparent_mass on this stiffness",
+    )  # fmt: skip
+    apparent_mass: float = parameter(
+        0.045, unit="kg", lower=1e-3, upper=5.0, doc="mass at the tip", source=_OMNI
+    )
+    friction: float = parameter(
+        0.26, unit="N", lower=0.0, upper=5.0, doc="backdrive friction: it sticks below",
+        source=_OMNI,
+    )  # fmt: skip
     handle: str = parameter(
         "", fixed=True, doc="robot whose joints read the hand, such as mma; empty: the Phantom's"
     )

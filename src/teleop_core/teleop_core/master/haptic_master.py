@@ -17,6 +17,7 @@ from teleop_core.geometry import (
     transform,
 )
 from teleop_core.kernels import inner, kernel, records
+from teleop_core.master.contact import CONTACT_STATE, account, distance
 from teleop_core.master.device import (
     DeviceParameters,
     make_handle,
@@ -25,6 +26,7 @@ from teleop_core.master.device import (
     read_phantom,
 )
 from teleop_core.master.hand import HandParameters, move_hand, tremble
+from teleop_core.master.rendering import RENDERING_PARAMETERS, RENDERING_STATE, render
 from teleop_core.operators import OPERATORS, Setting
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.shapes import PHASES
@@ -33,6 +35,7 @@ from teleop_core.signals import DT, STATE, assign
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
     MASTER_BUTTONS,
+    MASTER_CONTACT,
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
     MASTER_MEASURED_CV,
@@ -91,19 +94,21 @@ class HapticMasterParameters:
 
 
 _PARAMETERS = [
-    *((name, "f8") for name in ("resolution", "gimbal", "peak_force", "mass", "friction",
-      "stiffness", "damping", "tremor", "frequency")),
-    ("center", "f8", (3,)), ("half", "f8", (3,)), ("patience_ns", "i8"),
+    *((name, "f8") for name in ("resolution", "gimbal", "mass", "friction", "stiffness", "damping",
+      "tremor", "frequency", "device_mass", "device_damping")),
+    ("device_stiffness", "f8", (3,)), ("center", "f8", (3,)), ("half", "f8", (3,)),
+    ("patience_ns", "i8"), *RENDERING_PARAMETERS,
 ]  # fmt: skip
 _STATE = [
-    *((name, "f8", (3,)) for name in ("position", "speed", "wanted", "phase", "wander", "reading",
-      "rate", "turning")),
+    *((name, "f8", (3,)) for name in ("position", "speed", "hand", "hand_speed", "wanted",
+      "phase", "wander", "reading", "rate", "turning")),
     ("attitude", "f8", (4,)), ("next", "i8"), ("next_noise", "i8"), ("has_begun", "i8"),
-    ("first_ns", "i8"),
+    ("first_ns", "i8"), *RENDERING_STATE, *CONTACT_STATE,
 ]  # fmt: skip
 _WANTED = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("buttons", "f8", (3,)),
            ("tremor", "f8", (3,))]  # fmt: skip
 _IS_FOLLOWING = STATE["is_following"]
+_MOST = MASTER_CONTACT.columns.index("largest_force")
 
 
 @inner
@@ -126,7 +131,7 @@ def _begins(p: Any, s: Any, row: Any) -> bool:
 def haptic_master_step(
     p: Any, s: Any, handle: Any, wanted: Any, noises: Any, row: Any, dt: float
 ) -> None:
-    """One tick: feel master_servo_cf, move, and write master_measured_cp, _cv, _cf and _buttons.
+    """One tick: feel master_servo_cf, move, and write what the device measures and the contact.
 
     Until the slave follows the hand rests, as an operator's would: none of its motion is lost.
 
@@ -147,17 +152,16 @@ def haptic_master_step(
         s.next += 1
     now, noise, force = wanted[s.next], noises[s.next_noise], np.empty(3)
     s.next_noise += 1
-    command = row.master_servo_cf
-    size = math.sqrt(command[0] ** 2 + command[1] ** 2 + command[2] ** 2)
-    share = 1.0 if size <= p.peak_force else p.peak_force / size
-    tremor, place = np.empty(3), np.empty(3)
+    tremor, before, place = np.empty(3), np.empty(3), np.empty(3)
+    row.master_contact[_MOST] = render(p, s, row.master_servo_cf, force)
     tremble(p, s, noise, tremor, dt)
     for i in range(3):
-        force[i] = share * command[i]
+        before[i] = s.position[i]
         tremor[i] += now.wanted[i]
     move_hand(p, s, tremor, force, dt)
     for i in range(3):
         place[i] = s.position[i] + now.tremor[i]
+    account(s, force, p.friction, distance(before, s.position), place, row.master_contact)
     if handle is None:
         read_phantom(p, place, now.attitude, noise[3:6], row.master_measured_cp)
     else:
@@ -209,7 +213,8 @@ class HapticMaster(RunningStage):
         self.arguments = (self.parameters, self.state, self.handle, self._wanted, self._noises)
         self._bound = None
         assign(self.state, 0)
-        for name in ("position", "wanted"):
+        self.signals["master_contact"] = 0.0
+        for name in ("position", "hand", "wanted", "tip"):
             self.state[name] = REST_POSITION
         now = self._wanted[0]
         now["wanted"], now["attitude"], now["buttons"] = REST_POSITION, self._rest, 0.0
@@ -225,8 +230,12 @@ class HapticMaster(RunningStage):
         """Take new device and hand parameters from the next tick on; the operator goes on."""
         p, device, hand = self.parameters, parameters.device, parameters.hand
         p["resolution"], p["gimbal"] = device.position_resolution, device.gimbal_noise
-        p["peak_force"], p["friction"] = device.peak_force, device.friction
-        p["mass"] = device.apparent_mass + hand.mass
+        p["friction"], p["peak_force"] = device.friction, device.peak_force
+        p["continuous"] = device.continuous_force
+        p["warming"] = -math.expm1(-self.dt / device.thermal_time)
+        p["device_stiffness"] = device.stiffness
+        p["device_damping"] = device.structure_damping
+        p["mass"], p["device_mass"] = hand.mass, device.apparent_mass
         p["stiffness"], p["damping"] = hand.stiffness, hand.damping
         operator = OPERATORS.find(self._fixed.operator.kind.kind)
         p["tremor"] = 0.0 if operator.trembles else hand.tremor_amplitude
@@ -331,8 +340,10 @@ HAPTIC_MASTER = Stage(
     "haptic_master",
     HapticMasterParameters,
     reads=(MASTER_SERVO_CF, TELEOP_STATE),
-    writes=(MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS),
+    writes=(
+        MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT,
+    ),
     late=(MASTER_SERVO_CF, TELEOP_STATE),
     make=HapticMaster,
     node="teleop_core.nodes.haptic_master:HapticMasterNode",
-)
+)  # fmt: skip
