@@ -270,10 +270,12 @@ def energy(q, dq):
 def swing(steps, ticks=400):
     """Joints and speeds after free motion from a tilted posture, without any friction."""
     q, dq = np.array([0.0, 1.2, 0.3, 0, 0, 0]), np.array([1.5, -1.0, 0.05, 0, 0, 0])
-    acceleration_pointer = SlaveSim(SlaveSimParameters()).arm.acceleration
-    none, speed = np.zeros(6), np.ones(6)
+    slave = SlaveSim(SlaveSimParameters())
+    p, s, none = slave.parameters, slave.state, np.zeros(6)
+    for name in ("viscous", "coulomb", "bristle"):
+        p[name] = 0.0
     for _ in range(ticks):
-        integrate(acceleration_pointer, ROW, none, none, speed, steps, none, q, dq, 1e-3)
+        integrate(slave.arm.acceleration, ROW, p, s, steps, none, q, dq, 1e-3)
     return q, dq
 
 
