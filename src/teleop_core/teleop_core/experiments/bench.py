@@ -10,6 +10,7 @@ from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.evaluation import Score
 from teleop_core.geometry import Array
 from teleop_core.recording import Stream
+from teleop_core.slave.slave_sim import SlaveSimParameters
 
 Setting = float | str | bool | tuple[float, ...]
 Settings = Mapping[str, Setting]
@@ -122,6 +123,18 @@ class Bench:
     def sessions(self, scenario: str, settings: Settings | None = None) -> list[Session]:
         """The same session by several hands; see :meth:`session`."""
         return [self.session(scenario, seed, settings) for seed in self.seeds]
+
+    def slave(self, settings: Settings | None = None) -> SlaveSimParameters:
+        """Parameters of a slave under the bench's settings and more, for moves of the slave alone.
+
+        Raises:
+            TeleopError: A setting is wrong.
+        """
+        from teleop_core.api import configuration
+
+        group = configuration(settings=self._settings | dict(settings or {})).group("slave_sim")
+        assert isinstance(group, SlaveSimParameters)
+        return group
 
     def _run(self, scenario: str, seed: int, settings: Settings) -> Session:
         from teleop_core.api import run

@@ -31,14 +31,14 @@ def numbers(row: Row) -> tuple[str, str, str, str]:
 
 
 def _beside(value: float | None, published: float) -> str:
-    """Text of a number with one decimal more than what was printed, or four digits if more."""
+    """Text of a number with one decimal more than what was printed, or three digits if more."""
     if value is None:
         return ""
     if 0.0 < abs(published) < 1e-4:
         return f"{value:.4g}"
     printed = len(f"{published:.9g}".partition(".")[2])
     size = 0 if abs(value) < 1e-9 else math.floor(math.log10(abs(value)))
-    return f"{value + 0.0:.{max(printed + 1, min(3 - size, printed + 2))}f}"
+    return f"{value + 0.0:.{max(printed + 1, min(2 - size, printed + 2))}f}"
 
 
 def _plain(value: float | None) -> str:
