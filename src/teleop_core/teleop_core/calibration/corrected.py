@@ -75,7 +75,10 @@ def _links(F: Array) -> tuple[Mapping[str, float], tuple[float, float]]:
 
 def _with_joint(constant: float, is_against: bool) -> str:
     text = "-q" if is_against else "q"
-    return text if constant == 0.0 else f"{text} {'-' if constant < 0.0 else '+'} {abs(constant)!r}"
+    if constant == 0.0:
+        return text
+    # Expressions of a table know no exponents.
+    return f"{text} {'-' if constant < 0.0 else '+'} {np.format_float_positional(abs(constant))}"
 
 
 def _joint(robot: Robot, i: int) -> Row:

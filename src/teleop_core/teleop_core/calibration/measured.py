@@ -1,5 +1,6 @@
 """Measured: what an instrument says of the tip, pose by pose, and where such tables come from."""
 
+import csv
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -107,7 +108,7 @@ def read_measured(path: Path, robot: Robot) -> Measured:
 
     try:
         frame = pd.read_csv(path, sep=None, engine="python", comment="#", skipinitialspace=True)
-    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError, ValueError) as e:
+    except (csv.Error, ValueError) as e:  # pandas' own errors are ValueErrors
         raise CalibrationError(f"{path}: is no table of text with a head ({e})") from e
     found = {_plain(name): name for name in map(str, frame.columns)}
     joints = np.empty((len(frame), robot.n))
@@ -158,7 +159,7 @@ def _numbers(
     bad = ~np.isfinite(values) & (~cells.isna().to_numpy() if may_miss else True)
     if bad.any():
         row = int(np.argmax(bad))
-        cell = f"{cells.iloc[row]!r}"
+        cell = f"'{cells.iloc[row]}'"
         raise CalibrationError(f"{path}: row {row + 1} of {column!r} is {cell}, must be a number")
     return np.asarray(values * units[unit], dtype=np.float64)
 
