@@ -343,8 +343,8 @@ def test_command_writes_table_scores_and_page(recipe, path, tmp_path):
     page.write_text("old")
     (score,) = evaluate_bags([path], target, page, shown)
     text = shown.export_text()
-    assert "0.500✗ ≤0.338" in text
-    assert "0.500✓ ≤0.702" in text
+    assert "0.500✗ (0.338)" in text
+    assert "0.500 (0.702)" in text
     assert json.loads(target.read_text())[0] == score.to_json()
     assert page.read_text().startswith("<!DOCTYPE html>")
 

@@ -4,6 +4,7 @@ from collections import Counter
 
 import numpy as np
 
+from teleop_core.controllers.source_pid import SOURCE_PID
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.published import Published, published_for
 from teleop_core.evaluation.windows import Window
@@ -14,7 +15,7 @@ class Gains:
     """Accumulator of how many slave samples each gain was in force for."""
 
     def __init__(self, context: Context) -> None:
-        self._robot = context.robot
+        self._robot, self._origin = context.robot, context.origin
         self._counts: Counter[float] = Counter()
 
     def add(self, window: Window) -> None:
@@ -32,5 +33,10 @@ class Gains:
 
     @property
     def published(self) -> Published | None:
-        """Published figures of this gain and robot; None if there are none."""
-        return published_for(self.gain, self._robot)
+        """Published figures of this gain, robot and plant; None if there are none."""
+        return published_for(self.gain, self._robot, self._origin.plant)
+
+    @property
+    def is_source(self) -> bool:
+        """Whether the machine itself may have run, or what is to predict it, control law too."""
+        return self._origin.plant is None or self._origin.controller == SOURCE_PID.name

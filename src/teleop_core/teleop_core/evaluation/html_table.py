@@ -17,7 +17,7 @@ def html_table(scores: Sequence[Score]) -> str:
     """Table of the page: two columns per score, measured and published."""
     heads, kinds = "", ""
     for score in scores:
-        mode = published_for(score.session.gain, score.session.robot)
+        mode = published_for(score.session.gain, score.session.robot, score.session.plant)
         heads += f'<th colspan="2">{escape(score.session.place)}</th>'
         kinds += "<th><small>measured</small></th>"
         kinds += f"<th><small>published{f', {mode.mode}' if mode else ''}</small></th>"
@@ -32,7 +32,7 @@ def html_table(scores: Sequence[Score]) -> str:
 def _line(line: Line) -> str:
     cells = "".join(
         f'<td class="value {_CLASSES[row.is_met]}">{escape(row.value)}</td>'
-        f'<td class="published">{escape(row.published and "≤ " + row.published)}</td>'
+        f'<td class="published">{escape(row.published)}</td>'
         for row in line.rows
     )
     return f'<tr><td>{escape(line.label)}</td><td class="unit">{escape(line.unit)}</td>{cells}</tr>'
@@ -50,6 +50,5 @@ def compact_table(score: Score) -> str:
 
 
 def _compact_line(row: Row) -> str:
-    published = f"≤ {row.published}" if row.published else ""
-    cells = (row.label, row.value + _MARKS[row.is_met], row.unit, published)
+    cells = (row.label, row.value + _MARKS[row.is_met], row.unit, row.published)
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"

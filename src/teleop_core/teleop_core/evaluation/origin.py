@@ -32,6 +32,9 @@ class Origin:
         axes: Rotation (3, 3) from the master's base to the slave's axes.
         operator: What is stored of ``haptic_master.operator``, by names below it.
         interpolation: How the slave goes from command to command; None if it is not told.
+        plant: What the simulated slave was; "ideal" of versions that knew no other, None if no
+            simulator is told of.
+        controller: Its control law; None if it is not told.
         tool: Quaternions (4,) of the maps from the master's base to the slave's axes, and from the
             stylus to the tool; None where the tool does not turn as much as the stylus.
     """
@@ -41,6 +44,8 @@ class Origin:
     operator: Mapping[str, object] = field(default_factory=dict)
     interpolation: str | None = None
     tool: tuple[Array, Array] | None = None
+    plant: str | None = None
+    controller: str | None = None
 
     @cached_property
     def chain(self) -> tuple[tuple[str, Topic], ...]:
@@ -71,7 +76,7 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
     layer = _layer(bag)
     return Origin(
         _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
-        _tool(layer, arm),
+        _tool(layer, arm), *_slave(layer, arm),
     )  # fmt: skip
 
 
@@ -103,6 +108,16 @@ def _interpolation(layer: Layer, arm: str) -> str | None:
     name = SLAVE_SIM.name
     said = (layer.get(name, {}) | layer.get(f"{arm}/{name}", {})).get("interpolation")
     return said if isinstance(said, str) else None
+
+
+def _slave(layer: Layer, arm: str) -> tuple[str | None, str | None]:
+    """Plant and control law of the slave of the arm, or of all arms."""
+    name = SLAVE_SIM.name
+    said = layer.get(name, {}) | layer.get(f"{arm}/{name}", {})
+    if not said:
+        return None, None
+    law = said.get("controller.kind", "pid")
+    return str(said.get("plant.kind", "ideal")), str(law)
 
 
 def _tool(layer: Layer, arm: str) -> tuple[Array, Array] | None:

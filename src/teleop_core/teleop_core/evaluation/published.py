@@ -4,11 +4,17 @@ import math
 from dataclasses import dataclass
 
 SOURCE = "Vongbunyong 2008, Table 8.2"
+POSITION_SHARE, ANGLE_FACTOR = 0.15, 1.6
+"""A root mean square agrees with the published one within this share, or this factor."""
 
 
 @dataclass(frozen=True)
 class Published:
-    """Root mean square and maximum of one mode: position [mm], angles [deg]."""
+    """Root mean square and maximum of one mode: position [mm], angles [deg].
+
+    Angles have our names, roll about x and yaw about z; the source calls them yaw and roll
+    (its eqs. 2.7.1-2.7.6).
+    """
 
     mode: str
     gain: float
@@ -18,9 +24,9 @@ class Published:
     yaw_deg: tuple[float, float]
 
 
-COARSE = Published("coarse", 1.0, (0.338, 0.702), (0.044, 0.172), (0.092, 0.828), (0.112, 0.537))
+COARSE = Published("coarse", 1.0, (0.338, 0.702), (0.112, 0.537), (0.092, 0.828), (0.044, 0.172))
 # Table 8.2's maximum; the text's 0.266 mm is below its own root mean square.
-FINE = Published("fine", 0.1, (0.293, 0.791), (0.077, 0.628), (0.105, 0.832), (0.153, 0.811))
+FINE = Published("fine", 0.1, (0.293, 0.791), (0.153, 0.811), (0.105, 0.832), (0.077, 0.628))
 
 BOX_OVERSHOOT_MM = 1.0
 """How far the source's paths went beyond each wall, about [mm] (section 7.6)."""
@@ -28,13 +34,28 @@ ORIENTATION_MAX_DEG = 0.9
 """What the source claims for every angle in both modes [deg] (chapter 8)."""
 
 
-def published_for(gain: float | None, robot: str | None = "rcrt1") -> Published | None:
+def published_for(
+    gain: float | None, robot: str | None = "rcrt1", plant: str | None = "hardware"
+) -> Published | None:
     """Figures of the mode whose gain is nearer, on a scale of ratios.
 
     Returns:
-        None without a gain, and for another robot than the one they are of; a recording that
-        does not name its robot (None) may be of it.
+        None without a gain, for another robot than the one they are of, and for a plant that does
+        not claim to be like it: an ideal arm beside a real one would tell nothing. A recording
+        that does not name its robot or its plant (None) may be of the machine itself.
     """
     if gain is None or not gain > 0.0 or robot not in {"rcrt1", None}:
         return None
+    if plant not in {"hardware", None}:
+        return None
     return min((COARSE, FINE), key=lambda mode: abs(math.log(gain / mode.gain)))
+
+
+def agrees(value: float | None, published: float, share: float) -> bool | None:
+    """Whether a figure is within a share of the published one; None without a figure."""
+    return None if value is None else abs(value - published) <= share * published
+
+
+def agrees_by_factor(value: float | None, published: float, factor: float) -> bool | None:
+    """Whether a figure is within a factor of the published one; None without a figure."""
+    return None if value is None else published / factor <= value <= published * factor

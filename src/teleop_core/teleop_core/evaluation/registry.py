@@ -86,11 +86,13 @@ METRICS: Registry[type[Metric]] = Registry(
         "asked_error_deg": f"{_FOLDER}.asked_error:AskedTurnMetric",
         "position_error_mm": f"{_FOLDER}.position_error:PositionErrorMetric",
         "orientation_error_deg": f"{_FOLDER}.orientation_error:OrientationErrorMetric",
+        "true_error_mm": f"{_FOLDER}.true_error:TrueErrorMetric",
         "command_error_mm": f"{_FOLDER}.command_error:CommandErrorMetric",
         "command_orientation_error_deg":
             f"{_FOLDER}.orientation_error:CommandOrientationErrorMetric",
         "fixture": f"{_FOLDER}.fixture:FixtureMetric",
         "force_n": f"{_FOLDER}.force:ForceMetric",
+        "contact": f"{_FOLDER}.contact:ContactMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",
         "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
         "ticks": f"{_FOLDER}.ticks:TicksMetric",

@@ -9,10 +9,10 @@ MISSING = "–"
 
 @dataclass(frozen=True)
 class Row:
-    """One row: what it is, its unit, the value, the published value, and whether it is met.
+    """One row: what it is, its unit, the value, the published value, and whether both agree.
 
-    Rows of one group stand together under its name. ``is_met`` is None where nothing was
-    published.
+    Rows of one group stand together under its name. ``is_met`` says whether the value agrees with
+    what was published; None where nothing is compared.
     """
 
     group: str
@@ -24,20 +24,32 @@ class Row:
 
 
 def row(
-    group: str, label: str, unit: str, value: float | None, published: float | None = None
+    group: str,
+    label: str,
+    unit: str,
+    value: float | None,
+    published: float | None = None,
+    agrees: bool | None = None,
 ) -> Row:
-    """Row of a number, which is met if it is at most what was published."""
-    is_met = None if value is None or published is None else value <= published
-    return Row(group, label, unit, number(value), number(published, ""), is_met)
+    """Row of a number, beside what was published, and whether both agree if that is asked."""
+    return Row(group, label, unit, number(value), number(published, ""), agrees)
 
 
 def spread_rows(
-    group: str, label: str, unit: str, spread: Spread, figures: tuple[float, float] | None = None
+    group: str,
+    label: str,
+    unit: str,
+    spread: Spread,
+    figures: tuple[float, float] | None = None,
+    agrees: bool | None = None,
 ) -> list[Row]:
-    """Three rows of a spread; ``figures`` are the published root mean square and maximum."""
+    """Three rows of a spread; ``figures`` are the published root mean square and maximum.
+
+    Agreement is judged of the root mean square alone: a maximum is one moment of one session.
+    """
     rms, largest = figures or (None, None)
     return [
-        row(group, f"{label}, RMS", unit, spread.rms, rms),
+        row(group, f"{label}, RMS", unit, spread.rms, rms, agrees),
         row(group, f"{label}, S.D.", unit, spread.sd),
         row(group, f"{label}, max", unit, spread.max, largest),
     ]

@@ -26,6 +26,8 @@ SESSION_KEYS = (
     Key("session.duration_s", "s", "first to last message"),
     Key("session.gain", "m/m", "gain that was in force most of the time; null if unknown"),
     Key("session.arm", "1", "arm that was scored; empty if the recording names no arms"),
+    Key("session.plant", "1", "what the simulated slave was; null if no simulator is told of"),
+    Key("session.controller", "1", "its control law; null if unknown"),
     Key("session.from_s|to_s", "s", "what was scored, since the first message"),
 )
 """Keys of what is told about a recording, beside those of its metrics."""
@@ -64,6 +66,8 @@ class Session:
     arm: str = ""
     from_s: float = 0.0
     to_s: float | None = None
+    plant: str | None = None
+    controller: str | None = None
 
     @property
     def is_part(self) -> bool:
@@ -252,6 +256,8 @@ def facts(session: Session) -> Iterator[str]:
     found = (
         session.scenario and f"scenario {session.scenario}",
         session.robot and f"robot {session.robot}",
+        session.plant and f"{session.plant} plant",
+        session.controller and f"controller {session.controller}",
         session.arm and f"arm {session.arm}",
         None if session.seed is None else f"seed {session.seed}",
         f"{session.duration_s:.1f} s",

@@ -234,6 +234,8 @@ def _session(context: Context) -> Session:
         duration_s=(bag.end_ns - bag.start_ns) * 1e-9,
         gain=context.shared(Gains).gain,
         arm=context.arm,
+        plant=context.origin.plant,
+        controller=context.origin.controller,
         from_s=0.0 if span is None else (span.first_ns - bag.start_ns) * 1e-9,
         to_s=((bag.end_ns if span is None else span.last_ns) - bag.start_ns) * 1e-9,
     )

@@ -7,7 +7,7 @@ from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
-from teleop_core.evaluation.published import SOURCE, published_for
+from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE, published_for
 from teleop_core.evaluation.rows import MISSING, Row
 from teleop_core.evaluation.score import Score, Session
 from teleop_core.evaluation.summary import side_by_side
@@ -28,8 +28,11 @@ def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
 
 
 def score_table(scores: Sequence[Score]) -> Table:
-    """One column per score; each figure with a tick or a cross, and what was published."""
-    caption = f"{MET} met, {NOT_MET} not met: ≤ published figure ({SOURCE})"
+    """One column per score; each figure beside what was published, with a tick if both agree."""
+    caption = (
+        f"{MET} agrees, {NOT_MET} does not, with (the published figure; {SOURCE}): position RMS "
+        f"within {100.0 * POSITION_SHARE:.0f} %, angles within a factor of {ANGLE_FACTOR:g}"
+    )
     table = Table(
         box=SIMPLE, caption=caption, caption_justify="left", pad_edge=False, padding=(0, 1, 0, 0)
     )
@@ -48,12 +51,14 @@ def score_table(scores: Sequence[Score]) -> Table:
 def heading(session: Session) -> str:
     """Name of a recording, what it was, and its mode and arm, in three lines or more."""
     gain = "" if session.gain is None else f"gain {session.gain:g}, "
-    mode = published_for(session.gain, session.robot)
+    mode = published_for(session.gain, session.robot, session.plant)
     seed = "" if session.seed is None else f", seed {session.seed}"
     lines = (
         session.title,
         f"{gain}{session.duration_s:.3g} s",
         f"{session.robot or 'unknown'}{seed}",
+        session.plant and f"{session.plant} plant",
+        session.controller,
         mode and f"mode {mode.mode}",
         session.arm and f"arm {session.arm}",
         session.is_part and f"{session.from_s:g}–{session.to_s:g} s",
@@ -65,6 +70,6 @@ def _cell(row: Row) -> str:
     if row.is_met is None and (not row.published or row.value == MISSING):
         return escape(row.value)
     if row.is_met is None:
-        return f"{escape(row.value):>6} [dim]≤{escape(row.published)}[/dim]"
+        return f"{escape(row.value):>6} [dim]({escape(row.published)})[/dim]"
     mark = f"[green]{MET}[/green]" if row.is_met else f"[red]{NOT_MET}[/red]"
-    return f"{escape(row.value):>6}{mark} [dim]≤{escape(row.published)}[/dim]"
+    return f"{escape(row.value):>6}{mark} [dim]({escape(row.published)})[/dim]"

@@ -55,15 +55,15 @@ def _track(window: Window) -> Tracked:
     is_led = partner == NONE
     is_led[~is_led] = setpoint.stamp_ns[partner[~is_led]] != 0
     measured, partner = measured.only(is_led), partner[is_led]
-    poses, setpoints = measured.values, _rows(setpoint, partner)
-    commands = _rows(command, latest(measured.stamp_ns, command.stamp_ns))
+    poses, setpoints = measured.values, rows_of(setpoint, partner)
+    commands = rows_of(command, latest(measured.stamp_ns, command.stamp_ns))
     return Tracked(
         measured.log_ns, poses, setpoints, commands, partner != NONE,
         pose_errors(poses, setpoints), pose_errors(poses, commands),
     )  # fmt: skip
 
 
-def _rows(series: Series, index: Integers) -> Array:
+def rows_of(series: Series, index: Integers) -> Array:
     """Rows of poses by index, shape (N, 7); NaN for those without a partner."""
     if not len(series):
         return np.full((len(index), 7), np.nan)

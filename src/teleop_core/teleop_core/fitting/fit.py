@@ -23,7 +23,7 @@ from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 
-_WEAK = 3e-2  # singular value over the largest below which a direction is not identifiable
+_WEAK = 0.1  # singular value over the largest below which a direction is not identifiable
 _STEP = 0.01  # of differences, in units of the start
 _SHARE = 0.95  # of intervals
 _ROUNDS = 60
@@ -226,7 +226,7 @@ def fit(
     progress(0.1)
     found = least_squares(
         problem.residuals, start, jac=problem.slopes, bounds=(lower, np.inf),  # type: ignore[arg-type]
-        loss="soft_l1", max_nfev=_ROUNDS, xtol=1e-4, ftol=1e-4,
+        loss="cauchy", max_nfev=_ROUNDS, xtol=1e-4, ftol=1e-4,
     )  # fmt: skip
     if not found.success:
         raise FitError(

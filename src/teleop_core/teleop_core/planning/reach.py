@@ -217,7 +217,7 @@ def _reach(
 ) -> Reach:
     scaling, solving = made.group("motion_scaling", arm), made.group("inverse_kinematics", arm)
     whole = Walker(path.limited(_WHOLE), scaling, solving)
-    start = made.group("slave_sim", arm).start or whole.robot.start.tolist()
+    start = made.group("slave_sim", arm).start_of(whole.robot)
     given = Placement.of(scaling, solving, tuple(start))
     done = 0
 

@@ -28,13 +28,13 @@ _DRAWN = np.random.default_rng(2008).uniform(-1.0, 1.0, (4, 6)) * np.stack(
 _DRAWN[2, 2] = 5.5e-3  # d3
 
 HARDWARE = Hardware(
-    coulomb=np.array([0.0842, 0.231, 1.0, 6.08e-3, 5.61e-4, 5.00e-4]),
-    bias=np.array([0.0408, 0.0, 0.0, 0.0, 0.0, 0.0]),
-    wander=np.array([0.37, 0.21, 0.21, 0.42, 0.68, 0.78]),
+    coulomb=np.array([0.0880, 0.251, 1.0, 6.08e-3, 5.62e-4, 5.10e-4]),
+    bias=np.array([0.0445, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    wander=np.array([0.36, 0.20, 0.20, 0.43, 0.67, 0.75]),
     play=np.array([0.0, 0.0, 0.0, 0.0, _PLAY, _PLAY]),
     coupling=_COUPLING,
     links=LinkErrors.from_vector(_DRAWN.ravel()),
-    dynamics=link_row(m2b_L0b=0.0125),
+    dynamics=link_row(m2b_L0b=0.0135),
     sources={
         "coulomb": f"{_FIT}; of d3, which an integrator brings to its target: assumed",
         "bias": _FIT,

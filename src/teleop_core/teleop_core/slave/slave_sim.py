@@ -16,6 +16,7 @@ from teleop_core.robots import dh_kernels, load_robot_set
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
+from teleop_core.robots.robot import Robot
 from teleop_core.signals import DT, copy
 from teleop_core.slave.commands import (
     advance_setpoint,
@@ -83,6 +84,9 @@ class SlaveSimParameters(RobotParameters):
         (), unit="rad or m", fixed=True,
         doc="joints to which the slave moves from home before it follows; empty: the robot's start",
     )  # fmt: skip
+    starts_at_home: bool = parameter(
+        False, fixed=True, doc="whether it starts where it is, at home, if no start is given"
+    )
     start_speed: float = parameter(
         0.5, lower=0.01, upper=1.0, fixed=True, doc="share of the speed limits used on that move"
     )
@@ -106,6 +110,12 @@ class SlaveSimParameters(RobotParameters):
     plant: PlantParameters = field(default_factory=PlantParameters)
     controller: ControllerParameters = field(default_factory=ControllerParameters)
     reference_filter: ReferenceFilterParameters = field(default_factory=ReferenceFilterParameters)
+
+    def start_of(self, robot: Robot) -> Array:
+        """Joints (n,) from which a robot follows [rad or m]."""
+        if self.start:
+            return np.array(self.start, dtype=np.float64)
+        return robot.home.copy() if self.starts_at_home else robot.start.copy()
 
 
 def _records(n: int) -> tuple[Any, Any]:
@@ -337,7 +347,7 @@ class SlaveSim(RunningStage):
         """
         robot, p = self.robot, self.parameters
         assert robot.drives is not None
-        start = np.array(parameters.start or robot.start, dtype=np.float64)
+        start = parameters.start_of(robot)
         if start.shape != robot.home.shape:
             raise ParameterError("slave_sim.start", parameters.start, f"{robot.n} joints, or empty")
         if not ((robot.lower <= start) & (start <= robot.upper)).all():

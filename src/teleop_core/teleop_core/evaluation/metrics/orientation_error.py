@@ -17,6 +17,7 @@ from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics import command_error, position_error
 from teleop_core.evaluation.pose_errors import PoseErrors
+from teleop_core.evaluation.published import ANGLE_FACTOR, agrees_by_factor
 from teleop_core.evaluation.rows import Row, number, row, spread_rows
 from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, tracked
 from teleop_core.evaluation.windows import Window
@@ -97,10 +98,14 @@ class OrientationErrorMetric(Metric):
         """The spreads beside the published figures of the mode."""
         error, mode, group = self.values(), self._gains.published, position_error.GROUP
         published = (mode.roll_deg, mode.pitch_deg, mode.yaw_deg) if mode else (None, None, None)
+        is_judged = mode is not None and self._gains.is_source
         spreads = (error.roll, error.pitch, error.yaw)
         rows = []
         for turn, spread, figures in zip(TURNS, spreads, published, strict=True):
-            rows += spread_rows(group, turn, "deg", spread, figures)
+            met = None
+            if is_judged and figures is not None:
+                met = agrees_by_factor(spread.rms, figures[0], ANGLE_FACTOR)
+            rows += spread_rows(group, turn, "deg", spread, figures, met)
         return rows + spread_rows(group, "rotation", "deg", error.angle)
 
     def figures(self) -> list[Figure]:

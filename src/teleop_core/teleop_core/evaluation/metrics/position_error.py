@@ -6,6 +6,7 @@ from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, line, time_
 from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics.command_error import CommandErrorMetric
+from teleop_core.evaluation.published import POSITION_SHARE, agrees
 from teleop_core.evaluation.rows import Row, number, spread_rows
 from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, tracked
 from teleop_core.evaluation.windows import Window
@@ -38,8 +39,11 @@ class PositionErrorMetric(Metric):
     def rows(self) -> list[Row]:
         """The spread beside the published figures of the mode."""
         mode = self._gains.published
-        published = mode.position_mm if mode else None
-        return spread_rows(GROUP, "position", "mm", self.values(), published)
+        if mode is None:
+            return spread_rows(GROUP, "position", "mm", self.values())
+        published, spread = mode.position_mm, self.values()
+        met = agrees(spread.rms, published[0], POSITION_SHARE) if self._gains.is_source else None
+        return spread_rows(GROUP, "position", "mm", spread, published, met)
 
     def figures(self) -> list[Figure]:
         """Distance of the tip from reference and command against time."""
