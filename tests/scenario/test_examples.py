@@ -18,7 +18,8 @@ EXAMPLES = ROOT / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 PUBLIC = {
     "teleop_core", "teleop_core.evaluation", "teleop_core.operators", "teleop_core.fixtures",
-    "teleop_core.controllers", "teleop_core.robots", "teleop_core.topics", "numpy",
+    "teleop_core.controllers", "teleop_core.robots", "teleop_core.topics",
+    "teleop_core.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",
 }  # fmt: skip
 ROS = {
@@ -130,6 +131,14 @@ def test_human_operator_moves_as_people_do_and_the_random_one_does_not(tmp_path)
     low, high, *values = rows["peaks_per_s"]
     assert all(low <= value <= high for value in values[:2])
     assert all(value < low for value in values[2:])
+
+
+def test_own_experiment_stands_beside_those_of_the_package(tmp_path):
+    text = run("experiments", tmp_path)
+    assert "published 11.355 µm, predicted 11.355" in text
+    beside = re.search(r"0\.293 +([\d.]+) +([\d.]+)", text)
+    assert beside is not None
+    assert all(0.01 < float(error) < 2.0 for error in beside.groups())
 
 
 def test_recording_becomes_a_data_frame_and_a_page(tmp_path):

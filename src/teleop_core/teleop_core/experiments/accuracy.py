@@ -167,9 +167,9 @@ def _measure(bench: Bench) -> Findings:
 _NOTES = (
     f"The offset of {D3_OFFSET_MM} mm in d3 is fitted to these very tables, with moves along -x, "
     "±y and +z: that it explains them is a finding, not a prediction. The other link errors and "
-    "the play of the tendons are one draw of tolerances. Readings are rounded as the source read its "
-    "ruler of 0.5 mm, to 0.25 mm along x and z. The source tuned its gains for no error at rest "
-    "here; so ours moves the plant.",
+    "the play of the tendons are one draw of tolerances. Readings are rounded as the source read "
+    "its ruler of 0.5 mm, to 0.25 mm along x and z. The source tuned its gains for no error at "
+    "rest here; so ours moves the plant.",
 )
 
 

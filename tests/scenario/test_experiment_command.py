@@ -1,0 +1,137 @@
+"""``teleop experiment``: lists, tables, JSON, one page, and one line for what is wrong."""
+
+import json
+import math
+import re
+import shutil
+
+import pytest
+
+from headless import Headless
+from teleop_core import experiments
+from teleop_core.experiments.page import experiments_page
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+COMPILING = "compiling kernels"
+
+
+def one_line(done):
+    """The only line on standard error, beside the one of compiling; nothing on standard output."""
+    assert done.stdout == ""
+    lines = [line for line in done.stderr.splitlines() if not line.startswith(COMPILING)]
+    assert len(lines) == 1, done.stderr
+    return lines[0]
+
+
+def test_without_a_name_every_experiment_is_listed_in_a_line(teleop):
+    lines = teleop("experiment").stdout.splitlines()
+    assert [line.split()[0] for line in lines] == list(experiments.EXPERIMENTS.names())
+    assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_experiment_prints_published_beside_predicted(teleop):
+    shown = teleop("experiment", "resolution", "tendons").stdout
+    assert re.search(r"tip, all axes.* 11\.355 +11\.3548 .* ✓", shown)
+    assert re.search(r"motor 6 for joint 5 .* 1 +1\.39 .* ✗", shown)
+    assert shown.splitlines()[-1].endswith("rows are not judged")
+
+
+def test_help_teaches_what_a_mark_means(teleop):
+    shown = teleop("experiment", "--help").stdout
+    assert "teleop experiment all --html" in shown
+    assert "not whether a number is small" in shown
+
+
+def test_json_holds_every_number_exactly(teleop, tmp_path):
+    file = tmp_path / "found.json"
+    teleop("experiment", "hybrid", "resolution", "--json", file)
+    found = json.loads(file.read_text(encoding="utf-8"))["experiments"]
+    assert [entry["name"] for entry in found] == ["hybrid", "resolution"]
+    assert found == [experiments.run(name).to_json() for name in ("hybrid", "resolution")]
+    assert math.isclose(found[0]["rows"][0]["predicted"], 22.36067977, rel_tol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("resolutoin",), "resolution"),
+        (("resolution", "nosuch"), "'nosuch', must be one of"),
+        (("resolution", "--json", "{folder}/no/such.json"), "does not exist"),
+        (("resolution", "--html", "{folder}"), "is a directory"),
+        (("resolution", "--html", "/proc/page.html"), "cannot be written"),
+        (("resolution", "--seed", "-1"), "seed is -1"),
+        (("resolution", "--seed", "one"), "invalid int value"),
+    ],
+)
+def test_wrong_use_is_told_in_one_line_and_writes_nothing(teleop, tmp_path, arguments, told):
+    texts = [argument.format(folder=tmp_path) for argument in arguments]
+    done = teleop("experiment", *texts, code=2)
+    assert told in one_line(done)
+    assert not list(tmp_path.iterdir())
+
+
+def test_file_that_exists_is_kept_until_the_new_one_is_whole(teleop, tmp_path):
+    file = tmp_path / "found.json"
+    file.write_text("before")
+    teleop("experiment", "resolution", "nosuch", "--json", file, code=2)
+    assert file.read_text() == "before"
+    teleop("experiment", "resolution", "--json", file)
+    assert json.loads(file.read_text())["experiments"]
+    assert [path.name for path in tmp_path.iterdir()] == ["found.json"]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.skip(f"no browser to open the page with; install one of {', '.join(BROWSERS)}")
+    return found
+
+
+SHORT = {"duration": 8.0, "approach_time": 1.0, "buttons.fixture": (1.5,)}
+
+
+@pytest.fixture(scope="module")
+def outcomes():
+    """Experiments with plots of every kind, of sessions that are shorter than the source's."""
+    bench = experiments.Bench(settings=SHORT)
+    names = ("resolution", "workspace", "master_slave", "gravity", "hybrid", "mma_frames")
+    return experiments.run_several(names, bench=bench)
+
+
+@pytest.mark.browser
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1200, 500])
+def test_page_draws_every_figure_and_is_as_wide_as_its_window(browser, outcomes, tmp_path, width):
+    page = tmp_path / "page.html"
+    page.write_text(experiments_page(outcomes), encoding="utf-8")
+    figures = sum(len(outcome.figures) for outcome in outcomes)
+    with Headless(browser, tmp_path, width=width) as tab:
+        tab.open(page)
+        tab.until("document.body.dataset.finished === 'yes'")
+        assert tab.value("document.body.dataset.errors || ''") == ""
+        assert int(tab.value("document.body.dataset.drawn")) == figures
+        assert tab.value("document.documentElement.scrollWidth") <= width
+        marks = tab.value("document.querySelectorAll('td.met').length")
+    assert marks >= sum(outcome.agreeing for outcome in outcomes)
+
+
+def test_sessions_that_several_experiments_need_run_once(outcomes):
+    bench = experiments.Bench(settings=SHORT)
+    experiments.run("master_slave", bench=bench)
+    alone = bench.runs
+    experiments.run("gravity", bench=bench)
+    # Without compensation only: two modes, three hands, under two controllers.
+    assert bench.runs == alone + 12
+    again = experiments.run("master_slave", bench=bench)
+    assert bench.runs == alone + 12
+    found = next(outcome for outcome in outcomes if outcome.name == "master_slave")
+    assert again.to_json() == found.to_json()
+
+
+def test_gravity_off_is_clearly_worse_under_the_sources_controller(outcomes):
+    found = next(outcome for outcome in outcomes if outcome.name == "gravity")
+    for mode in ("coarse", "fine"):
+        ratio = found.row("without over with", f"position error, RMS, {mode}")
+        assert ratio.predicted > 1.5
+        assert ratio.ours < 1.1

@@ -1,0 +1,163 @@
+"""Outcomes of experiments: what counts as agreement, exact JSON, tables that say what they are."""
+
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.evaluation.figure import Figure
+from teleop_core.experiments import (
+    EXACT,
+    Experiment,
+    Outcome,
+    Row,
+    Tolerance,
+    absolute,
+    factor,
+    percent,
+)
+from teleop_core.experiments.page import experiments_page
+from teleop_core.experiments.table import numbers, summary, text
+
+positive = st.floats(1e-6, 1e6)
+finite = st.floats(-1e9, 1e9)
+
+
+def outcome(*rows, notes=(), figures=()):
+    return Outcome("trial", "a trial", "nobody 1900", 3, rows, figures, notes)
+
+
+@given(positive, positive)
+def test_prediction_agrees_within_a_share_whatever_its_sign(published, share):
+    tolerance = percent(100.0 * share)
+    for sign in (1.0, -1.0):
+        assert tolerance.allows(sign * published, sign * published * (1.0 + 0.99 * share))
+        assert not tolerance.allows(sign * published, sign * published * (1.0 + 1.01 * share))
+
+
+@given(finite, positive)
+def test_prediction_agrees_within_an_amount_on_both_sides(published, amount):
+    tolerance = absolute(amount)
+    assert tolerance.allows(published, published)
+    for side in (1.0, -1.0):
+        far = published + side * (1.01 * amount + 1e-6 * abs(published))
+        assert not tolerance.allows(published, far)
+
+
+@given(positive, st.floats(1.01, 100.0))
+def test_factor_bounds_the_ratio_from_above_and_below(published, times):
+    tolerance = factor(times)
+    assert tolerance.allows(published, published * times * 0.999)
+    assert tolerance.allows(published, published / times * 1.001)
+    assert not tolerance.allows(published, published * times * 1.001)
+    assert not tolerance.allows(published, published / times * 0.999)
+    assert not tolerance.allows(published, -published)
+
+
+def test_a_small_error_does_not_agree_with_a_large_one():
+    # What the machine did is to be predicted, not beaten.
+    assert Row(quantity="e", published=0.338, predicted=0.037, within=percent(15)).agrees is False
+
+
+def test_exact_forgives_rounding_of_the_computer_alone():
+    assert EXACT.allows(0.1 + 0.2, 0.3)
+    assert EXACT.allows(0.0, -0.0)
+    assert not EXACT.allows(360.0, 360.00001)
+
+
+def test_difference_that_is_just_the_tolerance_agrees():
+    assert absolute(0.25).allows(0.5, 0.25)
+    assert percent(10.0).allows(1.0, 1.1)
+
+
+@pytest.mark.parametrize("missing", ["published", "predicted", "within"])
+def test_row_without_one_of_its_parts_is_not_judged(missing):
+    whole = {"published": 1.0, "predicted": 1.0, "within": EXACT}
+    assert Row(quantity="q", **whole).agrees is True
+    assert Row(quantity="q", **{**whole, missing: None}).agrees is None
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (lambda: Tolerance("near", 1.0), "kind"),
+        (lambda: percent(0.0), "amount"),
+        (lambda: absolute(math.nan), "amount"),
+        (lambda: factor(1.0), "amount"),
+        (lambda: Tolerance("exact", 0.1), "amount"),
+        (lambda: Row(quantity="q", predicted=math.inf), "predicted of q"),
+    ],
+)
+def test_nonsense_is_refused_by_name(call, name):
+    with pytest.raises(ParameterError) as caught:
+        call()
+    assert caught.value.name == name
+
+
+@given(finite, finite)
+def test_json_brings_back_the_same_bits(published, predicted):
+    row = Row(quantity="q", unit="mm", published=published, predicted=predicted, within=EXACT)
+    back = json.loads(json.dumps(outcome(row).to_json(), allow_nan=False))["rows"][0]
+    assert back["published"] == published
+    assert back["predicted"] == predicted
+    assert back["difference"] == predicted - published
+    assert back["agrees"] == row.agrees
+
+
+def test_outcome_counts_what_is_judged_and_what_agrees():
+    rows = (
+        Row(quantity="a", published=1.0, predicted=1.0, within=EXACT),
+        Row(quantity="b", published=1.0, predicted=2.0, within=EXACT),
+        Row(quantity="c", predicted=2.0),
+    )
+    found = outcome(*rows)
+    assert (found.agreeing, found.judged) == (1, 2)
+    assert summary([found, found]) == "2 of 4 published figures agree; 2 rows are not judged"
+
+
+def test_row_is_found_by_quantity_and_group_and_a_wrong_name_lists_those_there_are():
+    first, second = (Row(quantity="rms", group=group, predicted=1.0) for group in ("x", "y"))
+    found = outcome(first, second)
+    assert found.row("rms") is first
+    assert found.row("rms", "y") is second
+    with pytest.raises(UnknownNameError) as caught:
+        found.row("rsm")
+    assert caught.value.alternatives == ("rms",)
+
+
+def test_prediction_is_shown_with_a_decimal_more_than_the_publication():
+    row = Row(quantity="q", published=22.3607, predicted=22.360680)
+    assert numbers(row) == ("22.3607", "22.36068", "", "-2e-05")
+    assert numbers(Row(quantity="q", published=1.0, predicted=1.0 + 1e-15))[3] == "0"
+
+
+def test_table_shows_marks_notes_and_ours_where_there_is_one():
+    row = Row(
+        quantity="error", unit="mm", published=0.5, predicted=0.51, ours=0.04, within=percent(15),
+        lowest=0.4, highest=0.6, group="coarse", note="by hand",
+    )  # fmt: skip
+    shown = text(outcome(row, notes=("mind this",)))
+    for part in ("coarse", "error (by hand)", "0.4 … 0.6", "ours", "15 %", "✓", "mind this"):
+        assert part in shown
+    assert "ours" not in text(outcome(Row(quantity="error", published=0.5, predicted=0.9)))
+
+
+def test_page_escapes_what_others_wrote_and_asks_nobody():
+    evil = "<script>alert(1)</script>"
+    figure = Figure(evil, evil, [{"type": "scatter", "x": [0.0], "y": [1.0], "name": evil}])
+    page = experiments_page([outcome(Row(quantity=evil, note=evil), figures=(figure,))])
+    assert evil not in page
+    assert "src=" not in page.split("<body", 1)[0]
+    assert "default-src 'none'" in page
+
+
+def test_experiment_that_returns_something_else_is_named():
+    from teleop_core.errors import PartError
+    from teleop_core.experiments import Bench
+
+    wrong = Experiment("mine", "mine", "me", lambda bench: None)
+    with pytest.raises(PartError, match="mine"):
+        wrong.run(Bench())
