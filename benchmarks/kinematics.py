@@ -141,11 +141,12 @@ def batch(robot: Any, count: int) -> tuple[Any, Any]:
     others cannot be assembled.
     """
     rng, span = np.random.default_rng(2), robot.upper - robot.lower
-    anywhere = robot.fk(rng.uniform(robot.lower, robot.upper, (count, robot.n)))
-    answer = robot.ik(anywhere)
+    drawn = rng.uniform(robot.lower, robot.upper, (count, robot.n))
+    answer = robot.ik(robot.solve_fk(drawn, search=False).T)
     if (answer.status != IkStatus.FOLLOWED).mean() > 0.2:
         near = robot.home + rng.uniform(-0.1, 0.1, (count, robot.n)) * span
-        answer = robot.ik(robot.fk(np.clip(near, robot.lower, robot.upper)))
+        near = np.clip(near, robot.lower, robot.upper)
+        answer = robot.ik(robot.solve_fk(near, search=False).T)
     return answer.q, answer.q + 0.01 * span * rng.normal(0.0, 1.0, answer.q.shape)
 
 
@@ -153,11 +154,11 @@ def batches(name: str, count: int) -> None:
     """Print how many poses and solutions a second one core makes in a batch."""
     robot = load_robot(name)
     q, seeds = batch(robot, count)
-    poses = robot.fk(q)
+    poses = robot.solve_fk(q, search=False).T
     rates = {"fk": 0.0, "ik near": 0.0, "ik far": 0.0}
     for _ in range(5):
         for key, call in (
-            ("fk", lambda: robot.fk(q)),
+            ("fk", lambda: robot.solve_fk(q, search=False)),
             ("ik near", lambda: robot.ik(poses, seeds)),
             ("ik far", lambda: robot.ik(poses)),
         ):

@@ -52,14 +52,14 @@ class IkStatus(IntEnum):
 class FkStatus(IntEnum):
     """Whether forward kinematics found a pose with which the loops of a robot close."""
 
-    CLOSED = 0  # the loops close, in the assembly next to the seed
-    NEAR_SINGULAR = 1  # they close there, but the joints hardly fix the tip, and assemblies meet
-    OTHER_MODE = 2  # they close, but not next to the seed: the nearest assembly that was found
+    CLOSED = 0  # the loops close, in the seed's assembly: they do on the straight way from there
+    NEAR_SINGULAR = 1  # they do, but the joints hardly fix the tip here, and assemblies meet
+    OTHER_MODE = 2  # they close, but in another assembly: the nearest to the seed that was found
     NOT_CLOSED = 3  # no assembly was found; the pose of least error next to the seed is returned
     UNDETERMINED = 4  # joints of this layout never fix a pose; the seed is returned
 
 
-_NOT_CLOSED = int(FkStatus.NOT_CLOSED)
+_OTHER_MODE = int(FkStatus.OTHER_MODE)
 
 Status = TypeVar("Status")
 Number = TypeVar("Number")
@@ -187,12 +187,12 @@ def assemble_batch(
     """Write transforms (N, 4, 4), residuals and modes (N, 2), statuses (N,) of joints (N, n).
 
     Each from the seed that stands in its place, or from home, as ``ask`` says; in a path all but
-    the first from the last before it that closed.
+    the first from the last before it in the assembly of the path.
     """
     seed = np.empty((4, 4))
     for i in range(q.shape[0]):
         if is_path:
-            if i == 0 or statuses[i - 1] < _NOT_CLOSED:
+            if i == 0 or statuses[i - 1] < _OTHER_MODE:
                 seed[:] = transforms[max(i - 1, 0)]
             transforms[i] = seed
         statuses[i] = assemble(q[i], geometry, ask, transforms[i], numbers[i])

@@ -12,13 +12,16 @@ import math
 
 import numpy as np
 
-from teleop_core.geometry import Array
+from teleop_core.geometry import Array, rotation_angle_between
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.kinematics import MAX_ASSEMBLIES, REACHED, SEARCH_ALL, FkStatus
 from teleop_core.robots.rps3_loop import COSINES, SINES, frame, loop, points, settle
 
 # Volume of the three unit rows of the loop equations under which the legs hardly fix the platform.
 _NEAR = 1e-3
+# Steps of the way from a seed, and the turn [rad] from which on it is gone: of 7300 random triples
+# with a pose of least squares nearer than 0.6 rad, all had it at the way's end.
+WAY, FAR = 48, 0.5
 _SAME = 1e-6  # rad, by which two assemblies differ
 _CLOSED, _NEAR_SINGULAR = int(FkStatus.CLOSED), int(FkStatus.NEAR_SINGULAR)
 _OTHER_MODE, _NOT_CLOSED = int(FkStatus.OTHER_MODE), int(FkStatus.NOT_CLOSED)
@@ -68,14 +71,22 @@ def open_by(q: Array, theta: Array, b: float, a: float, S: Array) -> float:
 
 
 @inner
-def angles_of(T: Array, b: float, a: float, q: Array, theta: Array) -> None:
-    """Write leg lengths (3,) [m] and angles (3,) [rad] of a platform at T (4, 4)."""
+def joints_at(T: Array, a: float, S: Array) -> None:
+    """Write the ball joints (3, 3) [m] of a platform at T (4, 4)."""
     for i in range(3):
         c, s = a * COSINES[i], a * SINES[i]
-        x, y = T[0, 3] + T[0, 0] * c + T[0, 1] * s, T[1, 3] + T[1, 0] * c + T[1, 1] * s
-        z = T[2, 3] + T[2, 0] * c + T[2, 1] * s
-        inward = b - x * COSINES[i] - y * SINES[i]
-        theta[i], q[i] = math.atan2(z, inward), math.sqrt(inward * inward + z * z)
+        for r in range(3):
+            S[i, r] = T[r, 3] + T[r, 0] * c + T[r, 1] * s
+
+
+@inner
+def angles_of(T: Array, b: float, a: float, q: Array, theta: Array) -> None:
+    """Write leg lengths (3,) [m] and angles (3,) [rad] of a platform at T (4, 4)."""
+    S = np.empty((3, 3))
+    joints_at(T, a, S)
+    for i in range(3):
+        inward = b - S[i, 0] * COSINES[i] - S[i, 1] * SINES[i]
+        theta[i], q[i] = math.atan2(S[i, 2], inward), math.sqrt(inward * inward + S[i, 2] ** 2)
 
 
 @inner
@@ -157,32 +168,69 @@ def _nearest(q: Array, b: float, a: float, starts: int, near: Array, theta: Arra
     return chosen >= 0
 
 
+@inner
+def _lead(q: Array, first: Array, b: float, a: float, side: float, theta: Array) -> bool:
+    """Move leg angles (3,) of an assembly with legs ``first`` along the straight way to legs q.
+
+    Returns:
+        Whether they arrived: the loop closes on all the way, on one side of the singular poses.
+    """
+    now, before, S = np.empty(3), np.empty(3), np.empty((3, 3))
+    for k in range(1, WAY + 1):
+        for i in range(3):
+            now[i], before[i] = first[i] + k / WAY * (q[i] - first[i]), theta[i]
+        settle(now, b, a, theta)
+        if open_by(now, theta, b, a, S) > REACHED or volume(now, theta, b, a) * side < 0.0:
+            return False
+        for i in range(3):
+            if abs(theta[i] - before[i]) > FAR:
+                return False
+    return True
+
+
+@inner
+def _at_seed(
+    q: Array, geometry: Array, ask: Array, T: Array, first: Array, theta: Array, start: Array
+) -> None:
+    """Write legs (3,) and angles (3,) of the seed or of home, and angles to start from; T, too."""
+    b, a = geometry[0], geometry[1]
+    if ask[1] > 0.0:
+        angles_of(T, b, a, first, theta)
+        start[:] = theta
+        return
+    S = np.empty((3, 3))
+    first[:] = geometry[2]
+    lean(first, geometry, theta)
+    lean(q, geometry, start)
+    points(first, theta, b, S)
+    frame(S, T)
+
+
 @kernel
 def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
     """Write ``T_base_tip`` of leg lengths (3,) [m]; see :class:`kinematics.Kernels`."""
-    b, a = geometry[0], geometry[1]
-    theta, S, near, side = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), 1.0
-    if ask[1] > 0.0:
-        lengths = np.empty(3)
-        angles_of(T, b, a, lengths, theta)
-        points(lengths, theta, b, near)
-        side = volume(lengths, theta, b, a)
-    else:
-        lean(q, geometry, theta)
-        points(q, theta, b, near)
+    b, a, S, pose = geometry[0], geometry[1], np.empty((3, 3)), np.empty((4, 4))
+    first, seed, theta = np.empty(3), np.empty(3), np.empty(3)
+    _at_seed(q, geometry, ask, T, first, seed, theta)
     settle(q, b, a, theta)
-    is_other = False
-    if ask[0] > 0.0 and open_by(q, theta, b, a, S) > REACHED:
-        is_other = _nearest(q, b, a, int(ask[0]), near, theta)
+    out[0], status = open_by(q, theta, b, a, S), _OTHER_MODE
+    frame(S, pose)
+    side, found = volume(first, seed, b, a), volume(q, theta, b, a)
+    is_same = found * side > 0.0 or min(abs(found), abs(side)) < _NEAR
+    if out[0] <= REACHED and is_same and rotation_angle_between(T, pose) <= FAR:
+        status = _CLOSED
+    elif _lead(q, first, b, a, side, seed):
+        theta[:], status = seed, _CLOSED
+    elif ask[0] > 0.0:
+        joints_at(T, a, S)
+        _nearest(q, b, a, int(ask[0]), S, theta)
     out[0] = open_by(q, theta, b, a, S)
     frame(S, T)
     found = volume(q, theta, b, a)
     out[1] = math.copysign(1.0, found)
     if out[0] > REACHED:
         return _NOT_CLOSED
-    if is_other or (found * side < 0.0 and min(abs(found), abs(side)) > _NEAR):
-        return _OTHER_MODE
-    return _NEAR_SINGULAR if abs(found) < _NEAR else _CLOSED
+    return _NEAR_SINGULAR if status == _CLOSED and abs(found) < _NEAR else status
 
 
 @kernel

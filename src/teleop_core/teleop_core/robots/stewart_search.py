@@ -22,6 +22,9 @@ from teleop_core.robots.stewart_legs import direct, leg_system
 NEAR = 1e-3
 # Root of x^6 = x + 1: its powers spread points evenly in five dimensions.
 _ROOT = 1.1347241384015194
+# Steps of the way from a seed, and the turn [rad] from which on it is gone: of 4300 random leg sets
+# with a pose of least squares nearer than 0.6 rad, all had it at the way's end.
+WAY, FAR = 48, 0.5
 _SAME = 1e-6  # rad, and of the platform's size, by which two assemblies differ
 _CLOSED, _NEAR_SINGULAR = int(FkStatus.CLOSED), int(FkStatus.NEAR_SINGULAR)
 _OTHER_MODE, _NOT_CLOSED = int(FkStatus.OTHER_MODE), int(FkStatus.NOT_CLOSED)
@@ -130,11 +133,47 @@ def _nearest(legs: Array, base: Array, platform: Array, size: float, starts: int
     return chosen >= 0
 
 
+@inner
+def _is_singular(
+    T: Array, base: Array, platform: Array, size: float, lengths: Array, J: Array
+) -> tuple[bool, float]:
+    """Write leg lengths (6,) [m]; whether legs hardly fix the pose, and the pose's side."""
+    leg_system(T, base, platform, lengths, J)
+    is_near = bool(is_near_singular(J.T, 1.0 / size, NEAR * 2.0 * size))
+    return is_near, side_of(J)
+
+
+@inner
+def _lead(legs: Array, base: Array, platform: Array, size: float, side: float, T: Array) -> bool:
+    """Move a closed pose (4, 4) along the straight way of its legs to others (6,).
+
+    Returns:
+        Whether it arrived: the legs close on all the way, on one side of the singular poses.
+    """
+    first, now, J, before = np.empty(6), np.empty(6), np.empty((6, 6)), np.empty((4, 4))
+    leg_system(T, base, platform, first, J)
+    for k in range(1, WAY + 1):
+        before[:] = T
+        for i in range(6):
+            now[i] = first[i] + k / WAY * (legs[i] - first[i])
+        if direct(now, base, platform, size, False, T) > REACHED:
+            return False
+        if rotation_angle_between(before, T) > FAR:
+            return False
+        leg_system(T, base, platform, now, J)
+        if side_of(J) * side < 0.0:
+            return False
+    return True
+
+
 @kernel
 def close_legs(
     legs: Array, base: Array, platform: Array, size: float, starts: int, T: Array, out: Array
 ) -> int:
     """Move a pose from where it is to the assembly with these leg lengths next to it.
+
+    That is the one at the end of the straight way of the legs, if they close all along it: the
+    pose of least squares, where that is near, or the way is gone in :data:`WAY` steps.
 
     Args:
         legs: Leg lengths (6,) [m].
@@ -149,23 +188,26 @@ def close_legs(
         :class:`FkStatus`.
     """
     J, lengths, seed, trial = np.empty((6, 6)), np.empty(6), np.empty((4, 4)), np.empty((4, 4))
+    seed[:], trial[:] = T, T
     leg_system(T, base, platform, lengths, J)
-    side, is_other = side_of(J), False
-    seed[:] = T
-    out[0] = direct(legs, base, platform, size, False, T)
-    if out[0] > REACHED and starts > 0:
+    side = side_of(J)
+    status, out[0] = _OTHER_MODE, direct(legs, base, platform, size, False, T)
+    is_near, out[1] = _is_singular(T, base, platform, size, lengths, J)
+    is_same = out[1] * side > 0.0 or is_near
+    if not is_same:  # a seed on a singular pose is on neither side
+        is_same = _is_singular(seed, base, platform, size, lengths, J)[0]
+    if out[0] <= REACHED and is_same and rotation_angle_between(seed, T) <= FAR:
+        return _NEAR_SINGULAR if is_near else _CLOSED
+    if _lead(legs, base, platform, size, side, trial):
+        T[:], status = trial, _CLOSED
+    elif starts > 0:
         trial[:] = seed
-        is_other = _nearest(legs, base, platform, size, starts, trial)
-        if is_other:
+        if _nearest(legs, base, platform, size, starts, trial):
             T[:] = trial
-    leg_system(T, base, platform, lengths, J)
+    is_near, out[1] = _is_singular(T, base, platform, size, lengths, J)
     out[0] = 0.0
     for i in range(6):
         out[0] = max(out[0], abs(lengths[i] - legs[i]))
-    is_near = is_near_singular(J.T, 1.0 / size, NEAR * 2.0 * size)
-    out[1] = side_of(J)
     if out[0] > REACHED:
         return _NOT_CLOSED
-    if is_other or (out[1] * side < 0.0 and not is_near):
-        return _OTHER_MODE
-    return _NEAR_SINGULAR if is_near else _CLOSED
+    return _NEAR_SINGULAR if is_near and status == _CLOSED else status
