@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 PUBLIC = {
+    "teleop_core.calibration",
     "teleop_core", "teleop_core.evaluation", "teleop_core.operators", "teleop_core.fixtures",
     "teleop_core.controllers", "teleop_core.robots", "teleop_core.topics",
     "teleop_core.experiments", "numpy",
@@ -156,6 +157,16 @@ def test_imported_hand_is_followed_by_the_slave(tmp_path):
     hand, slave = numbers(r"cp: ([\d.]+) mm wide", text)
     assert 29.0 < hand < 31.0
     assert abs(slave - hand) < 3.0
+
+
+def test_arms_are_led_closer_once_they_are_calibrated(tmp_path):
+    text = run("calibrate", tmp_path)
+    assert "published: d3 5.50 mm, RMS 0.744 -> 0.352 mm" in text
+    drawn, found = numbers(r"led as \w+: ([\d.]+) mm off", text)
+    assert drawn > 0.5
+    assert found < 0.2 * drawn
+    ruler, tracker = numbers(r"([\d.]+) mm RMS at fresh poses", text)
+    assert tracker < ruler < 1.0
 
 
 @pytest.mark.ros
