@@ -16,6 +16,7 @@ from teleop_core.experiments.outcome import Outcome, Row
 MARKS = {True: "✓", False: "✗", None: ""}
 _COLORS = {True: "green", False: "red", None: "default"}
 _WIDTH = 110
+_DIGITS = 6  # after the point, the most that any source prints
 
 
 def numbers(row: Row) -> tuple[str, str, str, str]:
@@ -27,7 +28,13 @@ def numbers(row: Row) -> tuple[str, str, str, str]:
         return "", _plain(row.predicted), _plain(row.ours), ""
     texts = [_beside(value, row.published) for value in (row.predicted, row.ours)]
     difference = "" if row.difference is None else _signed(row.difference, row.published)
-    return f"{row.published:.9g}", texts[0], texts[1], difference
+    return _printed(row.published), texts[0], texts[1], difference
+
+
+def _printed(published: float) -> str:
+    """A published number as it was printed; four digits of one that was computed from such."""
+    text = f"{published:.9g}"
+    return text if len(text.partition(".")[2]) <= _DIGITS else f"{published:.4g}"
 
 
 def _beside(value: float | None, published: float) -> str:
@@ -36,7 +43,7 @@ def _beside(value: float | None, published: float) -> str:
         return ""
     if 0.0 < abs(published) < 1e-4:
         return f"{value:.4g}"
-    printed = len(f"{published:.9g}".partition(".")[2])
+    printed = len(_printed(published).partition(".")[2])
     size = 0 if abs(value) < 1e-9 else math.floor(math.log10(abs(value)))
     return f"{value + 0.0:.{max(printed + 1, min(2 - size, printed + 2))}f}"
 
