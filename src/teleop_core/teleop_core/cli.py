@@ -9,7 +9,7 @@ import warnings
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.commands import calibrate, exchange, experiment, reach
+from teleop_core.commands import calibrate, exchange, experiment, fit, reach
 from teleop_core.commands.arguments import (
     command,
     configured,
@@ -99,6 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     reach.add(commands)
     calibrate.add(commands)
     experiment.add(commands)
+    fit.add(commands)
     return parser
 
 

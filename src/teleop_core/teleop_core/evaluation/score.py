@@ -211,6 +211,11 @@ class Score:
         return self.record("orientation_error_deg", OrientationError)
 
     @property
+    def true_error_mm(self) -> Spread:
+        """Distance of the true tip from its reference, [mm]; of None where nobody tells it."""
+        return self.record("true_error_mm", Spread)
+
+    @property
     def command_error_mm(self) -> Spread:
         """Distance of the slave's tip from the newest command, [mm]."""
         return self.record("command_error_mm", Spread)

@@ -12,7 +12,7 @@ from teleop_core.geometry import Array
 from teleop_core.recording import Stream
 from teleop_core.slave.slave_sim import SlaveSimParameters
 
-Setting = float | str | bool | tuple[float, ...]
+Setting = float | str | bool | tuple[float, ...] | tuple[str, ...]
 Settings = Mapping[str, Setting]
 Progress = Callable[[int, int], None]
 SEEDS = 3

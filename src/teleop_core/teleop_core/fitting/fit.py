@@ -27,6 +27,7 @@ _WEAK = 0.1  # singular value over the largest below which a direction is not id
 _STEP = 0.01  # of differences, in units of the start
 _SHARE = 0.95  # of intervals
 _ROUNDS = 60
+_UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
 _WANDER = 0.3  # with which the answer to wandering friction is measured
 
 
@@ -58,6 +59,7 @@ class FitResult:
         predicted: The same, simulated with the fitted numbers.
         measured_spread: Standard deviation (n,) of the runs [rad or m].
         predicted_spread: The same, simulated.
+        encoder_step: Smallest difference (n,) that is measured [rad or m].
         one_sided: Axes (n,) that all moves approach from one side, of which the distance to the
             target is fitted, not its side, because friction and bias cannot be told apart there.
     """
@@ -70,6 +72,7 @@ class FitResult:
     predicted: Array
     measured_spread: Array
     predicted_spread: Array
+    encoder_step: Array
     one_sided: NDArray[np.bool_]
 
     def value(self, name: str) -> float:
@@ -82,6 +85,28 @@ class FitResult:
         if name not in found:
             raise UnknownNameError("fitted number", name, found)
         return found[name]
+
+    def __str__(self) -> str:
+        from teleop_core.fitting.report import text
+
+        return text(self)
+
+    def to_json(self) -> dict[str, object]:
+        """All of it as plain values; numbers are exact, [SI]."""
+        return {
+            "robot": self.robot, "table": self.table, "joints": list(self.joint_names),
+            "numbers": [vars(number) for number in self.numbers],
+            "measured": self.measured.tolist(), "predicted": self.predicted.tolist(),
+            "measured_spread": self.measured_spread.tolist(),
+            "predicted_spread": self.predicted_spread.tolist(),
+            "one_sided": self.one_sided.tolist(),
+        }  # fmt: skip
+
+    def parameter_file(self) -> str:
+        """ROS 2 parameter file of a slave on the fitted plant."""
+        from teleop_core.fitting.report import parameter_file
+
+        return parameter_file(self)
 
 
 class _Problem:
@@ -197,9 +222,9 @@ def fit(
 ) -> FitResult:
     """Fit numbers of the plant ``hardware`` to where a machine came to rest.
 
-    Residuals count in standard deviations of the runs, with a loss that grows linearly for
-    points that no such model explains (soft L1). The wandering of friction follows afterwards,
-    from the spread of the runs.
+    Residuals count in standard deviations of the runs, with Cauchy's loss, which lets go of points
+    that no such model explains. Intervals are those of M-estimates. The wandering of friction
+    follows afterwards, from the spread of the runs.
 
     Args:
         table: Measured rests.
@@ -268,28 +293,26 @@ def _result(
     problem: _Problem, x: Array, slopes: Array, progress: Callable[[float], None]
 ) -> FitResult:
     residuals = problem.residuals(x)
-    # Points far off count as the loss counts them, so that one does not widen all intervals.
-    counted = 2.0 * (np.sqrt(1.0 + residuals**2) - 1.0)
     used = np.abs(slopes).max(axis=1) > 0.0
     freedom = max(int(used.sum()) - len(x), 1)
-    variance = counted[used].sum() / freedom
-    weights = 1.0 / np.sqrt(1.0 + residuals**2)
-    covariance = variance * np.linalg.inv(slopes.T @ (slopes * weights[:, None]))
+    # Covariance of an M-estimate (Huber 1967) of the loss ln(1 + r²), which is Cauchy's.
+    weights = 1.0 / (1.0 + residuals**2)
+    bend = np.linalg.inv(slopes.T @ (slopes * weights[:, None]))
+    pull = slopes * (weights * residuals)[:, None]
+    covariance = used.sum() / freedom * bend @ (pull.T @ pull) @ bend
     half = t.ppf(0.5 + 0.5 * _SHARE, freedom) * np.sqrt(np.diag(covariance))
+    values = np.stack((x, x - half, x + half), axis=1) * problem.scales[:, None]
     numbers = [
-        Fitted(
-            name,
-            "kg·m" if name.startswith("weight") else "N·m or N",
-            value * s,
-            (value - h) * s,
-            (value + h) * s,
-        )
-        for name, value, h, s in zip(problem.free, x, half, problem.scales, strict=True)
+        Fitted(name, _UNITS[name.partition(".")[0]], *row)
+        for name, row in zip(problem.free, values.tolist(), strict=True)
     ]
     wander, spread = _wander(problem, x, progress)
+    assert problem.robot.drives is not None
+    step = problem.robot.drives.encoder_step
     return FitResult(
         problem.robot.name, problem.robot.joint_names, problem.table.name, (*numbers, *wander),
-        problem.table.mean, problem.rests(x)[:, 0], problem.table.spread, spread, problem.one_sided,
+        problem.table.mean, problem.rests(x)[:, 0], problem.table.spread, spread, step,
+        problem.one_sided,
     )  # fmt: skip
 
 
@@ -312,7 +335,10 @@ def _wander(
     wander = np.array([share.get(name, 0.0) for name in robot.joint_names])
     freedom = sum(len(rests) - 1 for rests in problem.table.rests)
     low, high = np.sqrt(freedom / chi2.ppf([0.5 + 0.5 * _SHARE, 0.5 - 0.5 * _SHARE], freedom))
-    numbers = [Fitted(f"wander.{name}", "", w, w * low, w * high) for name, w in share.items()]
+    numbers = [
+        Fitted(f"wander.{name}", "", float(w), float(w * low), float(w * high))
+        for name, w in share.items()
+    ]
     predicted = spread(wander)
     progress(1.0)
     return numbers, predicted

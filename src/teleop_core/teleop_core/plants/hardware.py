@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from teleop_core.controllers import per_joint
+from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array
 from teleop_core.parameters import parameter
 from teleop_core.plants import Physics, Plant
@@ -15,21 +17,43 @@ from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.link_errors import true_chain
 from teleop_core.robots.robot import Robot
 
+FAULTS = {
+    "friction": "dry friction",
+    "sticking": "that dry friction sticks, and is not smooth",
+    "wandering": "dry friction that changes as time goes by",
+    "bias": "amplifiers that give effort when none is asked for",
+    "weights": "weights that the control law does not know",
+    "drive_steps": "efforts in steps of the converter",
+    "play": "backlash and stretch of tendons behind the encoders",
+    "links": "links, and zeros of joints, that are not as drawn",
+}
+"""Faults that can be left out, by name."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class HardwareParameters:
-    """Which faults there are, each to be switched off alone, and what no robot states."""
+    """Which faults there are, numbers in place of the robot's, and what no robot states."""
 
-    sticking: bool = parameter(True, doc="dry friction that holds a joint at rest")
-    wandering: bool = parameter(True, doc="dry friction that changes as time goes by")
-    bias: bool = parameter(True, doc="amplifiers that give effort when none is asked for")
-    drive_steps: bool = parameter(True, doc="efforts in steps of the converter")
-    play: bool = parameter(True, doc="backlash and stretch of tendons behind the encoders")
-    links: bool = parameter(True, doc="links, and zeros of joints, that are not as drawn")
-    masses: bool = parameter(True, doc="weights that the control law does not know")
+    without: tuple[str, ...] = parameter(
+        (), choices=tuple(FAULTS), doc="faults that are left out, to see what they add"
+    )
     coulomb: tuple[float, ...] = parameter(
-        (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the robot's",
+        (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the robot's"
+    )
+    wander: tuple[float, ...] = parameter(
+        (), lower=0.0, upper=2.0,
+        doc="standard deviation of each joint's dry friction over its mean; empty: the robot's",
     )  # fmt: skip
+    bias: tuple[float, ...] = parameter(
+        (), unit="N·m or N", doc="effort of each amplifier when none is asked; empty: the robot's"
+    )
+    play: tuple[float, ...] = parameter(
+        (), unit="rad or m", lower=0.0,
+        doc="half width of the play behind each encoder; empty: the robot's",
+    )  # fmt: skip
+    weights: tuple[str, ...] = parameter(
+        (), doc="symbol=value of the dynamics that the source does not state; empty: the robot's"
+    )
     bristle_frequency: float = parameter(
         250.0, unit="rad/s", lower=10.0, upper=2000.0,
         doc="at which a joint swings on its friction before it slips",
@@ -59,36 +83,54 @@ def faults_of(robot: Robot) -> Hardware:
 
 
 def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
-    """Numbers of a robot's drive table and of its faults, as far as they are switched on.
+    """Numbers of a robot's drive table and of its faults, less those that are left out.
 
     Raises:
-        ParameterError: ``coulomb`` is not of the robot's number of joints.
+        ParameterError: A list is not of the robot's number of joints, or a weight has no value.
+        UnknownNameError: A weight that the robot's dynamics do not leave open.
     """
-    from teleop_core.controllers import per_joint
-
-    drives, faults = robot.drives, faults_of(robot)
+    drives, faults, out = robot.drives, faults_of(robot), set(parameters.without)
     assert drives is not None
 
-    def where(is_on: bool, numbers: Array) -> Array:
-        return numbers if is_on else np.zeros_like(numbers)
+    def number(name: str, fault: str) -> Array:
+        given = getattr(parameters, name)
+        values = per_joint(robot, f"plant.hardware.{name}", given, getattr(faults, name))
+        return np.zeros(robot.n) if fault in out else values
 
-    bristle = drives.inertia * parameters.bristle_frequency**2
-    steps = 2.0 * drives.effort_limit / 2.0**parameters.drive_bits
+    zero, bristle = np.zeros(robot.n), drives.inertia * parameters.bristle_frequency**2
     return Physics(
         viscous=drives.viscous,
-        coulomb=per_joint(robot, "plant.hardware.coulomb", parameters.coulomb, faults.coulomb),
+        coulomb=number("coulomb", "friction"),
         friction_speed=drives.friction_speed,
-        bristle=where(parameters.sticking, bristle),
-        wander=where(parameters.wandering, faults.wander),
+        bristle=zero if "sticking" in out else bristle,
+        wander=number("wander", "wandering"),
         wander_time=parameters.wander_time,
-        bias=where(parameters.bias, faults.bias),
-        effort_step=where(parameters.drive_steps, steps),
+        bias=number("bias", "bias"),
+        effort_step=(
+            zero if "drive_steps" in out else 2.0 * drives.effort_limit / 2.0**parameters.drive_bits
+        ),
         encoder_step=drives.encoder_step,
-        play=where(parameters.play, faults.play),
-        coupling=where(parameters.play, faults.coupling),
-        tip_geometry=_tip_geometry(robot, faults) if parameters.links else np.zeros(0),
-        dynamics=faults.dynamics if parameters.masses else np.zeros(0),
+        play=number("play", "play"),
+        coupling=np.zeros((robot.n, robot.n)) if "play" in out else faults.coupling,
+        tip_geometry=np.zeros(0) if "links" in out else _tip_geometry(robot, faults),
+        dynamics=np.zeros(0) if "weights" in out else _dynamics(robot, faults, parameters.weights),
     )
+
+
+def _dynamics(robot: Robot, faults: Hardware, weights: tuple[str, ...]) -> Array:
+    """Parameter row of the true dynamics; empty where it is the one that the control law knows."""
+    model = robot.dynamics
+    assert model is not None
+    row = (faults.dynamics if len(faults.dynamics) else model.parameters).copy()
+    for text in weights:
+        symbol, _, value = text.partition("=")
+        if symbol not in model.unknown:
+            raise UnknownNameError("plant.hardware.weights", symbol, model.unknown)
+        try:
+            row[model.unknown[symbol]] = float(value)
+        except ValueError:
+            raise ParameterError("plant.hardware.weights", text, f"{symbol}=number") from None
+    return row
 
 
 def _tip_geometry(robot: Robot, faults: Hardware) -> Array:
