@@ -436,6 +436,17 @@ def test_tables_that_lack_something_are_refused_with_what_it_is(tmp_path):
         read_measured(tmp_path / "none.csv", RCRT1)
 
 
+def test_a_pose_that_was_misread_is_named(tmp_path):
+    table, _ = poses_table(40)
+    clean = calibrate(RCRT1, Measured(joints=table.iloc[:, :6], points=table.iloc[:, 6:]), ["d3"])
+    assert "misread" not in str(clean)
+    table.loc[12, "y"] += 0.01
+    table.loc[3, "x"] = np.nan
+    table.to_csv(tmp_path / "poses.csv", index=False)
+    text = str(calibrate(RCRT1, read_measured(tmp_path / "poses.csv", RCRT1), ["d3"]))
+    assert "pose 13 is off by" in text
+
+
 # Mistakes.
 
 

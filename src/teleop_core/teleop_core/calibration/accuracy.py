@@ -13,6 +13,9 @@ from teleop_core.geometry import Array
 
 AXES, TOTAL = ("x", "y", "z"), "total"
 _FOLDS = 5
+# What is left of a reading, over the typical, from which on it looks misread: of normal noise one
+# in a million is.
+_MISREAD = 5.0
 
 
 class Spread(NamedTuple):
@@ -107,3 +110,29 @@ def left_out(found: Found, measured: Measured) -> Accuracy | None:
     after = _spreads(measured.part(order), np.concatenate(rest))
     text = f"at {len(measured)} poses, each by those measured without its fifth"
     return Accuracy(text, at_measured(found, measured).before, after)
+
+
+class Misread(NamedTuple):
+    """Pose that does not fit the others: number from 1, what is left of it [m], over the typical."""
+
+    pose: int
+    off: float
+    times: float
+
+
+def misread(found: Found, measured: Measured) -> Misread | None:
+    """The pose that fits the others least, if it looks misread.
+
+    Source:
+        Median of magnitudes over 0.6745 in place of a deviation: Hampel 1974.
+    """
+    rest = np.abs(residuals(found.model, measured, found.vector))
+    typical = float(np.median(rest)) / 0.6745
+    worst = int(np.argmax(rest))
+    if len(rest) < 2 * _FOLDS or rest[worst] <= _MISREAD * typical:
+        return None
+    poses = np.arange(len(measured))
+    if measured.points is not None:
+        poses = np.repeat(poses, 3)[np.isfinite(measured.points).ravel()]
+    off = float(rest[worst])
+    return Misread(int(poses[worst]) + 1, off, off / typical if typical > 0.0 else np.inf)

@@ -1,13 +1,4 @@
-"""Identification: which link errors measurements tell apart, and their least squares.
-
-What cannot be told apart is found by the singular values of the identification Jacobian with
-columns of unit length: as long as the ratio of the largest to the smallest is above a bound, one
-entry of the weakest combination is left at zero, a length or a twist before a joint offset.
-
-Source:
-    Bound of 100: Schröer 1993, as quoted by Hollerbach, Khalil and Gautier 2016, Springer handbook
-    of robotics, section 8.3.2, which gives the elimination by singular values too.
-"""
+"""Identification: least squares of link errors over what measurements tell apart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,30 +7,17 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from teleop_core.calibration.identifiable import WORST_CONDITION, Left, condition, select
 from teleop_core.calibration.measured import CalibrationError, Measured
 from teleop_core.calibration.model import FRAME, Model, aligned
 from teleop_core.geometry import Array
 from teleop_core.robots.link_errors import LinkErrors
 
-WORST_CONDITION = 100.0
 LEVEL = 0.95
 """Of the confidence intervals."""
 NOT_SURE = "is not told from zero"
 # Of an angle [rad], and of a length as a share of the arm's: beyond, no arm was built so.
 _ABSURD = 0.35
-# Motion of the tip [m] per metre of an entry, or of the arm's length times its angle, below which
-# it does not move it; and share of a column below which what others leave of it is rounding.
-_NOTHING, _SAME = 1e-9, 1e-6
-# How readily an entry is left out: links before offsets, and the frame last.
-_LINK, _OFFSET, _FRAME = 1.0, 0.2, 0.01
-
-
-@dataclass(frozen=True)
-class Left:
-    """Entry that was left at zero, and why."""
-
-    name: str
-    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,59 +185,6 @@ def aligned_model(model: Model, measured: Measured) -> Model:
     return Model(model.robot, model.chain, aligned(drawn, measured.points[whole]))
 
 
-def select(
-    model: Model, J: Array, names: Sequence[str], worst_condition: float
-) -> tuple[tuple[str, ...], tuple[Left, ...]]:
-    """Names that readings with slopes J (m, 4n + 6) tell apart, and the others with reasons."""
-    column = {name: J[:, model.names.index(name)] for name in names}
-    lever = {name: model.size if model.unit(name) == "rad" else 1.0 for name in names}
-    effect = {name: float(np.linalg.norm(column[name])) / lever[name] for name in names}
-    kept = [name for name in names if effect[name] > _NOTHING * np.sqrt(len(J))]
-    moving = list(kept)
-    while kept and _condition(np.column_stack([column[name] for name in kept])) > worst_condition:
-        kept.remove(_weakest(model, column, kept))
-    left = []
-    for name in names:
-        if name not in moving:
-            left.append(Left(name, "does not change what is measured"))
-        elif name not in kept:
-            left.append(Left(name, _reason(column, name, kept)))
-    return tuple(kept), tuple(left)
-
-
-def _unit_columns(columns: Array) -> Array:
-    return columns / np.linalg.norm(columns, axis=0)
-
-
-def _condition(columns: Array) -> float:
-    values = np.linalg.svd(_unit_columns(columns), compute_uv=False)
-    if len(values) < columns.shape[1] or values[-1] == 0.0:
-        return float("inf")
-    return float(values[0] / values[-1])
-
-
-def _weakest(model: Model, column: dict[str, Array], kept: list[str]) -> str:
-    """Entry that has the largest part in the combination that readings tell the least of."""
-    _, _, Vt = np.linalg.svd(_unit_columns(np.column_stack([column[k] for k in kept])))
-    ease = [
-        _FRAME if name in FRAME else _OFFSET if name in model.offsets else _LINK for name in kept
-    ]
-    return kept[int(np.argmax(np.abs(Vt[-1]) * ease))]
-
-
-def _reason(column: dict[str, Array], name: str, kept: Sequence[str]) -> str:
-    """What an entry cannot be told from."""
-    A = np.column_stack([column[k] for k in kept])
-    share = np.linalg.lstsq(_unit_columns(A), column[name], rcond=None)[0]
-    rest = column[name] - _unit_columns(A) @ share
-    length = np.linalg.norm(column[name])
-    order = np.argsort(-np.abs(share))
-    many = [kept[i] for i in order if abs(share[i]) > 0.05 * length][:4]
-    how = "acts as" if np.linalg.norm(rest) < _SAME * length else "is hardly told from"
-    together = " together" if len(many) > 1 else ""
-    return f"{how} {' and '.join(filter(None, (', '.join(many[:-1]), many[-1])))}{together}"
-
-
 def _check_count(measured: Measured, entries: int) -> None:
     readings = measured.readings
     if readings <= entries:
@@ -295,7 +220,7 @@ def _solved(
     spread = np.sqrt(variance * np.diag(np.linalg.inv(J.T @ J)))
     half_widths = float(student.ppf(0.5 * (1.0 + LEVEL), freedom)) * spread
     return Found(
-        names, answer.x.copy(), half_widths, vector.copy(), left, _condition(J),
+        names, answer.x.copy(), half_widths, vector.copy(), left, condition(J),
         float(np.sqrt(variance)), freedom, model,
     )  # fmt: skip
 

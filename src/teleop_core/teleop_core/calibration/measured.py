@@ -2,8 +2,10 @@
 
 import csv
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from teleop_core.errors import ParameterError, ShapeError, TeleopError
 from teleop_core.exchange.names import without_unit
 from teleop_core.geometry import Array, checked_array
 from teleop_core.robots.robot import Robot
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 _ANGLES = {"": 1.0, "rad": 1.0, "deg": np.pi / 180.0}
@@ -111,13 +116,12 @@ def read_measured(path: Path, robot: Robot) -> Measured:
     except (csv.Error, ValueError) as e:  # pandas' own errors are ValueErrors
         raise CalibrationError(f"{path}: is no table of text with a head ({e})") from e
     found = {_plain(name): name for name in map(str, frame.columns)}
-    joints = np.empty((len(frame), robot.n))
+    joints, slides = np.empty((len(frame), robot.n)), _slides(robot)
     for i, name in enumerate(robot.joint_names):
         column = found.get(_plain(name), found.get(f"q{i + 1}"))
         if column is None:
             raise _missing(path, f"joint {name} (or q{i + 1})", frame.columns)
-        is_turn = name not in _slides(robot)
-        joints[:, i] = _numbers(path, frame, column, _ANGLES if is_turn else _LENGTHS)
+        joints[:, i] = _numbers(path, frame, column, _LENGTHS if name in slides else _ANGLES)
     points = np.empty((len(frame), 3))
     for i, axis in enumerate("xyz"):
         if axis not in found:
@@ -139,18 +143,23 @@ def _slides(robot: Robot) -> tuple[str, ...]:
     return tuple(n for n, kind in zip(robot.joint_names, kinds, strict=True) if abs(kind) > 1.5)
 
 
-def _missing(path: Path, what: str, columns: object) -> CalibrationError:
-    names = ", ".join(map(str, columns))  # type: ignore[call-overload]
+def _missing(path: Path, what: str, columns: Iterable[str]) -> CalibrationError:
+    names = ", ".join(map(str, columns))
     return CalibrationError(f"{path}: has no column for {what}; its columns are {names}")
 
 
 def _numbers(
-    path: Path, frame: object, column: str, units: dict[str, float], *, may_miss: bool = False
+    path: Path,
+    frame: "pd.DataFrame",
+    column: str,
+    units: dict[str, float],
+    *,
+    may_miss: bool = False,
 ) -> Array:
     """Column in SI units; NaN only where cells may miss."""
     import pandas as pd
 
-    cells = frame[column]  # type: ignore[index]
+    cells = frame[column]
     unit = without_unit(column)[1]
     if unit not in units:
         known = ", ".join(sorted(filter(None, units)))

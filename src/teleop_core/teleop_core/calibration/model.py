@@ -4,11 +4,10 @@ Derivatives are analytic: an error of theta or d turns or slides everything afte
 the joint's axis, one of alpha or a about or along the link's common normal.
 
 Source:
-    Mooring, Roth and Driels 1991, Fundamentals of manipulator calibration, chapter 4: the
-    identification Jacobian; here as geometric vectors.
+    Mooring, Roth and Driels 1991, Fundamentals of manipulator calibration:
+    the identification Jacobian; here as geometric vectors.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -162,15 +161,10 @@ def aligned(points: Array, measured: Array) -> Frame:
     """Frame in which points (N, 3) lie next to where they were measured (N, 3).
 
     Source:
-        Kabsch 1976; Umeyama 1991, eq. 43, which keeps the rotation right-handed.
+        Kabsch 1976; Umeyama 1991, who keeps the rotation right-handed.
     """
     middle, there = points.mean(axis=0), measured.mean(axis=0)
     U, _, Vt = np.linalg.svd((measured - there).T @ (points - middle))
     D = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
     R = U @ D @ Vt
     return Frame(R, there - R @ middle)
-
-
-def indices(names: Iterable[str], of: tuple[str, ...]) -> list[int]:
-    """Places of names in a vector."""
-    return [of.index(name) for name in names]

@@ -33,7 +33,7 @@ def optimal_poses(
         rng: Source of the candidates.
 
     Source:
-        Fedorov 1972, Theory of optimal experiments, section 3.2: forward steps; for calibration
+        Fedorov 1972, Theory of optimal experiments: forward steps; for calibration
         Borm and Menq 1991.
     """
     pool = random_poses(model.robot, max(CANDIDATES, 2 * count), rng)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from teleop_core.calibration.accuracy import misread
 from teleop_core.calibration.identify import LEVEL
 from teleop_core.calibration.model import FRAME
 
@@ -59,7 +60,13 @@ def _table(accuracy: "Accuracy") -> Iterator[str]:
 
 
 def _verdict(calibration: "Calibration") -> Iterator[str]:
-    """What it is worth, in one line."""
+    """What it is worth, and what is wrong with it."""
+    odd = misread(calibration.found, calibration.measured) if calibration.truth is None else None
+    if odd is not None:
+        yield (
+            f"pose {odd.pose} is off by {1e3 * odd.off:.3g} mm still, {odd.times:.0f} times as "
+            "much as is usual here; take it out if it was misread"
+        )
     tried = calibration.tried or calibration.fitted
     before, after = tried.before["total"].rms, tried.after["total"].rms
     if after < before:

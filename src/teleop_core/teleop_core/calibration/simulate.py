@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from teleop_core.calibration import appendix_e
-from teleop_core.calibration.identify import select, wanted_names
+from teleop_core.calibration.identifiable import WORST_CONDITION, select
+from teleop_core.calibration.identify import wanted_names
 from teleop_core.calibration.measured import CalibrationError, Measured
 from teleop_core.calibration.model import Model, rotation_of
 from teleop_core.calibration.poses import optimal_poses, random_poses
@@ -15,7 +16,7 @@ from teleop_core.robots.link_errors import LinkErrors
 from teleop_core.robots.robot import Robot
 
 TOLERANCES = {"cnc": 20e-6, "prototype": 100e-6}
-"""Half widths of tolerances [m], published: Vongbunyong 2008, section 3.3, of milled and of
+"""Half widths of tolerances [m], published: Vongbunyong 2008, chapter 3, of milled and of
 rapid-prototyped parts."""
 SEAT = 0.05
 """Lever [m] over which a tolerance turns an axis; assumed: the size of a bearing seat or a link."""
@@ -89,7 +90,7 @@ def chosen_poses(
         return random_poses(model.robot, count, rng)
     names, pool = wanted_names(model, fit), random_poses(model.robot, 100, rng)
     J = model.jacobian(pool, np.zeros(len(model.names))).reshape(-1, len(model.names))
-    kept, _ = select(model, J, names, worst_condition=100.0)
+    kept, _ = select(model, J, names, WORST_CONDITION)
     return optimal_poses(model, count, kept or names, rng)
 
 

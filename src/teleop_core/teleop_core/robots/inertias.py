@@ -2,13 +2,13 @@
 
 A rigid body of positive density everywhere has a positive mass and three principal moments about
 its centre of mass that are positive and of which none exceeds the sum of the other two. All of it
-is said by one matrix, the pseudo-inertia (4, 4) ∫ [x 1]ᵀ[x 1] dm: it is positive definite. A flat
+is said by one matrix, the pseudo-inertia (4, 4) ∫ (x, 1)(x, 1)ᵀ dm: it is positive definite. A flat
 plate, whose largest moment is that sum, is let through; a point or a line, which no engine can
 turn about itself, is not.
 
 Source:
     Wensing, Kim and Slotine 2018, Linear matrix inequalities for physically consistent inertial
-    parameter identification, eqs. 7, 11, 21.
+    parameter identification.
 """
 
 from collections.abc import Iterable

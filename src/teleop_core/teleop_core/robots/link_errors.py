@@ -16,7 +16,7 @@ they do not describe.
 
 Source:
     Denavit and Hartenberg 1955; Mooring, Roth and Driels 1991, Fundamentals of manipulator
-    calibration, chapter 2.
+    calibration.
 """
 
 import math
