@@ -20,7 +20,7 @@ ARM = load_robot("rcrt1")
 
 def own(name="own", **more):
     parts = {
-        "parameters": PidParameters, "gains": pid_gains, "control": pid_control, "memory": 3
+        "parameters": PidParameters, "gains": pid_gains, "control": pid_control, "memory": 4
     }  # fmt: skip
     return Controller(name, **{**parts, **more})
 
