@@ -31,10 +31,10 @@ class FixtureParameters:
         source="assumed: below the least stiffness of the device, 1020 N/m; none is published",
     )  # fmt: skip
     damping: float = parameter(
-        6.0, unit="N·s/m", lower=0.0, upper=50.0,
+        10.0, unit="N·s/m", lower=0.0, upper=50.0,
         doc="damper of the damped and the hard wall; at least stiffness times period is taken",
-        source="assumed: six times what 1000 N/m at 1 kHz needs (Colgate and Schenkel 1997), and "
-        "below what the device's structure damps",
+        source="assumed: what keeps slow contacts of a trembling hand passive too, twenty times "
+        "K T / 2 of 1000 N/m at 1 kHz (Colgate and Schenkel 1997)",
     )  # fmt: skip
     max_force: float = parameter(
         3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further",

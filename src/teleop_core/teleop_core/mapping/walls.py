@@ -20,19 +20,23 @@ WALL_PARAMETERS = [
     ("stiffness", "f8"), ("max_force", "f8"), ("damping", "f8"), ("is_damped", "i8"),
 ]  # fmt: skip
 WALL_STATE = [("felt", "f8", (3,)), ("rate", "f8", (3,))]
-# Of the last sample: place [m], and its rate through a first-order lag of this time [s], for a step
-# of the reading within a period would else be a blow.
-_SMOOTHING = 1e-3
+"""Of the last sample: place [m], and its smoothed rate [m/s]."""
+# The rate is that of the readings through a first-order lag that takes the time in which the hand
+# goes this far [m], within bounds [s]. A step of the reading within a period would else be a blow,
+# which throws the light device back; so slow motion needs a wide window, fast motion a short one
+# (Janabi-Sharifi, Hayward and Chen 2000 adapt it to the same end).
+_SMOOTH_WAY, _SMOOTH_LEAST, _SMOOTH_MOST = 0.3e-3, 1e-3, 20e-3
 # The damper sets in over this depth [m], a step of the reading, so that the surface is no edge.
 _RAMP = 0.05e-3
 # On the way out this share of the spring's force stays: beyond a wall there is always some.
 _LEAST = 0.05
 SOFT_ZONE = 1e-3
 """Depth over which the source's wall reaches its full force [m] (Vongbunyong 2008, section 7.6)."""
-HARD_STIFFNESS = 5000.0
-"""Stiffness of the hard wall [N/m]: dry friction of 0.26 N keeps steps of the reading of 0.055 mm
-from ringing up to 2 · 0.26 / 0.055e-3 = 9500 N/m (Abbott and Okamura 2005, K <= 2 f / step), and
-the damping that it needs at 1 kHz is no more than the device's structure bears."""
+HARD_STIFFNESS = 3300.0
+"""Stiffness of the hard wall [N/m]: full force after 1 mm, as the source's. No axis of the device
+renders more, and the damper keeps it passive up to about this; dry friction of 0.26 N keeps steps
+of the reading of 0.055 mm from ringing up to 2 · 0.26 / 0.055e-3 = 9500 N/m (Abbott and Okamura
+2005, K <= 2 f / step)."""
 
 
 class Wall(NamedTuple):
@@ -82,6 +86,16 @@ def wall_force(depth: Array, length: float, stiffness: float, largest: float, fo
         force[i] = -push * depth[i] / length if length > 0.0 else 0.0
 
 
+@inner
+def _along(rate: Array, depth: Array, length: float) -> float:
+    """Part of a rate (3,) out of the fixture; all of it inside."""
+    square = along = 0.0
+    for i in range(3):
+        square += rate[i] * rate[i]
+        along += rate[i] * depth[i]
+    return along / length if length > 0.0 else math.sqrt(square)
+
+
 @kernel
 def damped_wall(
     p: Any, s: Any, place: Array, depth: Array, length: float, period: float, force: Array
@@ -90,7 +104,7 @@ def damped_wall(
 
     Spring and damper, together between a twentieth of the spring's force and the largest force. The
     damping is at least stiffness times period: twice what a force lacks that is held for a period.
-    The rest takes what the energy of steps of the reading and a bending device needs.
+    What it has beyond takes the energy that steps of the reading and bending of the device give.
 
     Args:
         p: Record with :data:`WALL_PARAMETERS`.
@@ -105,12 +119,13 @@ def damped_wall(
         Colgate and Schenkel 1997, b > K T / 2 + |B|: the damping b that a wall of stiffness K needs
         when sampled with period T, part of which the wall itself gives here.
     """
-    share, speed = period / (period + _SMOOTHING), 0.0
+    before = _along(s.rate, depth, length)
+    lag = min(max(_SMOOTH_WAY / (abs(before) + 1e-9), _SMOOTH_LEAST), _SMOOTH_MOST)
+    share = period / (period + lag)
     for i in range(3):
         s.rate[i] += ((place[i] - s.felt[i]) / period - s.rate[i]) * share
         s.felt[i] = place[i]
-        if length > 0.0:
-            speed += s.rate[i] * depth[i] / length
+    speed = _along(s.rate, depth, length)
     damping = max(p.damping, p.stiffness * period) * min(length / _RAMP, 1.0)
     spring = p.stiffness * length
     push = min(max(spring + damping * speed, _LEAST * spring), p.max_force)

@@ -1,0 +1,131 @@
+"""Contact: the energy that the device's force took from the hand, and what it gave back."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Key, Metric
+from teleop_core.evaluation.metrics.fixture import GROUP
+from teleop_core.evaluation.rows import Row, number, row
+from teleop_core.evaluation.windows import Window
+from teleop_core.geometry import Array
+from teleop_core.topics import MASTER_CONTACT
+
+TOUCH_J = 1e-6
+"""What takes less energy is a touch [J]: the reading takes one step, and the force, which begins a
+period late and ends a period late, may give back some nanojoules more than it took."""
+_NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns))
+
+
+@dataclass(frozen=True)
+class ContactScore:
+    """Energy of the contacts of the hand with walls; None where there was none, or none is known.
+
+    Attributes:
+        count: Contacts: stretches of time in which the device pushed, and that took 1 µJ or more.
+        touches: Those that took less.
+        returned_max: Largest share of what a contact took that it gave back; above 1 it fed the
+            hand.
+        feeding: Contacts that gave back more than they took.
+        feeding_device: Contacts and touches that gave back more than they and the device's dry
+            friction took.
+        gain_max_uj: Largest energy that a contact or touch gave beyond what it took; negative where
+            each took more, [µJ].
+        taken_max_mj: Largest energy that one took, [mJ].
+        worst_s: When the contact with ``returned_max`` began, from the start of the recording, [s].
+        largest_force_min_n: Least of the forces that the warmth of the motors allowed, [N].
+    """
+
+    count: int | None
+    touches: int | None
+    returned_max: float | None
+    feeding: int | None
+    feeding_device: int | None
+    gain_max_uj: float | None
+    taken_max_mj: float | None
+    worst_s: float | None
+    largest_force_min_n: float | None
+
+
+class ContactMetric(Metric):
+    """Returned beside taken energy of each contact, as the simulated device tells it."""
+
+    name = "contact"
+    keys = (
+        Key("contact.count", "1",
+            "stretches in which the device pushed and took 1 µJ or more; null if not recorded"),
+        Key("contact.touches", "1", "those that took less"),
+        Key("contact.returned_max", "1",
+            "largest share of the energy taken that a contact gave back; above 1 it fed the hand"),
+        Key("contact.feeding", "1", "contacts that gave back more than they took"),
+        Key("contact.feeding_device", "1",
+            "contacts and touches that gave back more than they and the device's friction took"),
+        Key("contact.gain_max_uj", "uJ",
+            "most that a contact or touch gave beyond what it took; negative: each took more"),
+        Key("contact.taken_max_mj", "mJ", "most energy that one took"),
+        Key("contact.worst_s", "s", "when the one with returned_max began, after the start"),
+        Key("contact.largest_force_min_n", "N",
+            "least force that the warmth of the device's motors allowed"),
+    )  # fmt: skip
+    topics = (MASTER_CONTACT,)
+
+    def __init__(self, context: Context) -> None:
+        self._start_ns = context.bag.start_ns
+        # Contacts that are over (N, 6): the topic's columns, when it began [s]; the present one.
+        self._over: list[Array] = []
+        self._present = np.empty((0, len(MASTER_CONTACT.columns) + 1))
+        self._most = np.inf
+
+    def add(self, window: Window) -> None:
+        """Take one window: the last sample of each contact holds its energies."""
+        samples = window.samples(MASTER_CONTACT)
+        if not len(samples.values):
+            return
+        self._most = min(self._most, float(samples.values[:, _MOST].min()))
+        times = (samples.log_ns - self._start_ns) * 1e-9
+        rows = np.vstack((self._present, np.column_stack((samples.values, times))))
+        is_last = np.append(np.diff(rows[:, _NUMBER]) != 0.0, True)
+        found = rows[is_last]
+        found[1:, -1] = rows[1:][is_last[:-1], -1]
+        found[0, -1] = rows[0, -1]
+        self._over.append(found[:-1])
+        self._present = found[-1:]
+
+    def values(self) -> ContactScore:
+        """Score of everything so far."""
+        found = np.vstack((*self._over, self._present))
+        if not len(found):
+            return ContactScore(*[None] * 9)
+        found = found[found[:, _NUMBER] > 0.0]
+        taken, returned = found[:, _TAKEN], found[:, _RETURNED]
+        gain = returned - taken
+        is_contact = np.maximum(taken, returned) >= TOUCH_J
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = np.where(is_contact, returned / taken, -np.inf)
+        worst = int(shares.argmax()) if is_contact.any() else None
+        return ContactScore(
+            count=int(is_contact.sum()),
+            touches=int((~is_contact).sum()),
+            returned_max=None if worst is None else float(shares[worst]),
+            feeding=int((gain[is_contact] > 0.0).sum()),
+            feeding_device=int((gain > found[:, _FRICTION]).sum()),
+            gain_max_uj=1e6 * float(gain.max()) if len(found) else None,
+            taken_max_mj=1e3 * float(taken.max()) if len(found) else None,
+            worst_s=None if worst is None else float(found[worst, -1]),
+            largest_force_min_n=self._most,
+        )
+
+    def rows(self) -> list[Row]:
+        """Contacts and the worst of them; "none" where the recording does not tell."""
+        score = self.values()
+        if score.count is None:
+            return [Row(GROUP, "energy of contacts", "", "none recorded")]
+        worst = f" at {score.worst_s:.1f} s" if score.worst_s is not None else ""
+        share = None if score.returned_max is None else 100.0 * score.returned_max
+        return [
+            Row(GROUP, "contacts, touches", "", f"{score.count}, {score.touches}"),
+            Row(GROUP, "energy given back of taken, max", "%", f"{number(share)}{worst}"),
+            Row(GROUP, "contacts that fed the hand", "", str(score.feeding)),
+            row(GROUP, "least force that warmth allowed", "N", score.largest_force_min_n),
+        ]

@@ -1,0 +1,172 @@
+"""Contacts: what the device renders, and the energy that it takes and gives back."""
+
+import math
+
+import numpy as np
+import pytest
+
+from recipes import Recipe
+from teleop_core.evaluation.scoring import evaluate
+from teleop_core.master.haptic_master import (
+    REST_POSITION,
+    DeviceParameters,
+    HandParameters,
+    HapticMaster,
+    HapticMasterParameters,
+)
+from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.parameters import build
+from teleop_core.topics import MASTER_CONTACT
+
+COLUMN = {name: index for index, name in enumerate(MASTER_CONTACT.columns)}
+CALM = HandParameters(tremor_amplitude=0.0)
+STILL = build(OperatorParameters, {"kind": "hold", "rotation": 0.0})
+
+
+def master(hand=CALM, **device):
+    return HapticMaster(
+        HapticMasterParameters(
+            operator=STILL, hand=hand, device=DeviceParameters(**device), patience=0.0
+        )
+    )
+
+
+def push(device, forces):
+    """Places (N, 3) [m], forces (N, 3) [N] and contacts (N, 5) of ticks with commanded forces."""
+    rows = []
+    for force in forces:
+        device.signals["master_servo_cf"][:3] = force
+        device.step()
+        applied = device.signals["master_measured_cf"][:3].copy()
+        contact = device.signals["master_contact"].copy()
+        rows.append((device.state["position"].copy(), applied, contact))
+    return (np.array(column) for column in zip(*rows, strict=True))
+
+
+# What the device renders.
+
+
+@pytest.mark.parametrize("thermal_time", [0.1, 1.0, 5.0])
+@pytest.mark.parametrize("command", [1.0, 2.0, 3.3, 50.0])
+def test_mean_square_of_the_force_never_exceeds_the_continuous_one(thermal_time, command):
+    forces = np.zeros((6000, 3))
+    forces[:, 1] = command * np.sign(np.sin(np.arange(6000) / 200.0)) * (np.arange(6000) > 50)
+    _, applied, _ = push(master(thermal_time=thermal_time), forces)
+    share, heat, hottest = -math.expm1(-1e-3 / thermal_time), 0.0, 0.0
+    for square in (applied**2).sum(axis=1):
+        heat += (square - heat) * share
+        hottest = max(hottest, heat)
+    assert hottest <= 0.88**2 * (1.0 + 1e-9)
+    if thermal_time < 2.0:  # it is used, not just kept away from
+        assert hottest > 0.7 * 0.88**2
+
+
+def test_a_force_that_stays_falls_smoothly_from_the_peak_to_the_continuous_one():
+    _, applied, contacts = push(master(thermal_time=2.0), np.tile((0.0, 0.0, -5.0), (12_000, 1)))
+    size = -applied[:, 2]
+    assert size[0] == pytest.approx(3.3, rel=1e-12)
+    assert size[-1] == pytest.approx(0.88, rel=1e-3)
+    assert (np.diff(size) <= 1e-12).all()
+    assert np.abs(np.diff(size)).max() < 0.05
+    assert np.allclose(size, contacts[:, COLUMN["largest_force"]], rtol=1e-12, atol=0)
+
+
+def test_a_force_below_the_continuous_one_is_never_cut():
+    _, applied, _ = push(master(thermal_time=0.1), np.tile((0.87, 0.0, 0.0), (5000, 1)))
+    assert (applied[:, 0] == 0.87).all()
+
+
+def test_motors_cool_while_nothing_is_asked_of_them():
+    device = master(thermal_time=1.0)
+    push(device, np.tile((3.3, 0.0, 0.0), (5000, 1)))
+    push(device, np.zeros((5000, 3)))
+    _, applied, _ = push(device, np.tile((3.3, 0.0, 0.0), (1, 1)))
+    assert applied[0, 0] == pytest.approx(3.3, rel=1e-12)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_reading_of_a_pushed_device_runs_ahead_of_the_hand_by_force_over_stiffness(axis):
+    device = master(friction=0.0, continuous_force=3.3)
+    force = np.zeros(3)
+    force[axis] = 1.5
+    push(device, np.tile(force, (3000, 1)))
+    bend = (device.state["position"] - device.state["hand"])[axis]
+    assert bend == pytest.approx(1.5 / (1260.0, 2310.0, 1020.0)[axis], rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [0.05, 0.2, 0.259])
+def test_device_sticks_without_creep_below_its_friction(size):
+    places, _, _ = push(master(), np.tile((size, 0.0, 0.0), (20_000, 1)))
+    assert not (places[100:] - places[100]).any()
+    assert places[-1, 0] == REST_POSITION[0]
+
+
+def test_friction_is_one_force_in_whatever_direction_it_slides():
+    direction = np.array((0.6, 0.0, 0.8))
+    device = master(stiffness=(1e6,) * 3)
+    places, _, _ = push(device, np.tile(1.26 * direction, (4000, 1)))
+    moved = places[-1] - REST_POSITION
+    # The hand's spring of 300 N/m holds what friction leaves; what swings may stop a little off.
+    assert np.linalg.norm(moved) * 300.0 == pytest.approx(1.0, abs=0.26)
+    assert moved @ direction == pytest.approx(np.linalg.norm(moved), rel=1e-2)
+
+
+# The energy.
+
+
+def test_energy_of_a_contact_is_force_times_way():
+    forces = np.zeros((600, 3))
+    forces[100:200], forces[300:500] = (0.8, 0.3, 0.0), (0.0, 0.0, -1.1)
+    places, applied, contacts = push(master(friction=0.05), forces)
+    work = (applied * np.diff(places, axis=0, prepend=[REST_POSITION])).sum(axis=1)
+    assert list(np.unique(contacts[:, COLUMN["number"]])) == [0.0, 1.0, 2.0]
+    for stretch in (slice(100, 200), slice(300, 500)):
+        own, last = work[stretch], contacts[stretch][-1]
+        assert last[COLUMN["taken"]] == pytest.approx(-own[own < 0.0].sum(), rel=1e-9, abs=1e-15)
+        assert last[COLUMN["returned"]] == pytest.approx(own[own > 0.0].sum(), rel=1e-9)
+        way = np.linalg.norm(np.diff(places[stretch.start - 1 : stretch.stop], axis=0), axis=1)
+        assert last[COLUMN["friction"]] == pytest.approx(0.05 * way.sum(), rel=1e-9)
+    # After a contact its numbers stand until the next one.
+    assert (contacts[200:300] == contacts[199]).all(axis=None)
+
+
+# The score.
+
+
+def recorded(path, rows):
+    """Score of a recording whose contact topic holds these rows (N, 5), 100 ticks each."""
+    recipe = Recipe(count=100 * len(rows))
+    recipe.rows[MASTER_CONTACT] = (recipe.stamps, np.repeat(rows, 100, axis=0), recipe.stamps)
+    return evaluate(recipe.write(path))
+
+
+def test_contacts_are_scored_by_their_last_sample(tmp_path):
+    rows = np.array([
+        (0, 0, 0, 0, 3.3), (1, 2e-6, 0, 1e-6, 3.3), (1, 8e-6, 6e-6, 1e-6, 3.1),
+        (2, 1e-5, 1.1e-5, 5e-6, 2.0), (3, 1e-9, 2e-9, 0.0, 3.3), (4, 4e-3, 1e-3, 1e-3, 3.3),
+    ])  # fmt: skip
+    score = recorded(tmp_path / "bag", rows)
+    found = {key: score.value(f"contact.{key}") for key in (
+        "count", "touches", "feeding", "feeding_device", "returned_max", "gain_max_uj",
+        "taken_max_mj", "worst_s", "largest_force_min_n",
+    )}  # fmt: skip
+    assert found == {
+        "count": 3, "touches": 1, "feeding": 1, "feeding_device": 1,
+        "returned_max": pytest.approx(1.1), "gain_max_uj": pytest.approx(1.0),
+        "taken_max_mj": pytest.approx(4.0), "worst_s": pytest.approx(0.3),
+        "largest_force_min_n": 2.0,
+    }  # fmt: skip
+
+
+def test_a_session_without_contact_has_none(tmp_path):
+    score = recorded(tmp_path / "bag", np.array([(0, 0, 0, 0, 3.3)]))
+    assert score.value("contact.count") == 0
+    assert score.value("contact.returned_max") is None
+
+
+def test_recording_that_does_not_tell_of_contacts_says_so(tmp_path):
+    bag = Recipe().write(tmp_path / "bag")
+    assert bag.topics[MASTER_CONTACT.name].count == 0
+    score = evaluate(bag)
+    assert score.value("contact.count") is None
+    assert any(row.value == "none recorded" for result in score.results for row in result.rows)
