@@ -113,7 +113,7 @@ def left_out(found: Found, measured: Measured) -> Accuracy | None:
 
 
 class Misread(NamedTuple):
-    """Pose that does not fit the others: number from 1, what is left of it [m], over the typical."""
+    """Pose that does not fit: its number from 1, what is left of it [m], over the typical."""
 
     pose: int
     off: float

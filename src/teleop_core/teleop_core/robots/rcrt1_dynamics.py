@@ -167,21 +167,24 @@ DYNAMICS = Dynamics(
 
 _RPM = 2.0 * math.pi / 60.0
 DRIVES = Drives(
-    # Motors plus, at home, the links on axes 1-3.
+    # Derived of axes 1-3: motors plus, at home, the links. Assumed of the wrist: its rotors.
     inertia=np.array([0.1213, 0.1199, 26.95, LINKS["J4"], LINKS["J5"], LINKS["J6"]]),
     viscous=np.array([0.4, 0.4, 30.0, 0.004, 0.002, 0.002]),  # assumed
     coulomb=np.array([0.15, 0.15, 1.0, 0.010, 0.005, 0.005]),  # assumed
     friction_speed=np.array([2e-3, 2e-3, 2e-4, 2e-2, 2e-2, 2e-2]),  # assumed
-    # Axis 3: 0.0056 N·m at the screw over the lifting factor 2.184e-4 N·m/N.
+    # Published (table 3.6); of axis 3 derived: 0.0056 N·m at the screw over the lifting factor
+    # 2.184e-4 N·m/N of section 4.6.
     effort_limit=np.array([5.9, 5.9, 0.0056 / 2.184e-4, 0.3525, 0.19, 0.19]),
+    # Published (table 3.6); of axis 3 derived from its 1 mm lead.
     speed_limit=np.array(
         [30.0 * _RPM, 30.0 * _RPM, 3719.677 / 60.0 * 1e-3, 70.213 * _RPM, 130.263 * _RPM,
          130.263 * _RPM]
     ),
+    # Derived from pulses (four counts each) and gears of table 3.6, and the lead.
     encoder_step=np.array(
         [2 * math.pi / (90 * 4000), 2 * math.pi / (90 * 4000), 1e-3 / (3.71 * 2048),
          2 * math.pi / (141 * 2048), 2 * math.pi / (76 * 2048), 2 * math.pi / (76 * 2048)]
     ),
-    bandwidth=np.array([60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),
+    bandwidth=np.array([60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),  # assumed: prints no gains
     assumed=("inertia", "viscous", "coulomb", "friction_speed"),  # inertia: of the wrist
 )  # fmt: skip
