@@ -173,7 +173,7 @@ DRIVES = Drives(
     coulomb=np.array([0.15, 0.15, 1.0, 0.010, 0.005, 0.005]),  # assumed
     friction_speed=np.array([2e-3, 2e-3, 2e-4, 2e-2, 2e-2, 2e-2]),  # assumed
     # Published (table 3.6); of axis 3 derived: 0.0056 N·m at the screw over the lifting factor
-    # 2.184e-4 N·m/N of section 4.6.
+    # 2.184e-4 N·m/N of its ball screw.
     effort_limit=np.array([5.9, 5.9, 0.0056 / 2.184e-4, 0.3525, 0.19, 0.19]),
     # Published (table 3.6); of axis 3 derived from its 1 mm lead.
     speed_limit=np.array(
