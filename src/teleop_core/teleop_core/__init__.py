@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from teleop_core.api import configuration, replay, run
     from teleop_core.controllers import Controller, register_controller
     from teleop_core.errors import (
+        ClosureError,
         EvaluationError,
         KernelError,
         ParameterError,
@@ -66,6 +67,7 @@ _PLACES = {
     "api": ("configuration", "replay", "run"),
     "controllers": ("Controller", "register_controller"),
     "errors": (
+        "ClosureError",
         "EvaluationError",
         "KernelError",
         "ParameterError",
@@ -99,6 +101,7 @@ _PLACES = {
 _HOME = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
+    "ClosureError",
     "Controller",
     "EvaluationError",
     "ExportReport",

@@ -189,21 +189,43 @@ def _lead(q: Array, first: Array, b: float, a: float, side: float, theta: Array)
 
 
 @inner
-def _at_seed(
-    q: Array, geometry: Array, ask: Array, T: Array, first: Array, theta: Array, start: Array
-) -> None:
-    """Write legs (3,) and angles (3,) of the seed or of home, and angles to start from; T, too."""
-    b, a = geometry[0], geometry[1]
+def _at_seed(g: Array, ask: Array, T: Array, first: Array, theta: Array) -> float:
+    """Write legs (3,) and angles (3,) of the seed or of home, and T of home; the side they are on.
+
+    Home's side is where :func:`volume` is above 0.
+    """
     if ask[1] > 0.0:
-        angles_of(T, b, a, first, theta)
-        start[:] = theta
-        return
-    S = np.empty((3, 3))
-    first[:] = geometry[2]
-    lean(first, geometry, theta)
-    lean(q, geometry, start)
-    points(first, theta, b, S)
-    frame(S, T)
+        angles_of(T, g[0], g[1], first, theta)
+        return float(volume(first, theta, g[0], g[1]))
+    first[:] = g[2]
+    lean(first, g, theta)
+    for r in range(4):
+        for c in range(4):
+            T[r, c] = 1.0 if r == c else 0.0
+    T[2, 3] = first[0] * math.sin(theta[0])
+    return 1.0
+
+
+@inner
+def _far(
+    q: Array,
+    first: Array,
+    g: Array,
+    starts: int,
+    side: float,
+    T: Array,
+    seed: Array,
+    theta: Array,
+) -> int:
+    """Replace leg angles (3,) by the end of the way from the seed, else by the nearest found."""
+    if _lead(q, first, g[0], g[1], side, seed):
+        theta[:] = seed
+        return _CLOSED
+    if starts > 0:
+        S = np.empty((3, 3))
+        joints_at(T, g[1], S)
+        _nearest(q, g[0], g[1], starts, S, theta)
+    return _OTHER_MODE
 
 
 @kernel
@@ -211,22 +233,20 @@ def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int
     """Write ``T_base_tip`` of leg lengths (3,) [m]; see :class:`kinematics.Kernels`."""
     b, a, S, pose = geometry[0], geometry[1], np.empty((3, 3)), np.empty((4, 4))
     first, seed, theta = np.empty(3), np.empty(3), np.empty(3)
-    _at_seed(q, geometry, ask, T, first, seed, theta)
+    side = _at_seed(geometry, ask, T, first, seed)
+    theta[:] = seed
+    if ask[1] == 0.0:
+        lean(q, geometry, theta)
     settle(q, b, a, theta)
-    out[0], status = open_by(q, theta, b, a, S), _OTHER_MODE
+    out[0], found = open_by(q, theta, b, a, S), volume(q, theta, b, a)
     frame(S, pose)
-    side, found = volume(first, seed, b, a), volume(q, theta, b, a)
     is_same = found * side > 0.0 or min(abs(found), abs(side)) < _NEAR
-    if out[0] <= REACHED and is_same and rotation_angle_between(T, pose) <= FAR:
-        status = _CLOSED
-    elif _lead(q, first, b, a, side, seed):
-        theta[:], status = seed, _CLOSED
-    elif ask[0] > 0.0:
-        joints_at(T, a, S)
-        _nearest(q, b, a, int(ask[0]), S, theta)
-    out[0] = open_by(q, theta, b, a, S)
-    frame(S, T)
-    found = volume(q, theta, b, a)
+    status = _CLOSED
+    if out[0] > REACHED or not is_same or rotation_angle_between(T, pose) > FAR:
+        status = _far(q, first, geometry, int(ask[0]), side, T, seed, theta)
+        out[0], found = open_by(q, theta, b, a, S), volume(q, theta, b, a)
+        frame(S, pose)
+    T[:] = pose
     out[1] = math.copysign(1.0, found)
     if out[0] > REACHED:
         return _NOT_CLOSED

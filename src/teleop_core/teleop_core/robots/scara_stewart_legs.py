@@ -236,7 +236,7 @@ def close_platform(legs: Array, g: Array, ask: Array, T: Array, out: Array) -> i
         return _NEAR_SINGULAR if is_blind(T, turning, g) else _CLOSED
     if ask[1] == 0.0:
         orientation(legs, g, T)
-    status = close_legs(legs, joints[0], joints[1], g[1], int(ask[0]), T, out)
+    status = close_legs(legs, joints[0], joints[1], g[1], int(ask[0]), 0.0, T, out)
     out[1] *= home_side(g)
     return _OTHER_MODE if status == _CLOSED and ask[1] == 0.0 and out[1] < 0.0 else status
 

@@ -222,14 +222,16 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
     """Write ``T_base_tip`` of leg lengths (6,) [m]; see :class:`kinematics.Kernels`."""
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
+    side = 0.0
     if ask[1] == 0.0:
         _at_home(geometry, T)
+        side = geometry[_SIDE]
     if geometry[_SINGULAR] > 0.0:
         lengths = np.empty(6)
         leg_system(T, base, platform, lengths, np.empty((6, 6)))
         out[0], out[1] = np.abs(lengths - q).max(), 0.0
         return _UNDETERMINED
-    status = close_legs(q, base, platform, geometry[_SIZE], int(ask[0]), T, out)
+    status = close_legs(q, base, platform, geometry[_SIZE], int(ask[0]), side, T, out)
     out[1] *= geometry[_SIDE]
     return status
 

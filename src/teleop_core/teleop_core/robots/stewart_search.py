@@ -168,7 +168,14 @@ def _lead(legs: Array, base: Array, platform: Array, size: float, side: float, T
 
 @kernel
 def close_legs(
-    legs: Array, base: Array, platform: Array, size: float, starts: int, T: Array, out: Array
+    legs: Array,
+    base: Array,
+    platform: Array,
+    size: float,
+    starts: int,
+    side: float,
+    T: Array,
+    out: Array,
 ) -> int:
     """Move a pose from where it is to the assembly with these leg lengths next to it.
 
@@ -181,6 +188,7 @@ def close_legs(
         platform: Platform joints (6, 3) [m].
         size: Length [m] at which one metre weighs as one radian.
         starts: Starts of the search that follows where that does not close.
+        side: Sign of the leg Jacobian's determinant at the seed; 0 to find it.
         T: Seed, and pose (4, 4); of least error where nothing closes.
         out: Largest error of a leg [m], sign of the leg Jacobian's determinant (2,).
 
@@ -189,8 +197,9 @@ def close_legs(
     """
     J, lengths, seed, trial = np.empty((6, 6)), np.empty(6), np.empty((4, 4)), np.empty((4, 4))
     seed[:], trial[:] = T, T
-    leg_system(T, base, platform, lengths, J)
-    side = side_of(J)
+    if side == 0.0:
+        leg_system(T, base, platform, lengths, J)
+        side = side_of(J)
     status, out[0] = _OTHER_MODE, direct(legs, base, platform, size, False, T)
     is_near, out[1] = _is_singular(T, base, platform, size, lengths, J)
     is_same = out[1] * side > 0.0 or is_near
