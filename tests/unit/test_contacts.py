@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from recipes import Recipe
+from teleop_core.api import configuration
 from teleop_core.evaluation.scoring import evaluate
+from teleop_core.mapping.parameters import FixtureParameters
 from teleop_core.master.haptic_master import (
     REST_POSITION,
     DeviceParameters,
@@ -16,6 +18,7 @@ from teleop_core.master.haptic_master import (
 )
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.parameters import build
+from teleop_core.session.notes import notes_of, rendered_note
 from teleop_core.topics import MASTER_CONTACT
 
 COLUMN = {name: index for index, name in enumerate(MASTER_CONTACT.columns)}
@@ -170,3 +173,29 @@ def test_recording_that_does_not_tell_of_contacts_says_so(tmp_path):
     score = evaluate(bag)
     assert score.value("contact.count") is None
     assert any(row.value == "none recorded" for result in score.results for row in result.rows)
+
+
+# Walls that the device cannot render.
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        ({}, ""),
+        ({"stiffness": 1020.0}, ""),
+        ({"stiffness": 1100.0}, "on z (1020 N/m): the hand feels 529 N/m"),
+        ({"wall": "source"}, "3300 N/m, more than the device renders on x, y, z"),
+        ({"wall": "step"}, "on x, y, z (1260, 2310, 1020 N/m): the hand feels 1260, 2310, 1020"),
+        ({"wall": "step", "max_force": 0.0}, ""),
+    ],
+)
+def test_a_wall_stiffer_than_the_device_is_told_with_what_the_hand_feels(settings, told):
+    note = rendered_note(DeviceParameters(), FixtureParameters(**settings))
+    assert told in note
+    assert bool(note) is bool(told)
+
+
+def test_sessions_and_their_arms_tell_what_their_devices_cannot_render():
+    arms = configuration(arms=["left", "right"], settings={"right/fixture.wall": "source"})
+    assert [note.split(":")[0] for note in notes_of(arms)] == ["arm 'right'"]
+    assert not notes_of(configuration("coarse_box"))

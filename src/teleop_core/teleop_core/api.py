@@ -37,6 +37,7 @@ from teleop_core.session.layers import (
     setting,
 )
 from teleop_core.session.length import as_long_as_followed
+from teleop_core.session.notes import notes_of
 from teleop_core.session.runner import (
     NewSamples,
     StateReports,
@@ -191,7 +192,7 @@ def run(
             controller=controller, robot=robot, stages=stages, arms=arms, delays=delays,
             **parameters,
         )  # fmt: skip
-    for note in made.graph.notes:
+    for note in notes_of(made):
         warnings.warn(note, stacklevel=2)
     session = VirtualTime(made)
     ticks = session_ticks(made, session)

@@ -5,7 +5,9 @@ from typing import Any
 from teleop_core.master.haptic_master import HAPTIC_MASTER, HapticMasterParameters
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.stage import Stage
-from teleop_core.topics import MASTER_SERVO_CF, Topic
+from teleop_core.topics import MASTER_CONTACT, MASTER_SERVO_CF, Topic
+
+_MOST = MASTER_CONTACT.columns.index("largest_force")
 
 
 class HapticMasterNode(TickingNode):
@@ -33,10 +35,14 @@ class HapticMasterNode(TickingNode):
         super().read_ports(trigger)
 
     def concerns(self) -> list[str]:
-        """An operator who waits for the slave."""
-        if self.stage.has_begun:
-            return []
-        return ["waits until teleop/state says that the slave follows"]
+        """An operator who waits for the slave; motors that are too warm for the peak force."""
+        found = []
+        if not self.stage.has_begun:
+            found.append("waits until teleop/state says that the slave follows")
+        most = float(self.stage.signals[MASTER_CONTACT.field][_MOST])
+        if 0.0 < most < self.parameters.device.peak_force:
+            found.append(f"its motors are warm: {most:.2f} N at most")
+        return found
 
     def values(self) -> dict[str, str]:
         """Whether the operator moves yet."""
