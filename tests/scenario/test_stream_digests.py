@@ -42,7 +42,7 @@ def arithmetic() -> str:
 
 def digests(scenario: str, seed: int) -> dict[str, str]:
     """First 16 hexadecimal digits of the SHA-256 of each column's bytes, over a whole session."""
-    configuration = configure(scenario, settings=[f"haptic_master.seed={seed}"])
+    configuration = configure(scenario, settings=[f"seed={seed}"])
     found = defaultdict(hashlib.sha256)
     session = VirtualTime(configuration)
     for block in run_blocks(session, session_ticks(configuration, session)):

@@ -39,7 +39,7 @@ def text(found: FitResult) -> str:
 
 
 def parameter_file(found: FitResult) -> str:
-    """ROS 2 parameter file: the plant ``hardware`` with the fitted numbers in place of the robot's."""
+    """ROS 2 parameter file: the plant ``hardware`` with fitted numbers over the robot's."""
     values = {number.name: float(f"{number.value:.4g}") for number in found.numbers}
     own = faults_of(load_robot(found.robot))
     given: dict[str, object] = {

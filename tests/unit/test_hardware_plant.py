@@ -1,0 +1,202 @@
+"""Plants by name: what the hardware does beside its model, each fault alone, and mistakes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from teleop_core.errors import ParameterError, PartError, ShapeError, UnknownNameError
+from teleop_core.fitting.rests import Mover
+from teleop_core.parameters import MARKS, build, parameter, specs
+from teleop_core.plants import PLANTS, Plant, register_plant
+from teleop_core.plants.hardware import FAULTS, HARDWARE, faults_of
+from teleop_core.robots import load_robot
+from teleop_core.robots.hardware import ENTRIES, Hardware
+from teleop_core.robots.link_errors import LinkErrors
+from teleop_core.session.configuration import configure
+from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+
+ARM = load_robot("rcrt1")
+TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])
+
+
+def slave(plant="hardware", controller="source_pid", **settings):
+    given = {"plant.kind": plant, "controller.kind": controller}
+    return build(SlaveSimParameters, given | settings)
+
+
+def rest(*without, **settings):
+    """Mover after a move to the target, and the encoders' rest less the target (6,)."""
+    mover = Mover(slave(**{"plant.hardware.without": without}, **settings))
+    return mover, mover.move(TARGET) - TARGET
+
+
+def test_without_any_fault_the_hardware_is_the_ideal_plant_without_friction():
+    none = slave(**{"plant.hardware.without": tuple(FAULTS)})
+    ideal = slave("ideal", coulomb=(0.0,) * 6)
+    rests = [Mover(parameters).move(TARGET) for parameters in (none, ideal)]
+    assert np.array_equal(*rests)
+
+
+def test_dry_friction_stops_a_joint_short_by_its_size_over_kp():
+    mover, off = rest("wandering", "bias", "weights", "drive_steps")
+    kp = mover.slave.arm.gains[:, 0]
+    short = faults_of(ARM).coulomb / kp
+    towards = np.sign(ARM.home - TARGET)
+    step = ARM.drives.encoder_step
+    for joint in (0, 1, 3, 4, 5):  # an integrator brings d3 there
+        assert abs(off[joint] - towards[joint] * short[joint]) < 2.5 * step[joint], joint
+    assert abs(off[2]) < 3 * step[2]
+
+
+def test_bias_and_weight_push_a_joint_without_friction_off_by_their_size_over_kp():
+    mover, off = rest("wandering", "friction", "drive_steps")
+    kp, faults = mover.slave.arm.gains[:, 0], faults_of(ARM)
+    gravity = np.zeros(6)
+    ARM.dynamics.gravity(TARGET, faults.dynamics.copy(), gravity)
+    known = np.zeros(6)
+    ARM.dynamics.gravity(TARGET, ARM.dynamics.parameters.copy(), known)
+    expected = (faults.bias - (gravity - known)) / kp
+    step = ARM.drives.encoder_step
+    assert np.abs(off - expected)[[0, 1, 3, 4, 5]].max() < 2 * step.max()
+    assert abs(off[1]) > 10 * step[1]  # the weight is felt
+
+
+def test_encoders_see_nothing_that_lies_behind_them():
+    rests = [rest(*without)[1] for without in ((), ("play", "links"))]
+    assert np.array_equal(*rests)
+
+
+def test_true_tip_is_that_of_the_arm_as_built_behind_its_play():
+    mover, _ = rest()
+    faults, s = faults_of(ARM), mover.slave.state
+    encoders = mover.slave.arm.q
+    lag = encoders - s["carried"]
+    assert np.abs(lag[:4]).max() < 1e-5  # what a joint hunts in the tick since
+    assert abs(abs(lag[4]) - faults.play[4]) < 1e-5
+    assert abs(lag[5]) <= faults.play[5] + faults.play[4] + 1e-5
+    # Of a Denavit-Hartenberg chain written here, with the errors in its table.
+    table = np.zeros((6, 4))  # a, alpha, d, theta
+    table[:, 1] = np.array([-1.0, 1.0, 0.0, -1.0, 1.0, 0.0]) * math.pi / 2
+    table[5, 2] = 0.037
+    table += faults.links.vector.reshape(4, 6).T
+    q, T = s["carried"], np.eye(4)
+    for i, (a, alpha, d, theta) in enumerate(table):
+        theta, d = (theta, d + q[i]) if i == 2 else (theta + q[i], d)
+        ct, st_, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
+        T = T @ np.array([[ct, -st_ * ca, st_ * sa, a * ct], [st_, ct * ca, -ct * sa, a * st_],
+                          [0.0, sa, ca, d], [0.0, 0.0, 0.0, 1.0]])  # fmt: skip
+    # The tip was seen at the start of the last tick, at rest.
+    assert np.linalg.norm(mover.true_pose()[:3] - T[:3, 3]) < 1e-9
+
+
+def test_drives_give_efforts_in_steps_of_their_converter():
+    mover = Mover(slave(**{"plant.hardware.drive_bits": 8}))
+    mover.move(TARGET)
+    step = 2.0 * ARM.drives.effort_limit / 256
+    effort = mover.slave.arm.effort - faults_of(ARM).bias
+    assert np.abs(effort / step - np.round(effort / step)).max() < 1e-9
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_fault_can_be_left_out_alone(fault):
+    parameters = slave(**{"plant.hardware.without": (fault,)})
+    kind = parameters.plant.kind
+    with_it = HARDWARE.physics(slave().plant.kind.parameters, ARM)
+    without = HARDWARE.physics(kind.parameters, ARM)
+    differ = {
+        name for name in vars(with_it)
+        if not np.array_equal(getattr(with_it, name), getattr(without, name))
+    }  # fmt: skip
+    expected = {
+        "friction": {"coulomb"}, "sticking": {"bristle"}, "wandering": {"wander"},
+        "bias": {"bias"}, "weights": {"dynamics"}, "drive_steps": {"effort_step"},
+        "play": {"play", "coupling"}, "links": {"tip_geometry"},
+    }  # fmt: skip
+    assert differ == expected[fault]
+
+
+def test_every_number_of_the_hardware_says_how_it_is_known():
+    assert set(faults_of(ARM).sources) == set(ENTRIES)
+    for text in faults_of(ARM).sources.values():
+        assert text.partition(":")[0] in MARKS
+    numbers = [spec for spec in specs(HARDWARE.parameters) if spec.kind in {float, int}]
+    assert all(spec.source for spec in numbers)
+
+
+@pytest.mark.parametrize("name", ["puma560", "scara", "scara_stewart"])
+def test_other_robots_stick_by_their_drive_table_and_are_made_as_drawn(name):
+    made = SlaveSim(build(SlaveSimParameters, {"robot": name, "plant.kind": "hardware"}))
+    robot = made.robot
+    assert np.array_equal(made.parameters["coulomb"], robot.drives.coulomb)
+    assert (made.parameters["bristle"] > 0.0).all()
+    assert np.array_equal(made.arm.tip_geometry, robot.geometry_row)
+
+
+def test_a_plant_of_ones_own_moves_the_slave():
+    def physics(parameters, robot):
+        made = PLANTS.find("ideal").physics(None, robot)
+        return type(made)(**(vars(made) | {"bias": np.full(robot.n, 0.5)}))
+
+    plant = register_plant(Plant("leaning", PLANTS.find("ideal").parameters, physics))
+    try:
+        off = Mover(slave("leaning")).move(TARGET) - TARGET
+        assert off[0] > 5e-4
+    finally:
+        PLANTS.remove(plant.name)
+
+
+@pytest.mark.parametrize(
+    ("plant", "needed"),
+    [
+        ("no plant", "a Plant"),
+        (Plant("bad", int, lambda p, r: None), "dataclass"),
+        (Plant("bad", HARDWARE.parameters, lambda p, r: None), "gives Physics"),
+        (Plant("bad", HARDWARE.parameters, lambda p, r: 1 / 0), "ZeroDivisionError"),
+    ],
+)
+def test_what_is_no_plant_is_refused_with_the_reason(plant, needed):
+    with pytest.raises(PartError, match=needed):
+        PLANTS.add("bad", plant)
+    assert "bad" not in PLANTS.names()
+
+
+@pytest.mark.parametrize(
+    ("setting", "needed"),
+    [
+        ("plant=real", "ideal, hardware"),
+        ("plant.hardware.without=[rust]", "friction"),
+        ("plant.hardware.coulomb=[1.0]", "6 values"),
+        ("plant.hardware.coulomb=[-1.0,0,0,0,0,0]", "at least 0"),
+        ("plant.hardware.weights=[m9=1]", "m2b_L0b"),
+        ("plant.hardware.weights=[m2b_L0b=heavy]", "m2b_L0b=number"),
+    ],
+)
+def test_wrong_numbers_of_a_plant_name_what_is_possible(setting, needed):
+    with pytest.raises((ParameterError, UnknownNameError), match=needed):
+        SlaveSim(configure(None, settings=["plant=hardware", setting]).group("slave_sim"))
+
+
+@pytest.mark.parametrize(
+    ("changed", "kind"),
+    [
+        ({"coulomb": [-1.0, 0.0]}, ParameterError),
+        ({"play": [0.0]}, ShapeError),
+        ({"coupling": np.zeros((3, 3))}, ShapeError),
+        ({"coupling": np.ones((2, 2))}, ParameterError),
+        ({"links": LinkErrors.none(3)}, ShapeError),
+        ({"sources": {"mass": "published: x"}}, UnknownNameError),
+        ({"sources": {"play": "somewhere"}}, ParameterError),
+    ],
+)
+def test_impossible_hardware_is_refused(changed, kind):
+    zero = np.zeros(2)
+    given = {"coulomb": zero, "bias": zero, "wander": zero, "play": zero,
+             "coupling": np.zeros((2, 2))}  # fmt: skip
+    with pytest.raises(kind):
+        Hardware(**(given | changed))
+
+
+def test_a_source_without_a_mark_is_refused():
+    with pytest.raises(ParameterError, match="published"):
+        parameter(1.0, doc="", source="my own measurement")
