@@ -132,7 +132,8 @@ class Bench:
         """
         from teleop_core.api import configuration
 
-        group = configuration(settings=self._settings | dict(settings or {})).group("slave_sim")
+        given = {"seed": self.seed, **self._settings, **dict(settings or {})}
+        group = configuration(settings=given).group("slave_sim")
         assert isinstance(group, SlaveSimParameters)
         return group
 

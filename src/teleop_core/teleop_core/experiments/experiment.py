@@ -62,6 +62,7 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "filter": f"{_PLACE}.reference_filter:FILTER",
         "precision": f"{_PLACE}.precision:PRECISION",
         "repeatability": f"{_PLACE}.precision:REPEATABILITY",
+        "responses": f"{_PLACE}.responses:RESPONSES",
         "accuracy": f"{_PLACE}.accuracy:ACCURACY",
         "master_slave": f"{_PLACE}.master_slave:MASTER_SLAVE",
         "gravity": f"{_PLACE}.gravity:GRAVITY",
