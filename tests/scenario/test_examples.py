@@ -98,6 +98,14 @@ def test_own_force_slows_the_hand(tmp_path):
     assert 0.5 < numbers(r"([\d.]+) N", text)[1] < 3.3
 
 
+def test_assemblies_are_told_from_poses_that_do_not_close(tmp_path):
+    text = run("assemblies", tmp_path)
+    assert re.findall(r": ([A-Z_]+), mode", text) == ["CLOSED", "OTHER_MODE", "NOT_CLOSED"]
+    assert numbers(r"(\d+) assemblies", text) == [8.0, 8.0, 0.0]
+    assert "height -1.091 m, mode -1" in text
+    assert "must be joints with which the loops close" in text
+
+
 def test_two_arms_are_scored_one_by_one(tmp_path):
     text = run("two_arms", tmp_path)
     assert "left: rcrt1, seed 1" in text

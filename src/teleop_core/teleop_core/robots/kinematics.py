@@ -95,7 +95,10 @@ class IkResult(NamedTuple, Generic[Status]):
     status: Status
     """:class:`IkStatus` of one pose; for N an integer array (N,) of its values."""
     residual: Array
-    """Distance [m] and angle [rad], (2,) or (N, 2), between the pose of ``q`` and the wanted."""
+    """Distance [m] and angle [rad], (2,) or (N, 2), between the pose of ``q`` and the wanted.
+
+    Of robots with loops it is the pose next to home, as in a tick: ``Kernels.fk``.
+    """
 
 
 IkOne: TypeAlias = IkResult[IkStatus]
