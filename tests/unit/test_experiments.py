@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import dlti, dstep
 
 from teleop_core import experiments
-from teleop_core.errors import ParameterError, PartError, UnknownNameError
+from teleop_core.errors import ParameterError, PartError, TeleopError, UnknownNameError
 from teleop_core.experiments import Bench, Experiment, Findings, Row
 from teleop_core.experiments.accuracy import (
     AXES,
@@ -19,6 +19,7 @@ from teleop_core.experiments.accuracy import (
 from teleop_core.experiments.drawing import box_edges
 from teleop_core.experiments.points24 import visits_of
 from teleop_core.experiments.reference_filter import gain_at, step_response
+from teleop_core.experiments.responses import response
 from teleop_core.operators.tour import tour
 from teleop_core.recording import Stream
 from teleop_core.robots import load_robot
@@ -235,6 +236,40 @@ def test_tip_that_is_off_misses_by_as_much_in_the_plane_of_the_board():
     visits = Perfect((0.3, 0.4, 7.0)).visits()
     assert np.allclose(visits.off_mm, 0.5, atol=1e-9)
     assert np.allclose(visits.missed_mm, (0.3, 0.4, 7.0), atol=1e-9)
+
+
+def test_session_that_is_over_before_its_tour_is_told():
+    bench = Bench(settings={"duration": 12.0})
+    with pytest.raises(TeleopError, match="give it more time"):
+        experiments.run("points24", bench=bench)
+
+
+# -- responses -------------------------------------------------------------------------------------
+
+
+def test_move_ends_at_its_target_and_begins_at_home():
+    robot = load_robot("rcrt1")
+    target = np.array([0.3, 1.9, 0.40, 0.4, 0.5, -0.3])
+    found = response(Bench(settings={"plant": "ideal", "controller": "pid"}).slave(), target)
+    assert np.abs(found.reference[0] - robot.home).max() < 1e-5
+    assert np.abs(found.reference[-1] - target).max() < 1e-5
+    # The ideal plant under integral action rests within an encoder count or two.
+    assert (np.abs(found.measured[-1] - target) < 2.5 * robot.drives.encoder_step).all()
+    assert np.allclose(found.reached_mm[-1], 1e3 * robot.fk(found.measured[-1])[:3, 3], atol=1e-9)
+
+
+def test_friction_that_sticks_keeps_the_tip_off_where_the_ideal_arm_rests():
+    target = np.array([0.3, 1.9, 0.40, 0.4, 0.5, -0.3])
+    off = {
+        plant: np.linalg.norm(
+            response(
+                Bench(settings={"plant": plant, "controller": "source_pid"}).slave(), target
+            ).error_mm[-1]
+        )
+        for plant in ("ideal", "hardware")
+    }
+    assert off["hardware"] > 0.05
+    assert off["hardware"] > 3.0 * off["ideal"]
 
 
 def test_edges_of_a_box_are_twelve_of_its_sides():

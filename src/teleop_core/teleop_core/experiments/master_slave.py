@@ -16,7 +16,14 @@ from teleop_core.evaluation.figure import (
     stacked_axes,
     time_axis,
 )
-from teleop_core.evaluation.published import BOX_OVERSHOOT_MM, COARSE, FINE, Published
+from teleop_core.evaluation.published import (
+    ANGLE_FACTOR,
+    BOX_OVERSHOOT_MM,
+    COARSE,
+    FINE,
+    POSITION_SHARE,
+    Published,
+)
 from teleop_core.experiments.bench import Bench, Session, mean, pooled
 from teleop_core.experiments.conditions import OURS, PREDICTED
 from teleop_core.experiments.drawing import (
@@ -37,7 +44,9 @@ MODES = {"coarse_box": COARSE, "fine_box": FINE}
 BOX_MM = {"coarse_box": 30.0, "fine_box": 3.0}
 _RATIO = FINE.position_mm[0] / COARSE.position_mm[0]
 # Root mean squares are what the plant must predict; maxima are single events of one person's hand.
-_RMS, _TURN_RMS, _MAX = percent(15.0), factor(1.6), factor(1.6)
+_RMS, _TURN_RMS = percent(100.0 * POSITION_SHARE), factor(ANGLE_FACTOR)
+_MAX = factor(ANGLE_FACTOR)
+_CALLED = {"roll": "the source's yaw", "yaw": "the source's roll"}
 _PATH, _CURVE = 8, 2  # of how many samples one is drawn
 _QUATERNION = ["qw", "qx", "qy", "qz"]
 
@@ -87,7 +96,7 @@ def _mode_rows(name: str, found: list[Figures], ours: list[Figures]) -> list[Row
             values, others = ([getattr(f, field)[k] for f in which] for which in (found, ours))
             rows.append(
                 _row(f"{text} error, {kind}", unit, getattr(printed, field)[k], values, others,
-                     within if k == 0 else _MAX, group, is_rms=k == 0)
+                     within if k == 0 else _MAX, group, is_rms=k == 0, note=_CALLED.get(text, ""))
             )  # fmt: skip
     beyond, others = ([f.beyond_mm for f in which] for which in (found, ours))
     rows.append(
@@ -244,7 +253,10 @@ def _turn_figure(name: str, found: Drawn) -> Figure:
         rms = getattr(printed, f"{text}_deg")[0]
         shapes += [level(sign * rms, "", place["yaxis"])[0] for sign in (-1.0, 1.0)]
     layout["shapes"] = shapes
-    sentence = "Measured less reference; dotted: the published root mean squares."
+    sentence = (
+        "Measured less reference; dotted: the published root mean squares. The source calls roll "
+        "yaw and yaw roll."
+    )
     return Figure(f"Roll, pitch and yaw errors, {printed.mode}", sentence, traces, layout, 440)
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from teleop_core.errors import TeleopError
 from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure
 from teleop_core.experiments.bench import Bench, Session, Settings, mean
 from teleop_core.experiments.conditions import OURS, PREDICTED
@@ -54,6 +55,9 @@ def visits_of(session: Session, p: TourParameters, center: Array, approach_s: fl
         p: Its tour.
         center: Centre of the tour relative to the start of the hand (3,) [m].
         approach_s: Time of the hand's approach [s].
+
+    Raises:
+        TeleopError: The session is over before the tour is.
     """
     follows = session.is_followed
     times = session.time[follows] - session.time[follows][0] - approach_s
@@ -62,6 +66,9 @@ def visits_of(session: Session, p: TourParameters, center: Array, approach_s: fl
     start = session.places_mm("slave/servo_cp")[sent][0]  # the hand waits until the slave follows
     axes = axis_map("axes", MotionScalingParameters.axes)
     targets = start + 1e3 * (center + p.stops) @ axes.T
+    if times[-1] < (needed := p.visit_time + p.trace_time):
+        text = f"the session ends {needed - times[-1]:.1f} s before its tour of {needed:.1f} s"
+        raise TeleopError(f"{SCENARIO}: {text}; give it more time (duration)")
     cycle = p.leg_time + p.rest_time
     begins = np.arange(len(targets)) * cycle + p.leg_time + _SETTLED * p.rest_time
     rests = [path[(times >= begin) & (times < (k + 1) * cycle)] for k, begin in enumerate(begins)]
