@@ -23,6 +23,7 @@ from teleop_core.trials import fenced, is_whole
 
 __all__ = ["CONTROLLERS", "Controller", "per_joint", "register_controller"]
 
+_PLACE = "teleop_core.controllers"
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
 CONTROL = types.void(_TABLE, _TABLE, _ROW, _ROW, _ROW, _ROW, types.float64, _ROW)
 """Signature of a control kernel, so that one compiled slave serves every law."""
@@ -49,11 +50,16 @@ class Controller:
         control: ``control(gains, memory, setpoint, measured, feedforward, limit, dt, effort)``, a
             kernel or a plain function over all joints. Setpoint and measured position [rad or m],
             feedforward and limit [N·m or N] are (n,), ``memory`` (n, m) is its own to write, and
-            ``effort`` (n,) gets the drive efforts; they are cut at ±limit afterwards.
+            ``effort`` (n,) gets the drive efforts; they are cut at ±limit afterwards. The
+            feedforward is the gravity that is compensated.
         begin: ``begin(memory, measured, effort)`` prepares the memory for an arm at rest at
             ``measured`` that needs ``effort`` to stay there.
         shift: ``shift(memory, effort)`` lets it give so much more from now on, because the
             feedforward gives so much less.
+        uses_model: Whether the feedforward is (2 n + n²,): behind the gravity that is compensated
+            the model's bias, Coriolis, centrifugal and all gravity effort (n,) at measured
+            positions and speeds, and its inertia matrix (n, n), row by row. It is the model that is
+            known, not the plant; friction is in neither.
     """
 
     name: str
@@ -63,6 +69,11 @@ class Controller:
     memory: int = 0
     begin: Callable[[Array, Array, Array], None] = _nothing
     shift: Callable[[Array, Array], None] = _no_shift
+    uses_model: bool = False
+
+    def feedforward(self, n: int) -> int:
+        """Length of the feedforward that it takes, for ``n`` joints."""
+        return 2 * n + n * n if self.uses_model else n
 
     @cached_property
     def control_pointer(self) -> Any:
@@ -136,9 +147,12 @@ def _tried_effort(part: Controller, gains: Array, home: Array) -> tuple[Array, b
     effort, after = fenced(np.zeros(n))
     table, _ = fenced(gains)
     zero, one = np.zeros(n), np.ones(n)
+    feedforward, _ = fenced(np.zeros(part.feedforward(n)))
+    if part.uses_model:
+        feedforward[2 * n :] = np.eye(n).ravel()
     part.begin(memory, home.copy(), zero)
     part.shift(memory, zero)
-    part.control(table, memory, home.copy(), home.copy(), zero, one, DT, effort)
+    part.control(table, memory, home.copy(), home.copy(), feedforward, one, DT, effort)
     return effort, is_whole(fence) and is_whole(after)
 
 
@@ -146,9 +160,13 @@ CONTROLLERS: Registry[Controller] = Registry(
     "controller",
     "controllers",
     {
-        "pid": "teleop_core.controllers.pid:PID",
-        "pd": "teleop_core.controllers.pd:PD",
-        "source_pid": "teleop_core.controllers.source_pid:SOURCE_PID",
+        "pid": f"{_PLACE}.pid:PID",
+        "pd": f"{_PLACE}.pd:PD",
+        "source_pid": f"{_PLACE}.source_pid:SOURCE_PID",
+        "friction_compensation": f"{_PLACE}.friction_compensation:FRICTION_COMPENSATION",
+        "computed_torque": f"{_PLACE}.computed_torque:COMPUTED_TORQUE",
+        "adaptive": f"{_PLACE}.adaptive:ADAPTIVE",
+        "disturbance_observer": f"{_PLACE}.disturbance_observer:DISTURBANCE_OBSERVER",
     },
     _checked,
     _try,

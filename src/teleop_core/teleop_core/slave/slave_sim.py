@@ -26,6 +26,7 @@ from teleop_core.slave.commands import (
 from teleop_core.slave.friction import bristle_damping, wander
 from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way
 from teleop_core.slave.joints import integrate
+from teleop_core.slave.rigid_body import write_model
 from teleop_core.slave.trajectory import shortest_move_time
 from teleop_core.slave.transmission import follow_encoders
 from teleop_core.stage import RunningStage, Stage
@@ -155,7 +156,7 @@ class Arm(NamedTuple):
     effort: Array
     setpoint: Array
     measured: Array
-    feedforward: Array
+    feedforward: Array  # (n,); (2 n + n²,) for laws that take the model
     limit: Array
     joints: Array  # room for joints
     tip: Array  # true joint positions (n,), behind the transmission
@@ -175,11 +176,15 @@ def _measure(p: Any, s: Any, q: Array, dt: float) -> None:
 @inner
 def _control(p: Any, s: Any, arm: Any, dt: float) -> None:
     """Write the effort that the control law asks for."""
+    n = arm.q.shape[0]
     copy(s.setpoint, arm.setpoint)
     copy(s.measured, arm.measured)
-    arm.gravity(arm.measured, arm.model, arm.feedforward)
-    for i in range(arm.q.shape[0]):
+    arm.gravity(arm.measured, arm.model, arm.feedforward[:n])
+    for i in range(n):
         arm.feedforward[i] *= p.compensated[i]
+    if arm.feedforward.shape[0] > n:
+        copy(s.speed, arm.joints)
+        write_model(arm.acceleration, arm.model, arm.measured, arm.joints, arm.feedforward[n:])
     arm.control(
         arm.gains, arm.memory, arm.setpoint, arm.measured, arm.feedforward, arm.limit, dt,
         arm.effort,
@@ -279,7 +284,7 @@ class SlaveSim(RunningStage):
             gains=gains,
             memory=np.zeros((n, max(self._law.memory, 1))),
             q=np.zeros(n), dq=np.zeros(n), effort=np.zeros(n), setpoint=np.zeros(n),
-            measured=np.zeros(n), feedforward=np.zeros(n), limit=np.zeros(n),
+            measured=np.zeros(n), feedforward=np.zeros(self._law.feedforward(n)), limit=np.zeros(n),
             joints=np.zeros(n), tip=np.zeros(n), T=np.zeros((4, 4)),
         )  # fmt: skip
         self.kernel, self.arguments = slave_step, (self.parameters, self.state, self.arm)

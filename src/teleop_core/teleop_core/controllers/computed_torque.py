@@ -1,0 +1,104 @@
+"""Computed torque: the robot's model turns wanted accelerations into efforts, all joints together.
+
+What is wanted is the setpoint's acceleration and, of its error, what makes three equal poles. The
+model takes inertia and coupling from where the arm is, Coriolis and centrifugal effort, and all of
+its gravity, whatever ``gravity_compensation`` says; it knows no dry friction and no weight that
+the drawing lacks, which the integral must hold.
+
+Source:
+    Luh, Walker and Paul 1980; Craig 2005, eqs. 10.15-10.19, with integral action.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.controllers import Controller, per_joint
+from teleop_core.controllers.motion import MEMORY, begin_motion, beyond, fading_of, follow_motion
+from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
+from teleop_core.parameters import parameter
+from teleop_core.robots.robot import Robot
+
+_INTEGRAL, _WANTED = MEMORY, MEMORY + 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComputedTorqueParameters:
+    """Poles; an empty list means: from the robot's drive table."""
+
+    bandwidth: tuple[float, ...] = parameter(
+        (), unit="rad/s", lower=0.1, upper=500.0, doc="triple closed-loop pole of each joint",
+        source="assumed: the drive table's, as of pid",
+    )  # fmt: skip
+    filter_ratio: float = parameter(
+        4.0, lower=1.0, upper=10.0,
+        doc="pole of the filters of motion over that of the loop, where encoder noise allows it",
+        source="assumed: the middle of the rule of two to six",
+    )  # fmt: skip
+    dead_band: float = parameter(
+        1.0, lower=0.0, upper=100.0, doc="encoder counts of error that the integral does not sum",
+        source="derived: from 0.5 on, a setpoint between two counts lets the joint rest",
+    )  # fmt: skip
+
+
+@kernel
+def computed_torque_control(
+    gains: Array,
+    memory: Array,
+    setpoint: Array,
+    measured: Array,
+    feedforward: Array,
+    limit: Array,
+    dt: float,
+    effort: Array,
+) -> None:
+    """Write ``D (a + 3 w (v - v̂) + 3 w² e + w³ ∫e) + viscous v + bias``.
+
+    The integral of a joint is held while its drive is saturated and the error would push further.
+    """
+    n = effort.shape[0]
+    for i in range(n):
+        row, pole = memory[i], gains[i, 0]
+        follow_motion(row, setpoint[i], measured[i], gains[i, 1], dt)
+        error = setpoint[i] - measured[i]
+        wanted = row[5] + 3.0 * pole * (row[4] - row[1]) + 3.0 * pole * pole * error
+        row[_WANTED] = wanted + row[_INTEGRAL]
+        row[6] = wanted
+    for i in range(n):
+        row, pole, error = memory[i], gains[i, 0], setpoint[i] - measured[i]
+        asked = feedforward[n + i] + gains[i, 2] * row[4]
+        for j in range(n):
+            asked += feedforward[2 * n + n * i + j] * memory[j, _WANTED]
+        effort[i] = min(max(asked, -limit[i]), limit[i])
+        if effort[i] == asked or asked * error < 0.0:
+            row[_INTEGRAL] += pole * pole * pole * beyond(error, gains[i, 3]) * dt
+        else:
+            # A saturated joint accelerates by less than was wanted of it.
+            row[6] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
+
+
+def computed_torque_gains(
+    parameters: ComputedTorqueParameters, robot: Robot, viscous: Array
+) -> Array:
+    """Pole, fading, viscous friction and dead band of each joint, (n, 4).
+
+    Raises:
+        ParameterError: The list has another length than the robot has joints.
+    """
+    drives, p = robot.drives, parameters
+    assert drives is not None
+    pole = per_joint(robot, "controller.computed_torque.bandwidth", p.bandwidth, drives.bandwidth)
+    fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
+    return np.stack((pole, fading, viscous, p.dead_band * drives.encoder_step), axis=1)
+
+
+def begin(memory: Array, measured: Array, effort: Array) -> None:
+    """Start at rest; the model holds the arm."""
+    begin_motion(memory, measured)
+
+
+COMPUTED_TORQUE = Controller(
+    "computed_torque", ComputedTorqueParameters, computed_torque_gains, computed_torque_control,
+    MEMORY + 2, begin, uses_model=True,
+)  # fmt: skip

@@ -1,0 +1,129 @@
+"""Disturbance observer: what moves a joint beside its effort is estimated, and cancelled.
+
+The nominal joint is a pure inertia with viscous friction. Whatever else acts on it, dry friction,
+weights that nobody knows, coupling, gravity that is not compensated, is one disturbance; it passes
+a third-order filter Q of the observer's pole before it is taken off the effort. A pair of real
+poles is left for the tracking, with the setpoint's speed and acceleration fed forward.
+
+Source:
+    Ohnishi 1987; Umeno and Hori 1991, eqs. 6-14 (Q-filters of order three); here as an observer
+    with three equal poles, which has the same Q, ``1 / (1 + s / pole)³``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.controllers import Controller, per_joint
+from teleop_core.controllers.motion import (
+    MEMORY,
+    begin_motion,
+    beyond,
+    fading_of,
+    follow_motion,
+    friction_of_setpoint,
+    known_friction,
+)
+from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
+from teleop_core.parameters import parameter
+from teleop_core.robots.robot import Robot
+
+_HELD = MEMORY  # what the arm weighs at the start, beyond what is compensated
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisturbanceObserverParameters:
+    """Poles and what is known of friction; an empty list means: from the robot's drive table."""
+
+    bandwidth: tuple[float, ...] = parameter(
+        (), unit="rad/s", lower=0.1, upper=500.0, doc="double closed-loop pole of each joint",
+        source="assumed: the drive table's, as of pid",
+    )  # fmt: skip
+    observer_ratio: float = parameter(
+        4.0, lower=1.0, upper=10.0,
+        doc="pole of the observer over that of the loop, where encoder noise allows it",
+        source="assumed: the middle of the rule of two to six",
+    )  # fmt: skip
+    friction_share: float = parameter(
+        0.8, lower=0.0, upper=1.5, doc="share of known dry friction that is fed forward",
+        source="assumed: less than all of it, for what is too much pushes the joint ahead",
+    )  # fmt: skip
+    friction_counts: float = parameter(
+        4.0, lower=0.1, upper=1000.0, doc="encoder counts of travel that turn dry friction on",
+        source="assumed: a joint gives by a few encoder counts before it slips",
+    )  # fmt: skip
+    dead_band: float = parameter(
+        1.0, lower=0.0, upper=100.0, doc="encoder counts of error that nothing is done about",
+        source="derived: from 0.5 on, a setpoint between two counts lets the joint rest",
+    )  # fmt: skip
+
+
+@kernel
+def disturbance_observer_control(
+    gains: Array,
+    memory: Array,
+    setpoint: Array,
+    measured: Array,
+    feedforward: Array,
+    limit: Array,
+    dt: float,
+    effort: Array,
+) -> None:
+    """Write ``J (a + 2 w (v - v̂) + w² e - d̂) + viscous v + friction + feedforward``.
+
+    The joint's acceleration that nothing explains is d̂. After an effort at its limit, what is
+    expected of the joint is what the limit left, so the observer does not wind up.
+    """
+    for i in range(effort.shape[0]):
+        inertia, pole, viscous, fading = gains[i, 0], gains[i, 1], gains[i, 2], gains[i, 3]
+        row = memory[i]
+        follow_motion(row, setpoint[i], measured[i], fading, dt)
+        friction = friction_of_setpoint(row, setpoint[i], gains[i, 4], gains[i, 5])
+        error = beyond(setpoint[i] - measured[i], gains[i, 6])
+        wanted = row[5] + 2.0 * pole * (row[4] - row[1]) + pole * pole * error - row[2]
+        known = feedforward[i] + friction + row[_HELD]
+        effort[i] = min(max(inertia * wanted + viscous * row[4] + known, -limit[i]), limit[i])
+        row[6] = (effort[i] - known - viscous * row[1]) / inertia
+
+
+def disturbance_observer_gains(
+    parameters: DisturbanceObserverParameters, robot: Robot, viscous: Array
+) -> Array:
+    """Inertia, pole, viscous friction, fading, dry friction, its travel, dead band, (n, 7).
+
+    Raises:
+        ParameterError: The list has another length than the robot has joints.
+    """
+    drives, p = robot.drives, parameters
+    assert drives is not None
+    pole = per_joint(
+        robot, "controller.disturbance_observer.bandwidth", p.bandwidth, drives.bandwidth
+    )
+    fading = fading_of(
+        robot, pole, p.observer_ratio, stiffness=1.0, damping=2.0, rejection=1.0
+    )  # fmt: skip
+    friction = p.friction_share * known_friction(robot)
+    count = drives.encoder_step
+    columns = (
+        drives.inertia, pole, viscous, fading, friction, p.friction_counts * count,
+        p.dead_band * count,
+    )  # fmt: skip
+    return np.stack(columns, axis=1)
+
+
+def begin(memory: Array, measured: Array, effort: Array) -> None:
+    """Start at rest, holding what the arm weighs there."""
+    begin_motion(memory, measured)
+    memory[:, _HELD] = effort
+
+
+def shift(memory: Array, effort: Array) -> None:
+    """Hold what the feedforward no longer gives."""
+    memory[:, _HELD] += effort
+
+
+DISTURBANCE_OBSERVER = Controller(
+    "disturbance_observer", DisturbanceObserverParameters, disturbance_observer_gains,
+    disturbance_observer_control, MEMORY + 1, begin, shift,
+)  # fmt: skip

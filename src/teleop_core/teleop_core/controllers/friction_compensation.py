@@ -1,0 +1,131 @@
+"""Friction compensation: the PID with the effort fed forward that the setpoint's motion takes.
+
+Inertia and viscous friction of the setpoint's acceleration and speed, and dry friction in the
+direction of its motion, smooth over a few encoder counts of its travel. What is fed forward comes
+from the setpoint alone, so it closes no loop that could swing; the integral rests while the error
+is within a dead band, so that dry friction and encoder counts together make no limit cycle.
+
+Source:
+    Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, sections 5.2 and 5.3 (compensation by the
+    desired motion; dead band in the integral).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.controllers import Controller, per_joint
+from teleop_core.controllers.motion import (
+    MEMORY,
+    begin_motion,
+    beyond,
+    fading_of,
+    follow_motion,
+    friction_of_setpoint,
+    known_friction,
+)
+from teleop_core.controllers.pid import critically_damped_gains
+from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
+from teleop_core.parameters import parameter
+from teleop_core.robots.robot import Robot
+
+_INTEGRAL = MEMORY
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionCompensationParameters:
+    """Poles and what is known of friction; an empty list means: from the robot's drive table."""
+
+    bandwidth: tuple[float, ...] = parameter(
+        (), unit="rad/s", lower=0.1, upper=500.0, doc="triple closed-loop pole of each joint",
+        source="assumed: the drive table's, as of pid",
+    )  # fmt: skip
+    filter_ratio: float = parameter(
+        4.0, lower=1.0, upper=10.0,
+        doc="pole of the filters of motion over that of the loop, where encoder noise allows it",
+        source="assumed: the middle of the rule of two to six",
+    )  # fmt: skip
+    share: float = parameter(
+        0.8, lower=0.0, upper=1.5, doc="share of known dry friction that is fed forward",
+        source="assumed: less than all of it, for what is too much pushes the joint ahead",
+    )  # fmt: skip
+    counts: float = parameter(
+        4.0, lower=0.1, upper=1000.0, doc="encoder counts of travel that turn dry friction on",
+        source="assumed: a joint gives by a few encoder counts before it slips",
+    )  # fmt: skip
+    dead_band: float = parameter(
+        1.0, lower=0.0, upper=100.0, doc="encoder counts of error that the integral does not sum",
+        source="derived: from 0.5 on, a setpoint between two counts lets the joint rest",
+    )  # fmt: skip
+
+
+@kernel
+def friction_compensation_control(
+    gains: Array,
+    memory: Array,
+    setpoint: Array,
+    measured: Array,
+    feedforward: Array,
+    limit: Array,
+    dt: float,
+    effort: Array,
+) -> None:
+    """Write ``Kp e + Ki ∫e + Kd (v - v̂) + J a + viscous v + friction + feedforward``.
+
+    The integral is held while the drive is saturated and the error would push it further.
+    """
+    for i in range(effort.shape[0]):
+        row, inertia, viscous = memory[i], gains[i, 3], gains[i, 4]
+        follow_motion(row, setpoint[i], measured[i], gains[i, 5], dt)
+        friction = friction_of_setpoint(row, setpoint[i], gains[i, 6], gains[i, 7])
+        error = setpoint[i] - measured[i]
+        free = gains[i, 0] * error + gains[i, 2] * (row[4] - row[1])
+        free += inertia * row[5] + viscous * row[4] + friction + feedforward[i]
+        integral = row[_INTEGRAL] + gains[i, 1] * beyond(error, gains[i, 8]) * dt
+        if abs(free + integral) <= limit[i] or (free + integral) * error < 0.0:
+            row[_INTEGRAL] = integral
+        effort[i] = min(max(free + row[_INTEGRAL], -limit[i]), limit[i])
+        # The load that the integral holds is not what accelerates.
+        known = friction + feedforward[i] + row[_INTEGRAL]
+        row[6] = (effort[i] - known - viscous * row[1]) / inertia
+
+
+def friction_compensation_gains(
+    parameters: FrictionCompensationParameters, robot: Robot, viscous: Array
+) -> Array:
+    """Kp, Ki, Kd, inertia, viscous, fading, dry friction, its travel, dead band, (n, 9).
+
+    Raises:
+        ParameterError: The list has another length than the robot has joints.
+    """
+    drives, p = robot.drives, parameters
+    assert drives is not None
+    pole = per_joint(
+        robot, "controller.friction_compensation.bandwidth", p.bandwidth, drives.bandwidth
+    )
+    kp, ki, kd = critically_damped_gains(drives.inertia, viscous, pole)
+    fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
+    friction, count = p.share * known_friction(robot), drives.encoder_step
+    columns = (
+        kp, ki, kd, drives.inertia, viscous, fading, friction, p.counts * count,
+        p.dead_band * count,
+    )  # fmt: skip
+    return np.stack(columns, axis=1)
+
+
+def begin(memory: Array, measured: Array, effort: Array) -> None:
+    """Start at rest; the integrals hold the arm where it is."""
+    begin_motion(memory, measured)
+    memory[:, _INTEGRAL] = effort
+
+
+def shift(memory: Array, effort: Array) -> None:
+    """Let the integrals take over what the feedforward no longer gives."""
+    memory[:, _INTEGRAL] += effort
+
+
+FRICTION_COMPENSATION = Controller(
+    "friction_compensation", FrictionCompensationParameters, friction_compensation_gains,
+    friction_compensation_control, MEMORY + 1, begin, shift,
+)  # fmt: skip

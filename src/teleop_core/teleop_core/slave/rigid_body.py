@@ -1,0 +1,63 @@
+"""Rigid body: inertia matrix and bias of an arm, from nothing but its forward dynamics."""
+
+from typing import Any
+
+import numpy as np
+
+from teleop_core.geometry import Array
+from teleop_core.kernels import kernel
+
+
+@kernel
+def invert_positive(A: Array) -> None:
+    """Put the inverse of a symmetric positive definite matrix (n, n) in its place.
+
+    Gauss-Jordan elimination; such matrices need no pivoting (Golub and Van Loan 2013, section 4.2).
+    """
+    n = A.shape[0]
+    for k in range(n):
+        pivot = 1.0 / A[k, k]
+        A[k, k] = 1.0
+        for j in range(n):
+            A[k, j] *= pivot
+        for i in range(n):
+            factor = A[i, k]
+            if i != k and factor != 0.0:
+                A[i, k] = 0.0
+                for j in range(n):
+                    A[i, j] -= factor * A[k, j]
+
+
+@kernel
+def write_model(acceleration: Any, model: Array, q: Array, dq: Array, out: Array) -> None:
+    """Write bias and inertia of ``D(q) ddq + bias(q, dq) = effort``, by n + 1 forward dynamics.
+
+    A unit of effort on joint j alone accelerates by column j of the inverse inertia, on top of
+    what the arm does without effort, which is ``-D⁻¹ bias``.
+
+    Args:
+        acceleration: Kernel or pointer ``acceleration(q, dq, effort, parameters, ddq)``.
+        model: Its parameter row.
+        q: Joint positions (n,) [rad or m].
+        dq: Joint speeds (n,) [rad/s or m/s].
+        out: (n + n²,): the bias, Coriolis, centrifugal and gravity effort [N·m or N], and the
+            inertia, row by row [kg·m², kg·m or kg]; written.
+
+    Source:
+        Walker and Orin 1982, method 1, with the solve the other way round.
+    """
+    n = q.shape[0]
+    effort, free, ddq, inertia = np.zeros(n), np.empty(n), np.empty(n), np.empty((n, n))
+    acceleration(q, dq, effort, model, free)
+    for j in range(n):
+        effort[j] = 1.0
+        acceleration(q, dq, effort, model, ddq)
+        effort[j] = 0.0
+        for i in range(n):
+            inertia[i, j] = ddq[i] - free[i]
+    invert_positive(inertia)
+    for i in range(n):
+        out[i] = 0.0
+        for j in range(n):
+            out[i] -= inertia[i, j] * free[j]
+            out[n + n * i + j] = inertia[i, j]
