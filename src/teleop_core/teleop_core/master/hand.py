@@ -10,7 +10,7 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import inner
 from teleop_core.parameters import parameter
 
-_STEPS = 4
+_STEPS = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,9 +67,11 @@ def move_hand(p: Any, s: Any, wanted: Array, force: Array, dt: float) -> None:
         Kikuuwe, Takesue, Sano, Mochiyama and Fujimoto 2006 for Coulomb friction, a set of forces,
         by the implicit Euler step; Moreau 1988 for the scheme.
     """
-    h = dt / _STEPS
+    h, aim_speed = dt / _STEPS, np.empty(3)
+    for i in range(3):
+        aim_speed[i] = (wanted[i] - s.wanted[i]) / dt
     for step in range(_STEPS):
-        _push_on(p, s, wanted, force, h, (step + 1) / _STEPS, dt)
+        _push_on(p, s, aim_speed, force, h, h * (step + 1))
     for i in range(3):
         s.wanted[i] = wanted[i]
         low, high = p.center[i] - p.half[i], p.center[i] + p.half[i]
@@ -81,29 +83,46 @@ def move_hand(p: Any, s: Any, wanted: Array, force: Array, dt: float) -> None:
 
 
 @inner
-def _push_on(
-    p: Any, s: Any, wanted: Array, force: Array, h: float, share: float, dt: float
-) -> None:
-    """Make one step of ``h`` [s], at whose end the hand aims at a share of its way in the tick."""
-    free, inertia, pulled = np.empty(3), np.empty(3), np.empty(3)
+def _push_on(p: Any, s: Any, aim_speed: Array, force: Array, h: float, time: float) -> None:
+    """Make one step of ``h`` [s] that ends ``time`` [s] after the tick's begin."""
+    free, pulled = np.empty(3), np.empty(3)
     square = 0.0
     for i in range(3):
-        aim_speed = (wanted[i] - s.wanted[i]) / dt
-        pull = p.stiffness * (s.wanted[i] + share * dt * aim_speed - s.hand[i])
-        pull += p.damping * aim_speed
-        # Momenta of hand and device without friction, and the matrix of the implicit step.
+        pull = p.stiffness * (s.wanted[i] + time * aim_speed[i] - s.hand[i])
+        # Momenta of hand and device without friction and without what joins them.
         bent = h * p.device_stiffness[i] * (s.hand[i] - s.position[i])
-        joined = h * (p.device_damping + h * p.device_stiffness[i])
-        own = p.mass + h * p.damping + joined
-        pulled[i] = p.mass * s.hand_speed[i] + h * pull - bent
-        inertia[i] = p.device_mass + joined - joined * joined / own
-        free[i] = p.device_mass * s.speed[i] + h * force[i] + bent + joined * pulled[i] / own
+        pulled[i] = p.mass * s.hand_speed[i] + h * (pull + p.damping * aim_speed[i]) - bent
+        free[i] = p.device_mass * s.speed[i] + h * force[i] + bent + p.joined_share[i] * pulled[i]
         square += free[i] * free[i]
     rubbed = h * p.friction  # most momentum that friction takes
     left = 1.0 - rubbed / math.sqrt(square) if square > rubbed * rubbed else 0.0
     for i in range(3):
-        joined = h * (p.device_damping + h * p.device_stiffness[i])
-        s.speed[i] = left * free[i] / inertia[i]
-        s.hand_speed[i] = (pulled[i] + joined * s.speed[i]) / (p.mass + h * p.damping + joined)
+        s.speed[i] = left * free[i] * p.lightness[i]
+        s.hand_speed[i] = pulled[i] * p.hand_lightness[i] + p.joined_share[i] * s.speed[i]
         s.position[i] += h * s.speed[i]
         s.hand[i] += h * s.hand_speed[i]
+
+
+def join(p: Any, dt: float) -> None:
+    """Write what the implicit step needs of the matrix that joins hand and device.
+
+    Args:
+        p: Parameter record with masses, dampings and stiffnesses; ``joined_share``, what the hand's
+            momentum gives the device's, and ``lightness`` and ``hand_lightness`` [1/kg] of device
+            and hand are written, (3,) each.
+        dt: Tick [s].
+    """
+    h = dt / _STEPS
+    joined = h * (p["device_damping"] + h * p["device_stiffness"])
+    own = p["mass"] + h * p["damping"] + joined
+    p["joined_share"], p["hand_lightness"] = joined / own, 1.0 / own
+    p["lightness"] = 1.0 / (p["device_mass"] + joined - joined * joined / own)
+
+
+HAND_PARAMETERS = [
+    *((name, "f8") for name in ("mass", "stiffness", "damping", "friction", "device_mass",
+      "device_damping")),
+    *((name, "f8", (3,)) for name in ("device_stiffness", "joined_share", "lightness",
+      "hand_lightness")),
+]  # fmt: skip
+"""Fields of the parameter record that :func:`move_hand` and :func:`join` use."""

@@ -25,7 +25,7 @@ from teleop_core.master.device import (
     read_handle,
     read_phantom,
 )
-from teleop_core.master.hand import HandParameters, move_hand, tremble
+from teleop_core.master.hand import HAND_PARAMETERS, HandParameters, join, move_hand, tremble
 from teleop_core.master.rendering import RENDERING_PARAMETERS, RENDERING_STATE, render
 from teleop_core.operators import OPERATORS, Setting
 from teleop_core.operators.parameters import OperatorParameters
@@ -94,10 +94,9 @@ class HapticMasterParameters:
 
 
 _PARAMETERS = [
-    *((name, "f8") for name in ("resolution", "gimbal", "mass", "friction", "stiffness", "damping",
-      "tremor", "frequency", "device_mass", "device_damping")),
-    ("device_stiffness", "f8", (3,)), ("center", "f8", (3,)), ("half", "f8", (3,)),
-    ("patience_ns", "i8"), *RENDERING_PARAMETERS,
+    *((name, "f8") for name in ("resolution", "gimbal", "tremor", "frequency")),
+    ("center", "f8", (3,)), ("half", "f8", (3,)), ("patience_ns", "i8"),
+    *HAND_PARAMETERS, *RENDERING_PARAMETERS,
 ]  # fmt: skip
 _STATE = [
     *((name, "f8", (3,)) for name in ("position", "speed", "hand", "hand_speed", "wanted",
@@ -237,6 +236,7 @@ class HapticMaster(RunningStage):
         p["device_damping"] = device.structure_damping
         p["mass"], p["device_mass"] = hand.mass, device.apparent_mass
         p["stiffness"], p["damping"] = hand.stiffness, hand.damping
+        join(p, self.dt)
         operator = OPERATORS.find(self._fixed.operator.kind.kind)
         p["tremor"] = 0.0 if operator.trembles else hand.tremor_amplitude
         p["frequency"] = hand.tremor_frequency
