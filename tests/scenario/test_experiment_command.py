@@ -4,6 +4,8 @@ import json
 import math
 import re
 import shutil
+import subprocess
+import sys
 
 import pytest
 
@@ -78,6 +80,16 @@ def test_file_that_exists_is_kept_until_the_new_one_is_whole(teleop, tmp_path):
     teleop("experiment", "resolution", "--json", file)
     assert json.loads(file.read_text())["experiments"]
     assert [path.name for path in tmp_path.iterdir()] == ["found.json"]
+
+
+def test_files_are_written_although_nobody_reads_the_tables_to_their_end(tmp_path):
+    file = tmp_path / "found.json"
+    command = [sys.executable, "-m", "teleop_core.cli", "experiment", "poses", "--json", str(file)]
+    reader = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert reader.stdout is not None
+    reader.stdout.close()
+    reader.communicate(timeout=120)
+    assert json.loads(file.read_text(encoding="utf-8"))["experiments"]
 
 
 @pytest.fixture(scope="module")

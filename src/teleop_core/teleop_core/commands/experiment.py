@@ -51,8 +51,10 @@ def _run(arguments: argparse.Namespace) -> int:
         check_place(file)
     is_all = not arguments.names or ALL in arguments.names
     outcomes = _outcomes(() if is_all else tuple(arguments.names), arguments.seed)
+    # Files come first: who reads the tables may have seen enough before their end.
+    written = _write(outcomes, arguments.json, arguments.html)
     _show(outcomes)
-    _write(outcomes, arguments.json, arguments.html)
+    print("".join(f"{line}\n" for line in written), end="")
     return 0
 
 
@@ -79,18 +81,21 @@ def _show(outcomes: "list[Outcome]") -> None:
     print(summary(outcomes))
 
 
-def _write(outcomes: "list[Outcome]", json_file: Path | None, html_file: Path | None) -> None:
+def _write(outcomes: "list[Outcome]", json_file: Path | None, html_file: Path | None) -> list[str]:
+    """Write what is wanted; returns a line for each file."""
     from teleop_core import __version__
     from teleop_core.evaluation.command import write_whole
 
+    written = []
     if json_file is not None:
         found = [outcome.to_json() for outcome in outcomes]
         whole = {"version": __version__, "experiments": found}
         text = json.dumps(whole, indent=2, allow_nan=False, ensure_ascii=False)
         write_whole(json_file, text + "\n")
-        print(f"numbers: {json_file}")
+        written.append(f"numbers: {json_file}")
     if html_file is not None:
         from teleop_core.experiments.page import experiments_page
 
         write_whole(html_file, experiments_page(outcomes))
-        print(f"page: {html_file}")
+        written.append(f"page: {html_file}")
+    return written
