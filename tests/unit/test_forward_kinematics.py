@@ -8,6 +8,7 @@ import pytest
 from teleop_core.errors import ClosureError, ParameterError, ShapeError
 from teleop_core.geometry import rotation, transform
 from teleop_core.robots import FkStatus, list_robots, load_robot
+from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.robots.rps3 import assembly_modes
 from teleop_core.robots.stewart import PAIRED
 
@@ -308,3 +309,16 @@ def test_bad_questions_are_refused_by_name():
         robot.fk([robot.home, [0.1, 0.1, 5.0]])
     with pytest.raises(ClosureError):
         robot.jacobian([0.1, 0.1, 5.0])
+
+
+def test_a_workspace_is_made_of_joints_that_close_and_of_all_where_there_are_no_loops():
+    for name, low, high in (
+        ("rcrt1", 300, 300),
+        ("rps3", 100, 200),
+        ("three_finger_hand", 300, 300),
+    ):
+        points, values = sample_workspace(load_robot(name), 300, np.random.default_rng(13))
+        assert low <= len(points) == len(values) <= high
+        assert np.isfinite(points).all()
+    # The platform is above its base, as next to home.
+    assert sample_workspace(load_robot("rps3"), 300, np.random.default_rng(13))[0][:, 2].min() > 0.3

@@ -311,6 +311,8 @@ def _workspace(arguments: argparse.Namespace) -> int:
     robot = load_robot_set(arguments.name, arguments.geometry)
     rng = np.random.default_rng(arguments.seed)
     points, values = sample_workspace(robot, arguments.samples, rng)
+    if len(points) < arguments.samples:
+        print(f"{len(points)} of {arguments.samples} joint vectors close the robot's loops")
     low, high = points.min(axis=0), points.max(axis=0)
     for axis, begin, end in zip("xyz", low, high, strict=True):
         print(f"{axis}: {begin:8.4f} … {end:8.4f} m")
