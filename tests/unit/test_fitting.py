@@ -1,0 +1,164 @@
+"""Fit: the plant's numbers come back from made-up rests, and from the published ones; mistakes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from teleop_core.cli import main
+from teleop_core.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.fitting.fit import FitError, default_free, fit
+from teleop_core.fitting.rests import rest_positions
+from teleop_core.fitting.table import PUBLISHED, RestTable, read_rests
+from teleop_core.parameters import build
+from teleop_core.plants.hardware import faults_of
+from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
+from teleop_core.slave.slave_sim import SlaveSimParameters
+
+ARM = load_robot("rcrt1")
+NAMES = ARM.joint_names
+
+
+def slave(**settings):
+    given = {"plant.kind": "hardware", "controller.kind": "source_pid"}
+    return build(SlaveSimParameters, given | settings)
+
+
+@pytest.fixture(scope="module")
+def published():
+    return read_rests(PUBLISHED, ARM)
+
+
+@pytest.fixture(scope="module")
+def found(published):
+    return fit(published, slave())
+
+
+def test_the_plant_has_the_numbers_that_its_fit_finds(found):
+    faults = faults_of(ARM)
+    for number in found.numbers:
+        kind, _, of = number.name.partition(".")
+        if kind == "weight":
+            value = faults.dynamics[ARM.dynamics.unknown[of]]
+        else:
+            value = getattr(faults, kind)[NAMES.index(of)]
+        assert abs(value / number.value - 1.0) < 0.02, number
+        assert number.low < number.value < number.high
+
+
+def test_fitted_rests_are_the_measured_ones_but_for_point_1(found):
+    off = (found.predicted - found.measured)[1:, [0, 1, 3]] / ARM.drives.encoder_step[[0, 1, 3]]
+    assert np.sqrt(np.mean(off**2)) < 6.0
+    assert abs(found.predicted[0, 1] - found.measured[0, 1]) / ARM.drives.encoder_step[1] > 50
+
+
+def test_fitted_spread_of_the_runs_is_the_measured_one(found):
+    ratio = (found.predicted_spread / found.measured_spread)[[0, 1, 3, 4, 5]]
+    assert ((ratio > 0.7) & (ratio < 1.3)).all()
+
+
+def test_numbers_that_made_rests_come_back_from_them(published):
+    inside = np.clip(published.targets, ARM.lower, ARM.upper)
+    truth = {"coulomb": (0.15, 0.4, 1.0, 0.01, 0.0012, 0.0009), "bias": (-0.05,) + (0.0,) * 5,
+             "weights": ("m2b_L0b=0.02",), "wander": (0.2,) * 6}  # fmt: skip
+    made = slave(seed=7, **{f"plant.hardware.{k}": v for k, v in truth.items()})
+    rests = rest_positions(made, inside, 8)
+    free = ["coulomb.theta1", "coulomb.theta2", "bias.theta1", "weight.m2b_L0b"]
+    again = fit(RestTable("made up", inside, tuple(rests)), slave(), free)
+    assert abs(again.value("coulomb.theta1") / 0.15 - 1.0) < 0.15
+    assert abs(again.value("coulomb.theta2") / 0.4 - 1.0) < 0.15
+    assert abs(again.value("bias.theta1") + 0.05) < 0.02
+    assert abs(again.value("weight.m2b_L0b") - 0.02) < 0.004
+    for name in ("theta1", "theta2"):
+        assert abs(again.value(f"wander.{name}") - 0.2) < 0.08
+
+
+def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published):
+    free = default_free(ARM, published)
+    assert "coulomb.d3" not in free
+    assert "bias.theta1" in free  # approached from both sides
+    assert "bias.theta4" not in free  # from one
+    assert "weight.m2b_L0b" in free
+
+
+@pytest.mark.parametrize(
+    ("free", "named"),
+    [
+        (["coulomb.theta4", "bias.theta4"], ["coulomb.theta4", "bias.theta4"]),
+        (["coulomb.theta1", "coulomb.d3"], ["coulomb.d3"]),
+        (["coulomb.theta2", "bias.theta2", "weight.m2b_L0b"], ["bias.theta2", "weight.m2b_L0b"]),
+    ],
+)
+def test_parameters_that_cannot_be_told_apart_are_named(published, free, named):
+    with pytest.raises(FitError, match="not identifiable") as caught:
+        fit(published, slave(), free)
+    for name in named:
+        assert name in str(caught.value)
+
+
+@pytest.mark.parametrize("free", [[], ["coulomb.theta1"] * 2])
+def test_nothing_to_fit_is_refused(published, free):
+    with pytest.raises(ParameterError, match="free"):
+        fit(published, slave(), free)
+
+
+def test_an_unknown_parameter_and_another_plant_are_refused(published):
+    with pytest.raises(UnknownNameError, match="coulomb.theta1"):
+        fit(published, slave(), ["coulomb.elbow"])
+    with pytest.raises(ParameterError, match="hardware"):
+        fit(published, slave(**{"plant.kind": "ideal"}))
+
+
+def changed(tmp_path, change):
+    table = pd.read_csv(PUBLISHED)
+    file = tmp_path / "rests.csv"
+    change(table).to_csv(file, index=False)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("change", "needed"),
+    [
+        (lambda t: t.drop(columns=["theta2", "target_d3"]), "lacks target_d3, theta2"),
+        (lambda t: t.replace({"theta1": {0.78529: np.nan}}), "line 2"),
+        (lambda t: t.assign(theta1="far"), "number"),
+        (lambda t: t[t["run"] == 1], "1 run"),
+        (lambda t: t.assign(target_d3=t["target_d3"] + 1e-3 * t["run"]), "several targets"),
+        (lambda t: t[:0], "no rows"),
+    ],
+)
+def test_a_table_of_another_shape_is_refused_in_one_line(tmp_path, capsys, change, needed):
+    file = changed(tmp_path, change)
+    with pytest.raises(TeleopError, match=needed):
+        read_rests(file, ARM)
+    assert main(["fit", str(file), "--out", str(tmp_path / "out.yaml")]) == 2
+    shown = capsys.readouterr()
+    assert needed in shown.err
+    assert len(shown.err.strip().splitlines()) == 1
+    assert not (tmp_path / "out.yaml").exists()
+
+
+def test_a_missing_table_and_folder_are_told(tmp_path, capsys):
+    assert main(["fit", str(tmp_path / "none.csv")]) == 2
+    assert "none.csv" in capsys.readouterr().err
+    assert main(["fit", "--json", str(tmp_path / "no" / "fit.json")]) == 2
+    assert "make it first" in capsys.readouterr().err
+
+
+def test_command_writes_a_plant_that_a_session_takes(tmp_path, capsys):
+    out, numbers = tmp_path / "plant.yaml", tmp_path / "fit.json"
+    names = ["coulomb.theta1", "bias.theta1"]
+    assert main(["fit", "--free", *names, "--out", str(out), "--json", str(numbers)]) == 0
+    assert "coulomb.theta1" in capsys.readouterr().out
+    told = {entry["name"]: entry["value"] for entry in json.loads(numbers.read_text())["numbers"]}
+    assert set(told) == {*names, "wander.theta1"}
+    values = yaml.safe_load(out.read_text())["slave_sim"]["ros__parameters"]
+    assert values["plant.hardware.coulomb"][0] == pytest.approx(told["coulomb.theta1"], rel=1e-3)
+    # What was not fitted is the robot's own.
+    assert values["plant.hardware.coulomb"][1] == faults_of(ARM).coulomb[1]
+    group = configure(None, [Path(out)]).group("slave_sim")
+    assert group.plant.kind.kind == "hardware"
