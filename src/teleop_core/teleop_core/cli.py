@@ -312,7 +312,7 @@ def _workspace(arguments: argparse.Namespace) -> int:
     rng = np.random.default_rng(arguments.seed)
     points, values = sample_workspace(robot, arguments.samples, rng)
     if len(points) < arguments.samples:
-        print(f"{len(points)} of {arguments.samples} joint vectors close the robot's loops")
+        print(f"{len(points)} of {arguments.samples} joint vectors assemble as at home")
     low, high = points.min(axis=0), points.max(axis=0)
     for axis, begin, end in zip("xyz", low, high, strict=True):
         print(f"{axis}: {begin:8.4f} … {end:8.4f} m")

@@ -97,9 +97,9 @@ def sample_workspace(
     """Tip positions and manipulability of joint vectors drawn evenly inside the limits.
 
     Even in the joints is not even in space: the density of points says how many postures reach a
-    place. Joints with which a robot's loops do not close next to home are left out; where no draw
-    closes, as with the joints of a hand, which hold an object by no chance, all count with their
-    pose of least error.
+    place. Joints with which a robot's loops do not close in home's assembly are left out; where no
+    draw closes, as with the joints of a hand, which hold an object by no chance, all count with
+    their pose of least error.
 
     Args:
         robot: The arm.
@@ -118,7 +118,7 @@ def sample_workspace(
     _check_length(length)
     joints = rng.uniform(robot.lower, robot.upper, (count, robot.n))
     answer = robot.solve_fk_batch(joints, search=False)
-    is_closed = answer.status < FkStatus.NOT_CLOSED
+    is_closed = answer.status < FkStatus.OTHER_MODE
     kept = is_closed if is_closed.any() else np.ones(count, dtype=bool)
     points = np.ascontiguousarray(answer.T[kept, :3, 3])
     jacobians = np.stack(
