@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from teleop_core.fitting.table import PUBLISHED as PUBLISHED_RESTS
+from teleop_core.fitting.table import read_rests
 from teleop_core.geometry import roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
@@ -12,28 +14,15 @@ from teleop_core.session.runner import session_ticks, simulate
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.signals import STATE, TICK_NS
 from teleop_core.slave.commands import CommandStatus
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
-from teleop_core.slave.trajectory import cubic_move, shortest_move_time
+from teleop_core.slave.trajectory import shortest_move_time
 from teleop_core.topics import SLAVE_REACH, STREAMS
 
 ARM = load_robot("rcrt1")
-AT_HOME = SlaveSimParameters(start=tuple(ARM.home.tolist()))
 DEGREE, MM = math.pi / 180.0, 1e-3
-QUARTER = math.pi / 4
-# Points of the precision test with the joint values that reproduce its tables (rad, m).
-POINTS = {
-    1: (QUARTER, 1.1994, 0.350, 1.39, 1.39, 1.39),
-    2: (QUARTER, 2 * QUARTER, 0.400, 1.39, 1.39, 1.39),
-    3: (-math.pi / 6, 110 * DEGREE, 0.400, QUARTER, QUARTER, QUARTER),
-    4: (-math.pi / 6, 130 * DEGREE, 0.350, QUARTER, QUARTER, QUARTER),
-    5: (-QUARTER, 2.5084, 0.375, 1.39, 1.39, 1.39),
-    6: (math.pi / 6, 130 * DEGREE, 0.400, QUARTER, QUARTER, QUARTER),
-}
-# The source's 1.4 rad of joint 5 lies 0.2 degrees past its own limit; 1.39 lies inside.
-PRECISION_MM, REPEATABILITY_MM = 0.514, 0.050
 # Table 8.2: RMS and largest position error [mm]; rotation error below 0.9 degrees.
 PUBLISHED = {"coarse_box": (0.338, 0.702), "fine_box": (0.293, 0.791)}
 BOX_MM = {"coarse_box": 30.0, "fine_box": 3.0}
+IDEAL = ("plant=ideal", "controller=pid")
 
 
 def session(scenario, *settings):
@@ -61,15 +50,48 @@ def rotation_error_degrees(block):
     return np.abs((angles[0] - angles[1] + math.pi) % (2 * math.pi) - math.pi) / DEGREE
 
 
-def test_position_error_is_clearly_below_the_published_one(box):  # case 28
+def rms(values):
+    return math.sqrt(np.mean(np.square(values)))
+
+
+def following(block):
+    """Rows of a session in which the slave follows the hand."""
+    return block[block["command_status"] == CommandStatus.FRESH]
+
+
+def test_position_error_predicts_the_published_one():  # case 28
+    # Of three hands; the plant is fitted to tables 7.1-7.6 alone.
+    found = {}
+    for name, (published, _) in PUBLISHED.items():
+        errors = [position_error_mm(following(session(name, f"seed={k}"))) for k in (1, 2, 3)]
+        found[name] = rms(np.concatenate(errors))
+        assert abs(found[name] / published - 1.0) < 0.15, (name, found[name])
+    assert abs(found["fine_box"] / found["coarse_box"] - 0.87) < 0.12
+
+
+def test_largest_errors_are_of_the_published_size_but_smaller(box):
     name, block = box
-    error, (rms, largest) = position_error_mm(block), PUBLISHED[name]
-    assert math.sqrt(np.mean(error**2)) < 0.25 * rms
-    assert error.max() < 0.25 * largest
+    largest = position_error_mm(following(block)).max()
+    assert 0.5 < largest / PUBLISHED[name][1] < 1.0
 
 
 def test_rotation_error_stays_below_the_published_limit(box):  # case 28
     assert rotation_error_degrees(box[1]).max() < 0.9
+
+
+def test_without_compensation_of_gravity_the_error_is_clearly_worse():
+    with_it, without = (
+        rms(position_error_mm(following(session("coarse_box", "duration=20.0", *more))))
+        for more in ((), ("gravity_compensation=none",))
+    )
+    assert without > 2.0 * with_it
+
+
+def test_an_ideal_arm_is_far_better_than_any_machine(box):
+    # Which is why it is not compared with one.
+    name, block = box
+    ideal = following(session(name, "duration=20.0", *IDEAL))
+    assert rms(position_error_mm(ideal)) < 0.5 * rms(position_error_mm(following(block)))
 
 
 def test_slave_stays_in_the_box_within_a_millimetre(box):  # case 30
@@ -82,7 +104,7 @@ def test_slave_stays_in_the_box_within_a_millimetre(box):  # case 30
     assert np.allclose(size / MM, BOX_MM[name], rtol=0, atol=1e-9)
     outside = np.abs(block["slave_measured_cp"][on, :3] - center) - 0.5 * size
     assert outside.max() < 1.0 * MM
-    # The hand wants to go 2 mm beyond each wall: it was held back, not just slow.
+    # The hand wants to go 5 mm beyond the walls at the sides: it was held back, not just slow.
     wanted_out = np.abs(block["master_servo_cf"][on, :3]).max()
     assert wanted_out > 0.3
 
@@ -128,16 +150,6 @@ def test_without_the_box_the_hand_leaves_it():
     ]
     assert outside[0] < 1.0
     assert outside[1] > 1.5
-
-
-@pytest.mark.parametrize("seed", [2, 3, 4])
-@pytest.mark.parametrize("name", PUBLISHED)
-def test_other_operators_keep_the_published_figures_too(name, seed):
-    block = session(name, f"seed={seed}", "duration=16.0")
-    error, (rms, largest) = position_error_mm(block), PUBLISHED[name]
-    assert math.sqrt(np.mean(error**2)) < rms
-    assert error.max() < largest
-    assert rotation_error_degrees(block).max() < 0.9
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
@@ -189,49 +201,15 @@ def test_toggled_fixture_does_not_disturb_the_motion():  # case 31
 
 
 def test_recorded_session_has_the_ticks_of_its_duration(tmp_path):
-    configuration = configure("fine_box", settings=["duration=2.5"])
+    configuration = configure("mode_switching", settings=["duration=2.5"])
     ticks = simulate(configuration, tmp_path / "session")
     lead = VirtualTime(configuration).lead  # the hand waits until the slave is where it starts
     assert lead > 0
     assert ticks == 2500 + lead
 
 
-def move(slave, now_ns, goal, hold_s):
-    """Drive the slave to a joint vector by the shortest cubic, then hold; returns the time."""
-    start = slave.signals["slave_setpoint_js"].copy()
-    move_time = shortest_move_time(start, goal, 0.9 * ARM.drives.speed_limit)
-    times = np.arange(1, round((move_time + hold_s) * 1e3) + 1) * 1e-3
-    for joints in cubic_move(start, goal, move_time, times)[0]:
-        now_ns += TICK_NS
-        slave.signals["slave_servo_jp"] = joints
-        slave.signals["slave_servo_jp_ns"] = slave.signals["now_ns"] = now_ns
-        slave.step()
-    return now_ns
-
-
-def precision_errors(point, runs=10):
-    """Tip errors [mm] of repeated moves to a point, from starts that the seed scatters."""
-    rng, slave, now_ns = np.random.default_rng(point), SlaveSim(AT_HOME), 0
-    goal, errors = np.array(POINTS[point]), []
-    for _ in range(runs):
-        scatter = 0.02 * ARM.drives.speed_limit * rng.uniform(-1.0, 1.0, 6)
-        near_home = np.clip(ARM.home + scatter, ARM.lower, ARM.upper)
-        now_ns = move(slave, now_ns, near_home, 0.5)
-        now_ns = move(slave, now_ns, goal, 1.0)
-        reached = ARM.fk(slave.signals["slave_measured_js"][:6])
-        errors.append(np.linalg.norm(reached[:3, 3] - ARM.fk(goal)[:3, 3]) / MM)
-    return np.array(errors)
-
-
-@pytest.mark.parametrize("point", POINTS)
-def test_repeated_moves_are_more_precise_and_repeatable_than_published(point):  # case 29
-    errors = precision_errors(point)
-    # What the encoders see: a count on each axis is 0.02 mm at the tip.
-    assert errors.max() < 0.1 * PRECISION_MM
-    assert 2.0 * np.std(errors, ddof=1) < REPEATABILITY_MM
-
-
 def test_published_time_scale_of_the_moves_is_impossible():  # misprint 16
-    for point, goal in POINTS.items():
-        fastest = shortest_move_time(ARM.home, np.array(goal), ARM.drives.speed_limit)
+    targets = read_rests(PUBLISHED_RESTS, ARM).targets
+    for point, goal in enumerate(np.clip(targets, ARM.lower, ARM.upper)):
+        fastest = shortest_move_time(ARM.home, goal, ARM.drives.speed_limit)
         assert 0.5 < fastest < 1.8, point
