@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from teleop_core.evaluation.metrics.contact import TOUCH_J
 from teleop_core.mapping.motion_scaling import MotionScaling
 from teleop_core.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.master.haptic_master import (
@@ -22,7 +23,6 @@ from teleop_core.signals import TICK_NS
 
 HALF = 2e-3  # from the middle of the box to its walls [m]
 RENDERED = DeviceParameters().stiffness  # what the device can render on x, y, z [N/m]
-TOUCH = 1e-6  # what takes less energy is no contact [J]
 SLIVER = 5e-7  # a touch may give so much more than it took [J]: 0.1 N over 5 µm
 
 
@@ -101,8 +101,8 @@ def test_no_contact_with_a_damped_wall_gives_back_more_than_it_took(seed, own_pa
         motion, hand, stiffness = leaning(rng)
         found.append(energies(*session(motion, 3.0, hand, seed=number + 1, stiffness=stiffness)))
     taken, returned, friction = np.concatenate(found).T
-    assert (taken > 20.0 * TOUCH).sum() >= 3
-    is_contact = np.maximum(taken, returned) >= TOUCH
+    assert (taken > TOUCH_J).sum() >= 3
+    is_contact = np.maximum(taken, returned) >= TOUCH_J
     assert (returned <= taken)[is_contact].all()
     assert (returned - taken <= SLIVER).all()
     # With its dry friction the device feeds the hand at no touch either.
@@ -120,7 +120,7 @@ def test_an_undamped_wall_feeds_slow_contacts_of_a_trembling_hand_a_damped_one_n
     fed = {}
     for wall in ("soft", "damped"):
         taken, returned, _ = energies(*session(slow, 10.0, wall=wall)).T
-        is_contact = taken > 20.0 * TOUCH
+        is_contact = taken > TOUCH_J
         assert is_contact.sum() >= 3
         fed[wall] = (returned / taken)[is_contact].max()
     assert fed["soft"] > 1.02

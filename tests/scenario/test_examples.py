@@ -126,6 +126,17 @@ def test_sweep_tells_that_a_stiffer_wall_holds_better(tmp_path):
     assert depths == sorted(depths, reverse=True)
 
 
+def test_walls_hold_the_hand_by_how_far_it_aims_and_damped_ones_do_not_feed_it(tmp_path):
+    lines = [line.split() for line in run("walls", tmp_path).splitlines()[1:]]
+    damped = [[float(text) for text in words[1:]] for words in lines if words[0] == "damped"]
+    hand = [row[1] for row in damped]
+    assert hand == sorted(hand)
+    assert hand[-1] > 2.0
+    assert all(row[5] == row[6] == 0.0 for row in damped)
+    step = next(words for words in lines if words[0] == "step")
+    assert float(step[6]) > 100.0
+
+
 def test_a_hand_that_goes_too_far_is_followed_as_proposed(tmp_path):
     text = run("reach", tmp_path)
     given, proposed = numbers(r"([\d.]+)% followed", text)

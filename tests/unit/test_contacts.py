@@ -145,8 +145,8 @@ def recorded(path, rows):
 
 def test_contacts_are_scored_by_their_last_sample(tmp_path):
     rows = np.array([
-        (0, 0, 0, 0, 3.3), (1, 2e-6, 0, 1e-6, 3.3), (1, 8e-6, 6e-6, 1e-6, 3.1),
-        (2, 1e-5, 1.1e-5, 5e-6, 2.0), (3, 1e-9, 2e-9, 0.0, 3.3), (4, 4e-3, 1e-3, 1e-3, 3.3),
+        (0, 0, 0, 0, 3.3), (1, 2e-5, 0, 1e-6, 3.3), (1, 8e-5, 6e-5, 1e-6, 3.1),
+        (2, 1e-4, 1.1e-4, 5e-6, 2.0), (3, 1e-9, 2e-9, 0.0, 3.3), (4, 4e-3, 1e-3, 1e-3, 3.3),
     ])  # fmt: skip
     score = recorded(tmp_path / "bag", rows)
     found = {key: score.value(f"contact.{key}") for key in (
@@ -155,7 +155,7 @@ def test_contacts_are_scored_by_their_last_sample(tmp_path):
     )}  # fmt: skip
     assert found == {
         "count": 3, "touches": 1, "feeding": 1, "feeding_device": 1,
-        "returned_max": pytest.approx(1.1), "gain_max_uj": pytest.approx(1.0),
+        "returned_max": pytest.approx(1.1), "gain_max_uj": pytest.approx(10.0),
         "taken_max_mj": pytest.approx(4.0), "worst_s": pytest.approx(0.3),
         "largest_force_min_n": 2.0,
     }  # fmt: skip

@@ -107,7 +107,7 @@ def test_nothing_to_fit_is_refused(published, free):
 
 
 def test_an_unknown_parameter_and_another_plant_are_refused(published):
-    with pytest.raises(UnknownNameError, match="coulomb.theta1"):
+    with pytest.raises(UnknownNameError, match=r"coulomb\.theta1"):
         fit(published, slave(), ["coulomb.elbow"])
     with pytest.raises(ParameterError, match="hardware"):
         fit(published, slave(**{"plant.kind": "ideal"}))

@@ -1,4 +1,4 @@
-"""Friction that sticks: it holds for ever, slips by Coulomb's law, takes energy, wanders by seed."""
+"""Friction that sticks: it holds for ever, slips as Coulomb says, takes energy, wanders."""
 
 import math
 
@@ -56,7 +56,7 @@ def test_a_load_below_dry_friction_is_held_for_ever(share):
 
 
 def test_a_load_above_dry_friction_slips_as_coulomb_says():
-    joint = Joint(**{"viscous": (0.0,) * 6})
+    joint = Joint(viscous=(0.0,) * 6)
     joint.step(1.5 * joint.dry, 200)
     before = joint.dq[JOINT]
     joint.step(1.5 * joint.dry, 100)
@@ -103,7 +103,7 @@ def test_motion_is_that_of_an_elastic_and_plastic_bristle(hertz):
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=12))
 def test_friction_gives_back_no_more_than_its_bristle_had_stored(shares):
-    joint = Joint(steps=10, **{"viscous": (0.0,) * 6})
+    joint = Joint(steps=10, viscous=(0.0,) * 6)
     work, last = 0.0, 0.0
     for share in shares:
         for place in joint.step(share * joint.dry, 40):

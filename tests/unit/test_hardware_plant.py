@@ -81,8 +81,8 @@ def test_true_tip_is_that_of_the_arm_as_built_behind_its_play():
     table[5, 2] = 0.037
     table += faults.links.vector.reshape(4, 6).T
     q, T = s["carried"], np.eye(4)
-    for i, (a, alpha, d, theta) in enumerate(table):
-        theta, d = (theta, d + q[i]) if i == 2 else (theta + q[i], d)
+    for i, row in enumerate(table):
+        a, alpha, d, theta = row + q[i] * np.eye(4)[2 if i == 2 else 3]
         ct, st_, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
         T = T @ np.array([[ct, -st_ * ca, st_ * sa, a * ct], [st_, ct * ca, -ct * sa, a * st_],
                           [0.0, sa, ca, d], [0.0, 0.0, 0.0, 1.0]])  # fmt: skip

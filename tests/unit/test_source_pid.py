@@ -52,6 +52,7 @@ def test_closed_loop_poles_are_equal_and_real(joint):
 
 def test_a_constant_error_without_integral_action_gives_a_constant_effort():
     table, memory, effort = gains(ki=(0.0,) * 6), np.zeros((6, 2)), np.zeros(6)
+    off, zero, limit = np.full(6, 0.01), np.zeros(6), np.full(6, np.inf)
     SOURCE_PID.begin(memory, np.zeros(6), np.ones(6))  # what held the arm is let go
     found = []
     for _ in range(50):

@@ -32,9 +32,9 @@ class ComputedTorqueParameters:
         source="assumed: the drive table's, as of pid",
     )  # fmt: skip
     filter_ratio: float = parameter(
-        4.0, lower=1.0, upper=10.0,
+        3.5, lower=1.0, upper=10.0,
         doc="pole of the filters of motion over that of the loop, where encoder noise allows it",
-        source="assumed: the middle of the rule of two to six",
+        source="assumed: the middle, √12, of the rule of two to six",
     )  # fmt: skip
     dead_band: float = parameter(
         1.0, lower=0.0, upper=100.0, doc="encoder counts of error that the integral does not sum",

@@ -41,9 +41,9 @@ class DisturbanceObserverParameters:
         source="assumed: the drive table's, as of pid",
     )  # fmt: skip
     observer_ratio: float = parameter(
-        4.0, lower=1.0, upper=10.0,
+        3.5, lower=1.0, upper=10.0,
         doc="pole of the observer over that of the loop, where encoder noise allows it",
-        source="assumed: the middle of the rule of two to six",
+        source="assumed: the middle, √12, of the rule of two to six",
     )  # fmt: skip
     friction_share: float = parameter(
         0.8, lower=0.0, upper=1.5, doc="share of known dry friction that is fed forward",

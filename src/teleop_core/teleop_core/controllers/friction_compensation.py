@@ -42,9 +42,9 @@ class FrictionCompensationParameters:
         source="assumed: the drive table's, as of pid",
     )  # fmt: skip
     filter_ratio: float = parameter(
-        4.0, lower=1.0, upper=10.0,
+        3.5, lower=1.0, upper=10.0,
         doc="pole of the filters of motion over that of the loop, where encoder noise allows it",
-        source="assumed: the middle of the rule of two to six",
+        source="assumed: the middle, √12, of the rule of two to six",
     )  # fmt: skip
     share: float = parameter(
         0.8, lower=0.0, upper=1.5, doc="share of known dry friction that is fed forward",

@@ -20,7 +20,8 @@ SEEDS = 3
 # What experiments look at; the rest of a recording, most of its memory, is let go.
 _KEPT = (
     "master/measured_cp", "slave/servo_cp", "slave/servo_jp", "slave/setpoint_js",
-    "slave/setpoint_cp", "slave/measured_js", "slave/measured_cp", "teleop/state",
+    "slave/setpoint_cp", "slave/measured_js", "slave/measured_cp", "slave/true_cp",
+    "teleop/state",
 )  # fmt: skip
 
 

@@ -65,6 +65,7 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "responses": f"{_PLACE}.responses:RESPONSES",
         "accuracy": f"{_PLACE}.accuracy:ACCURACY",
         "master_slave": f"{_PLACE}.master_slave:MASTER_SLAVE",
+        "controllers": f"{_PLACE}.controllers:CONTROLLERS",
         "gravity": f"{_PLACE}.gravity:GRAVITY",
         "shares": f"{_PLACE}.shares:SHARES",
         "points24": f"{_PLACE}.points24:POINTS24",

@@ -15,6 +15,7 @@ from teleop_core.experiments.outcome import EXACT, Findings, Row
 from teleop_core.geometry import Array
 from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.operators.tour import TourParameters
+from teleop_core.signals import DT
 
 SCENARIO = "points24"
 INNER_MM = 0.5
@@ -66,7 +67,7 @@ def visits_of(session: Session, p: TourParameters, center: Array, approach_s: fl
     start = session.places_mm("slave/servo_cp")[sent][0]  # the hand waits until the slave follows
     axes = axis_map("axes", MotionScalingParameters.axes)
     targets = start + 1e3 * (center + p.stops) @ axes.T
-    if times[-1] < (needed := p.visit_time + p.trace_time):
+    if times[-1] < (needed := p.visit_time + p.trace_time) - DT:  # the last tick ends there
         text = f"the session ends {needed - times[-1]:.1f} s before its tour of {needed:.1f} s"
         raise TeleopError(f"{SCENARIO}: {text}; give it more time (duration)")
     cycle = p.leg_time + p.rest_time

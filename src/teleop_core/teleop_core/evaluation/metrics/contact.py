@@ -12,9 +12,10 @@ from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array
 from teleop_core.topics import MASTER_CONTACT
 
-TOUCH_J = 1e-6
-"""What takes less energy is a touch [J]: the reading takes one step, and the force, which begins a
-period late and ends a period late, may give back some nanojoules more than it took."""
+TOUCH_J = 14e-6
+"""What takes less energy is a touch [J]: less than dry friction of the device, 0.26 N, takes over
+a step of its reading, 0.055 mm. A force that begins and ends a period late may give back tenths of a
+microjoule more than it took there, whatever the law of the wall."""
 _NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns))
 
 
@@ -23,13 +24,13 @@ class ContactScore:
     """Energy of the contacts of the hand with walls; None where there was none, or none is known.
 
     Attributes:
-        count: Contacts: stretches of time in which the device pushed, and that took 1 µJ or more.
+        count: Contacts: stretches of time in which the device pushed, and that took 14 µJ or more.
         touches: Those that took less.
         returned_max: Largest share of what a contact took that it gave back; above 1 it fed the
             hand.
-        feeding: Contacts that gave back more than they took.
-        feeding_device: Contacts and touches that gave back more than they and the device's dry
-            friction took.
+        feeding: Contacts whose wall gave back more than it took.
+        feeding_device: Contacts that gave back more than wall and dry friction of the device took:
+            only then the hand gets more energy than it spent.
         gain_max_uj: Largest energy that a contact or touch gave beyond what it took; negative where
             each took more, [µJ].
         taken_max_mj: Largest energy that one took, [mJ].
@@ -54,13 +55,13 @@ class ContactMetric(Metric):
     name = "contact"
     keys = (
         Key("contact.count", "1",
-            "stretches in which the device pushed and took 1 µJ or more; null if not recorded"),
+            "stretches in which the device pushed and took 14 µJ or more; null if not recorded"),
         Key("contact.touches", "1", "those that took less"),
         Key("contact.returned_max", "1",
             "largest share of the energy taken that a contact gave back; above 1 it fed the hand"),
-        Key("contact.feeding", "1", "contacts that gave back more than they took"),
+        Key("contact.feeding", "1", "contacts whose wall gave back more than it took"),
         Key("contact.feeding_device", "1",
-            "contacts and touches that gave back more than they and the device's friction took"),
+            "contacts that gave back more than wall and dry friction of the device took"),
         Key("contact.gain_max_uj", "uJ",
             "most that a contact or touch gave beyond what it took; negative: each took more"),
         Key("contact.taken_max_mj", "mJ", "most energy that one took"),
@@ -109,7 +110,7 @@ class ContactMetric(Metric):
             touches=int((~is_contact).sum()),
             returned_max=None if worst is None else float(shares[worst]),
             feeding=int((gain[is_contact] > 0.0).sum()),
-            feeding_device=int((gain > found[:, _FRICTION]).sum()),
+            feeding_device=int((gain > found[:, _FRICTION])[is_contact].sum()),
             gain_max_uj=1e6 * float(gain.max()) if len(found) else None,
             taken_max_mj=1e3 * float(taken.max()) if len(found) else None,
             worst_s=None if worst is None else float(found[worst, -1]),
@@ -126,6 +127,11 @@ class ContactMetric(Metric):
         return [
             Row(GROUP, "contacts, touches", "", f"{score.count}, {score.touches}"),
             Row(GROUP, "energy given back of taken, max", "%", f"{number(share)}{worst}"),
-            Row(GROUP, "contacts that fed the hand", "", str(score.feeding)),
+            Row(
+                GROUP,
+                "contacts that gave more, wall/device",
+                "",
+                f"{score.feeding}/{score.feeding_device}",
+            ),
             row(GROUP, "least force that warmth allowed", "N", score.largest_force_min_n),
         ]
