@@ -56,16 +56,7 @@ def test_a_constant_error_without_integral_action_gives_a_constant_effort():
     SOURCE_PID.begin(memory, np.zeros(6), np.ones(6))  # what held the arm is let go
     found = []
     for _ in range(50):
-        SOURCE_PID.control(
-            table,
-            memory,
-            np.full(6, 0.01),
-            np.zeros(6),
-            np.zeros(6),
-            np.full(6, np.inf),
-            DT,
-            effort,
-        )
+        SOURCE_PID.control(table, memory, off, zero, zero, limit, DT, effort)
         found.append(effort.copy())
     assert np.allclose(found[1:], table[:, 0] * 0.01, rtol=1e-12)
 
