@@ -39,6 +39,7 @@ from teleop_core.topics import (
     SLAVE_TRUE_CP,
 )
 
+_FILTER_SOURCE = "published: Vongbunyong 2008, eq. 6.2.8"
 INTERPOLATIONS = ("none", "linear", "minimum_jerk")
 
 
@@ -47,9 +48,15 @@ class ReferenceFilterParameters:
     """First-order lag on every joint reference; at rest its output is its input."""
 
     is_on: bool = parameter(True, doc="whether references pass the filter")
-    gain: float = parameter(0.1, lower=0.0, upper=1.0, doc="gain for fast motion")
-    zero: float = parameter(100.0, unit="rad/s", lower=0.0, upper=1000.0, doc="zero")
-    pole: float = parameter(10.0, unit="rad/s", lower=0.01, upper=1000.0, doc="pole")
+    gain: float = parameter(
+        0.1, lower=0.0, upper=1.0, doc="gain for fast motion", source=_FILTER_SOURCE
+    )
+    zero: float = parameter(
+        100.0, unit="rad/s", lower=0.0, upper=1000.0, doc="zero", source=_FILTER_SOURCE
+    )
+    pole: float = parameter(
+        10.0, unit="rad/s", lower=0.01, upper=1000.0, doc="pole", source=_FILTER_SOURCE
+    )
 
     def __post_init__(self) -> None:
         if not math.isclose(self.gain * self.zero, self.pole, rel_tol=1e-9):
