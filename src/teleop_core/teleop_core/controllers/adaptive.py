@@ -16,12 +16,15 @@ import numpy as np
 from teleop_core.controllers import Controller, per_joint
 from teleop_core.controllers.motion import (
     MEMORY,
+    approach,
     begin_motion,
     beyond,
+    closeness,
     fading_of,
     follow_motion,
     friction_of_setpoint,
     known_friction,
+    linear_range,
 )
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
@@ -89,15 +92,17 @@ def adaptive_control(
 
     With the error e and its rate: ``v_r = v + w e``, ``a_r = a + w e'``, ``s = e' + w e``; each
     parameter changes by ``rate w² J s`` times what it acts on, over the square of that's scale.
-    Nothing is learned while the drive is saturated.
+    Nothing is learned while the drive is saturated or the setpoint too far for it.
     """
     for i in range(effort.shape[0]):
         inertia, pole, viscous = gains[i, 0], gains[i, 1], gains[i, 2]
         row = memory[i]
         follow_motion(row, setpoint[i], measured[i], gains[i, 3], dt)
         direction = friction_of_setpoint(row, setpoint[i], 1.0, gains[i, 5])
-        error, rate = setpoint[i] - measured[i], row[4] - row[1]
-        speed, acceleration = row[4] + pole * error, row[5] + pole * rate
+        off = setpoint[i] - measured[i]
+        error, share = approach(off, gains[i, 11]), closeness(off, gains[i, 11])
+        rate = share * row[4] - row[1]
+        speed, acceleration = share * row[4] + pole * error, share * row[5] + pole * rate
         slip = rate + pole * error
         friction = (gains[i, 4] + row[_FRICTION]) * direction
         held = friction + row[_LOAD] + feedforward[i]
@@ -105,7 +110,7 @@ def adaptive_control(
         asked = moving + held + 2.0 * pole * inertia * slip
         effort[i] = min(max(asked, -limit[i]), limit[i])
         row[6] = (effort[i] - held - viscous * row[1]) / inertia
-        if effort[i] == asked:
+        if effort[i] == asked and share == 1.0:
             change = gains[i, 7] * beyond(slip, pole * gains[i, 6]) * dt
             row[_INERTIA] = learn(
                 row[_INERTIA], change * acceleration / gains[i, 9] ** 2, gains[i, 10]
@@ -116,10 +121,11 @@ def adaptive_control(
 
 
 def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array) -> Array:
-    """Table (n, 11) of what is known of each joint, and of how it learns.
+    """Table (n, 12) of what is known of each joint, and of how it learns.
 
     Columns: inertia, pole, viscous friction, fading, dry friction, its travel, dead band, rate of
-    load, scales of speed and acceleration (limits of the drive), bound of the inertia.
+    load, scales of speed and acceleration (limits of the drive), bound of the inertia,
+    linear range.
 
     Raises:
         ParameterError: The list has another length than the robot has joints.
@@ -133,6 +139,7 @@ def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array)
         drives.inertia, pole, viscous, fading, friction, p.friction_counts * count,
         p.dead_band * count, p.rate * pole**2 * drives.inertia, drives.speed_limit,
         drives.effort_limit / drives.inertia, p.span * drives.inertia,
+        linear_range(robot, pole, 3.0),
     )  # fmt: skip
     return np.stack(columns, axis=1)
 

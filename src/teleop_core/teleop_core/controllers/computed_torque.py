@@ -14,7 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.controllers import Controller, per_joint
-from teleop_core.controllers.motion import MEMORY, begin_motion, beyond, fading_of, follow_motion
+from teleop_core.controllers.motion import (
+    MEMORY,
+    approach,
+    begin_motion,
+    beyond,
+    closeness,
+    fading_of,
+    follow_motion,
+    linear_range,
+)
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 from teleop_core.parameters import parameter
@@ -55,33 +64,35 @@ def computed_torque_control(
 ) -> None:
     """Write ``D (a + 3 w (v - v̂) + 3 w² e + w³ ∫e) + viscous v + bias``.
 
-    The integral of a joint is held while its drive is saturated and the error would push further.
+    The integral of a joint is held while its setpoint is too far for the drive, or the drive is
+    saturated and the error would push it further.
     """
     n = effort.shape[0]
     for i in range(n):
         row, pole = memory[i], gains[i, 0]
         follow_motion(row, setpoint[i], measured[i], gains[i, 1], dt)
-        error = setpoint[i] - measured[i]
-        wanted = row[5] + 3.0 * pole * (row[4] - row[1]) + 3.0 * pole * pole * error
+        off = setpoint[i] - measured[i]
+        error, share = approach(off, gains[i, 4]), closeness(off, gains[i, 4])
+        wanted = 3.0 * pole * (share * row[4] - row[1] + pole * error) + share * row[5]
         row[_WANTED] = wanted + row[_INTEGRAL]
         row[6] = wanted
     for i in range(n):
         row, pole, error = memory[i], gains[i, 0], setpoint[i] - measured[i]
-        asked = feedforward[n + i] + gains[i, 2] * row[4]
+        share = closeness(error, gains[i, 4])
+        asked = feedforward[n + i] + gains[i, 2] * share * row[4]
         for j in range(n):
             asked += feedforward[2 * n + n * i + j] * memory[j, _WANTED]
         effort[i] = min(max(asked, -limit[i]), limit[i])
-        if effort[i] == asked or asked * error < 0.0:
+        if share == 1.0 and (effort[i] == asked or asked * error < 0.0):
             row[_INTEGRAL] += pole * pole * pole * beyond(error, gains[i, 3]) * dt
-        else:
-            # A saturated joint accelerates by less than was wanted of it.
-            row[6] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
+        # A saturated joint accelerates by less than was wanted of it.
+        row[6] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
 
 
 def computed_torque_gains(
     parameters: ComputedTorqueParameters, robot: Robot, viscous: Array
 ) -> Array:
-    """Pole, fading, viscous friction and dead band of each joint, (n, 4).
+    """Pole, fading, viscous friction, dead band and linear range of each joint, (n, 5).
 
     Raises:
         ParameterError: The list has another length than the robot has joints.
@@ -90,7 +101,8 @@ def computed_torque_gains(
     assert drives is not None
     pole = per_joint(robot, "controller.computed_torque.bandwidth", p.bandwidth, drives.bandwidth)
     fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
-    return np.stack((pole, fading, viscous, p.dead_band * drives.encoder_step), axis=1)
+    linear = linear_range(robot, pole, 3.0)
+    return np.stack((pole, fading, viscous, p.dead_band * drives.encoder_step, linear), axis=1)
 
 
 def begin(memory: Array, measured: Array, effort: Array) -> None:

@@ -17,12 +17,15 @@ import numpy as np
 from teleop_core.controllers import Controller, per_joint
 from teleop_core.controllers.motion import (
     MEMORY,
+    approach,
     begin_motion,
     beyond,
+    closeness,
     fading_of,
     follow_motion,
     friction_of_setpoint,
     known_friction,
+    linear_range,
 )
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
@@ -80,17 +83,21 @@ def disturbance_observer_control(
         row = memory[i]
         follow_motion(row, setpoint[i], measured[i], fading, dt)
         friction = friction_of_setpoint(row, setpoint[i], gains[i, 4], gains[i, 5])
-        error = beyond(setpoint[i] - measured[i], gains[i, 6])
-        wanted = row[5] + 2.0 * pole * (row[4] - row[1]) + pole * pole * error - row[2]
+        off = beyond(setpoint[i] - measured[i], gains[i, 6])
+        error, share = approach(off, gains[i, 7]), closeness(off, gains[i, 7])
+        speed = share * row[4]
+        wanted = share * row[5] + 2.0 * pole * (speed - row[1]) + pole * pole * error - row[2]
         known = feedforward[i] + friction + row[_HELD]
-        effort[i] = min(max(inertia * wanted + viscous * row[4] + known, -limit[i]), limit[i])
+        effort[i] = min(max(inertia * wanted + viscous * speed + known, -limit[i]), limit[i])
         row[6] = (effort[i] - known - viscous * row[1]) / inertia
 
 
 def disturbance_observer_gains(
     parameters: DisturbanceObserverParameters, robot: Robot, viscous: Array
 ) -> Array:
-    """Inertia, pole, viscous friction, fading, dry friction, its travel, dead band, (n, 7).
+    """Inertia, pole, viscous friction, fading, dry friction, its travel, dead band, linear range.
+
+    The table is (n, 8).
 
     Raises:
         ParameterError: The list has another length than the robot has joints.
@@ -107,7 +114,7 @@ def disturbance_observer_gains(
     count = drives.encoder_step
     columns = (
         drives.inertia, pole, viscous, fading, friction, p.friction_counts * count,
-        p.dead_band * count,
+        p.dead_band * count, linear_range(robot, pole, 1.0),
     )  # fmt: skip
     return np.stack(columns, axis=1)
 

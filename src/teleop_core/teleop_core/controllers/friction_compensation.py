@@ -17,12 +17,15 @@ import numpy as np
 from teleop_core.controllers import Controller, per_joint
 from teleop_core.controllers.motion import (
     MEMORY,
+    approach,
     begin_motion,
     beyond,
+    closeness,
     fading_of,
     follow_motion,
     friction_of_setpoint,
     known_friction,
+    linear_range,
 )
 from teleop_core.controllers.pid import critically_damped_gains
 from teleop_core.geometry import Array
@@ -73,17 +76,21 @@ def friction_compensation_control(
 ) -> None:
     """Write ``Kp e + Ki ∫e + Kd (v - v̂) + J a + viscous v + friction + feedforward``.
 
-    The integral is held while the drive is saturated and the error would push it further.
+    The integral is held while the setpoint is too far for the drive, or the drive is saturated and
+    the error would push it further.
     """
     for i in range(effort.shape[0]):
         row, inertia, viscous = memory[i], gains[i, 3], gains[i, 4]
         follow_motion(row, setpoint[i], measured[i], gains[i, 5], dt)
         friction = friction_of_setpoint(row, setpoint[i], gains[i, 6], gains[i, 7])
-        error = setpoint[i] - measured[i]
-        free = gains[i, 0] * error + gains[i, 2] * (row[4] - row[1])
-        free += inertia * row[5] + viscous * row[4] + friction + feedforward[i]
+        off = setpoint[i] - measured[i]
+        error, share = approach(off, gains[i, 9]), closeness(off, gains[i, 9])
+        speed = share * row[4]
+        free = gains[i, 0] * error + gains[i, 2] * (speed - row[1])
+        free += inertia * share * row[5] + viscous * speed + friction + feedforward[i]
         integral = row[_INTEGRAL] + gains[i, 1] * beyond(error, gains[i, 8]) * dt
-        if abs(free + integral) <= limit[i] or (free + integral) * error < 0.0:
+        is_inside = abs(free + integral) <= limit[i] or (free + integral) * error < 0.0
+        if share == 1.0 and is_inside:
             row[_INTEGRAL] = integral
         effort[i] = min(max(free + row[_INTEGRAL], -limit[i]), limit[i])
         # The load that the integral holds is not what accelerates.
@@ -94,7 +101,9 @@ def friction_compensation_control(
 def friction_compensation_gains(
     parameters: FrictionCompensationParameters, robot: Robot, viscous: Array
 ) -> Array:
-    """Kp, Ki, Kd, inertia, viscous, fading, dry friction, its travel, dead band, (n, 9).
+    """Kp, Ki, Kd, inertia, viscous, fading, dry friction, its travel, dead band, range.
+
+    The table is (n, 10).
 
     Raises:
         ParameterError: The list has another length than the robot has joints.
@@ -109,7 +118,7 @@ def friction_compensation_gains(
     friction, count = p.share * known_friction(robot), drives.encoder_step
     columns = (
         kp, ki, kd, drives.inertia, viscous, fading, friction, p.counts * count,
-        p.dead_band * count,
+        p.dead_band * count, linear_range(robot, pole, 3.0),
     )  # fmt: skip
     return np.stack(columns, axis=1)
 

@@ -19,6 +19,8 @@ Source:
     Tracking and Kalman Filtering Made Easy, table 1.3.2 (critically damped g-h-k filter).
 """
 
+import math
+
 import numpy as np
 
 from teleop_core.geometry import Array
@@ -31,6 +33,8 @@ MEMORY = 9
 EFFORT_SHARE = 0.02
 FRICTION_SHARE = 0.5
 """What one encoder count may change of an effort: shares of the drive's limit, of dry friction."""
+APPROACH_SHARE = 0.5
+"""Share of a drive's limit that an error may take before it counts as less, see approach()."""
 _HALVINGS = 50
 
 
@@ -91,6 +95,28 @@ def friction_of_setpoint(memory: Array, setpoint: float, most: float, travel: fl
 
 
 @kernel
+def approach(error: float, linear: float) -> float:
+    """Error to act on: a setpoint too far for the drive counts as nearer, so that it can brake.
+
+    Beyond ``linear`` [rad or m] the error D counts as ``√(linear (2 D - linear))``; the speed of
+    approach then falls with the root of what is left, as that of a constant deceleration does.
+    """
+    gap = abs(error)
+    if gap <= linear:
+        return error
+    return math.copysign(math.sqrt(linear * (2.0 * gap - linear)), error)
+
+
+@kernel
+def closeness(error: float, linear: float) -> float:
+    """Share of the setpoint's motion to feed forward: 1 where :func:`approach` acts on the error.
+
+    It falls to 0 at twice that distance: who is far behind follows no motion, but catches up.
+    """
+    return min(max(2.0 - abs(error) / linear, 0.0), 1.0)
+
+
+@kernel
 def beyond(value: float, room: float) -> float:
     """What a value has beyond ±room; 0 inside."""
     return value - min(max(value, -room), room)
@@ -99,6 +125,14 @@ def beyond(value: float, room: float) -> float:
 def begin_motion(memory: Array, measured: Array) -> None:
     """Let the estimates of all joints (n, m) begin at rest at ``measured`` (n,)."""
     memory[:, 0] = memory[:, 3] = memory[:, 7] = measured
+
+
+def linear_range(robot: Robot, pole: Array, stiffness: float) -> Array:
+    """Largest error (n,) that :func:`approach` leaves as it is; ``stiffness`` as in fading_of()."""
+    drives = robot.drives
+    assert drives is not None
+    share = APPROACH_SHARE * drives.effort_limit
+    return np.asarray(share / (stiffness * pole**2 * drives.inertia), dtype=np.float64)
 
 
 def known_friction(robot: Robot) -> Array:

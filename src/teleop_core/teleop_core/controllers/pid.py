@@ -1,11 +1,11 @@
 """PID: one joint's controller in parallel form, with a clean derivative and no windup."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from teleop_core.controllers import Controller, per_joint
+from teleop_core.controllers.motion import approach
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 from teleop_core.parameters import parameter
@@ -118,8 +118,8 @@ def weighted_setpoint(
     effort at every tick as ``Kp (b r - y) + Ki ∫(r - y)``, but leaves the integral what holds the
     load alone, instead of ``Kp (1 - b) r`` besides.
 
-    A setpoint too far for the drive, at a distance D beyond ``d = room / (b Kp)``, counts as one
-    at ``√(d (2 D - d))``: the arm comes no faster than it can brake.
+    A setpoint farther than ``room / (b Kp)`` counts as nearer, so that the drive can brake: see
+    :func:`teleop_core.controllers.motion.approach`.
 
     Args:
         setpoint: Wanted position [rad or m].
@@ -133,12 +133,9 @@ def weighted_setpoint(
     if weight == 1.0 or pull == 0.0:  # without an integral the lag would stand still
         memory[3] = setpoint
         return setpoint
-    gap = abs(setpoint - measured)
     linear = room / (max(weight, THIRD) * gains[0] + 1e-300)
-    if gap > linear:
-        near = measured + math.copysign(
-            math.sqrt(linear * (2.0 * gap - linear)), setpoint - measured
-        )
+    if abs(setpoint - measured) > linear:
+        near = measured + approach(setpoint - measured, linear)
     memory[3] += (near - memory[3]) * (pull / (gains[0] + pull))
     return weight * near + (1.0 - weight) * memory[3]
 
