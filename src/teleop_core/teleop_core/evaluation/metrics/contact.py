@@ -13,8 +13,8 @@ from teleop_core.geometry import Array
 from teleop_core.topics import MASTER_CONTACT
 
 TOUCH_J = 14e-6
-"""What takes less energy is a touch [J]: less than dry friction of the device, 0.26 N, takes over
-a step of its reading, 0.055 mm. A force that begins and ends a period late may give back tenths of a
+"""What takes less energy is a touch [J]: less than the device's dry friction, 0.26 N, takes over a
+step of its reading, 0.055 mm. A force that begins and ends a period late may give back tenths of a
 microjoule more than it took there, whatever the law of the wall."""
 _NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns))
 
