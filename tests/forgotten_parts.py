@@ -7,9 +7,10 @@ import pytest
 from teleop_core.controllers import CONTROLLERS
 from teleop_core.fixtures import FIXTURES
 from teleop_core.operators import OPERATORS
+from teleop_core.plants import PLANTS
 from teleop_core.stage import STAGES
 
-REGISTRIES = (CONTROLLERS, FIXTURES, OPERATORS, STAGES)
+REGISTRIES = (CONTROLLERS, FIXTURES, OPERATORS, PLANTS, STAGES)
 
 
 @pytest.fixture

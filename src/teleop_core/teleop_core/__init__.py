@@ -1,9 +1,9 @@
 """Master-slave teleoperation: haptic master, motion scaling, inverse kinematics, 1 kHz slave.
 
 Folders follow the data: ``operators`` -> ``master`` -> ``mapping`` and ``fixtures`` -> ``robots``
--> ``slave`` and ``controllers`` -> ``bags`` -> ``evaluation``. ``graph`` says which stages there
-are and how they are linked, ``session`` runs them in virtual time, ``nodes`` puts them on ROS 2
-topics.
+-> ``slave``, ``controllers`` and ``plants`` -> ``bags`` -> ``evaluation``. ``graph`` says which
+stages there are and how they are linked, ``session`` runs them in virtual time, ``nodes`` puts
+them on ROS 2 topics.
 
 Everything a user needs is here:
 
@@ -11,15 +11,16 @@ Everything a user needs is here:
 - :func:`import_recording`, :func:`export_recording`: recordings of others, and ours for others;
 - :func:`configuration`: what a session runs, checked;
 - :func:`load_robot`, :func:`list_robots`, :func:`robot_from_table`: arms;
-- :class:`Stage`, :class:`Fixture`, :class:`Controller`, :class:`Operator`, :class:`Metric` and the
-  ``register_...`` functions: parts of your own;
+- :func:`fit_plant`, ``teleop_core.calibration``, ``teleop_core.experiments``: what a real arm does;
+- :class:`Stage`, :class:`Fixture`, :class:`Controller`, :class:`Plant`, :class:`Operator`,
+  :class:`Metric` and the ``register_...`` functions: parts of your own;
 - :func:`kernel`, :func:`parameter`, ``topics``: what parts are made of.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 if TYPE_CHECKING:
     from teleop_core import topics
@@ -45,12 +46,14 @@ if TYPE_CHECKING:
         export_recording,
         import_recording,
     )
+    from teleop_core.fitting import FitError, FitResult, fit_plant
     from teleop_core.fixtures import Fixture, register_fixture
     from teleop_core.graph import Graph, build_graph
     from teleop_core.kernels import kernel
     from teleop_core.operators import Operator, following, register_operator
     from teleop_core.parameters import NoParameters, parameter
     from teleop_core.planning.reach import Reach, reach
+    from teleop_core.plants import Physics, Plant, register_plant
     from teleop_core.recording import Recording, Stream, open_recording
     from teleop_core.robots import (
         Robot,
@@ -86,12 +89,14 @@ _PLACES = {
         "export_recording",
         "import_recording",
     ),
+    "fitting": ("FitError", "FitResult", "fit_plant"),
     "fixtures": ("Fixture", "register_fixture"),
     "graph": ("Graph", "build_graph"),
     "kernels": ("kernel",),
     "operators": ("Operator", "following", "register_operator"),
     "parameters": ("NoParameters", "parameter"),
     "planning.reach": ("Reach", "reach"),
+    "plants": ("Physics", "Plant", "register_plant"),
     "recording": ("Recording", "Stream", "open_recording"),
     "robots": ("Robot", "list_robots", "load_robot", "register_robot", "robot_from_table"),
     "robots.parameters": ("RobotParameters",),
@@ -105,6 +110,8 @@ __all__ = [
     "Controller",
     "EvaluationError",
     "ExportReport",
+    "FitError",
+    "FitResult",
     "Fixture",
     "Graph",
     "ImportOptions",
@@ -117,6 +124,8 @@ __all__ = [
     "Operator",
     "ParameterError",
     "PartError",
+    "Physics",
+    "Plant",
     "Reach",
     "Recording",
     "RecordingError",
@@ -134,6 +143,7 @@ __all__ = [
     "build_graph",
     "configuration",
     "export_recording",
+    "fit_plant",
     "following",
     "import_recording",
     "kernel",
@@ -146,6 +156,7 @@ __all__ = [
     "register_fixture",
     "register_metric",
     "register_operator",
+    "register_plant",
     "register_robot",
     "register_stage",
     "replay",

@@ -23,6 +23,7 @@ from teleop_core.errors import ParameterError, TeleopError
 from teleop_core.fixtures import FIXTURES, Fixture
 from teleop_core.geometry import Array
 from teleop_core.operators import OPERATORS, Motion, Operator, following
+from teleop_core.plants import PLANTS, Plant
 from teleop_core.recording import Recording, open_recording
 from teleop_core.robots import ROBOTS, Robot
 from teleop_core.robots.dh import DhTable
@@ -76,6 +77,7 @@ def configuration(
     operator: OperatorLike | None = None,
     fixture: str | Fixture | None = None,
     controller: str | Controller | None = None,
+    plant: str | Plant | None = None,
     robot: str | Robot | DhTable | None = None,
     stages: str | Stage | Sequence[str | Stage] = (),
     arms: Sequence[str] = (),
@@ -93,6 +95,7 @@ def configuration(
         operator: Who moves the hand; see :data:`OperatorLike`.
         fixture: Shape around the hand: a name, or a part of your own.
         controller: Control law of the slave's joints: a name, or a part of your own.
+        plant: What the slave simulator moves: a name, or a part of your own.
         robot: The slave: a name, a table's file, or a robot of your own.
         stages: Further stages of every arm, one or several: names, or stages of your own.
         arms: Names of the arms, the first of which is the default one.
@@ -108,6 +111,7 @@ def configuration(
     named: dict[str, object] = {}
     for name, registry, part in (
         ("fixture", FIXTURES, fixture), ("controller", CONTROLLERS, controller),
+        ("plant", PLANTS, plant),
     ):  # fmt: skip
         if part is not None:
             named[f"{name}.kind"] = part if isinstance(part, str) else _known(registry, part)
@@ -146,6 +150,7 @@ def run(
     operator: OperatorLike | None = None,
     fixture: str | Fixture | None = None,
     controller: str | Controller | None = None,
+    plant: str | Plant | None = None,
     robot: str | Robot | DhTable | None = None,
     stages: str | Stage | Sequence[str | Stage] = (),
     arms: Sequence[str] = (),
@@ -165,6 +170,7 @@ def run(
         operator: As there.
         fixture: As there.
         controller: As there.
+        plant: As there.
         robot: As there.
         stages: As there.
         arms: As there.
@@ -189,8 +195,8 @@ def run(
     else:
         made = configuration(
             scenario, files=files, settings=given, texts=(), operator=operator, fixture=fixture,
-            controller=controller, robot=robot, stages=stages, arms=arms, delays=delays,
-            **parameters,
+            controller=controller, plant=plant, robot=robot, stages=stages, arms=arms,
+            delays=delays, **parameters,
         )  # fmt: skip
     for note in notes_of(made):
         warnings.warn(note, stacklevel=2)

@@ -257,10 +257,11 @@ def _parts(_: argparse.Namespace) -> int:
     from teleop_core.evaluation import METRICS
     from teleop_core.fixtures import FIXTURES
     from teleop_core.operators import OPERATORS
+    from teleop_core.plants import PLANTS
     from teleop_core.robots import ROBOTS
     from teleop_core.stage import STAGES
 
-    for registry in (OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, STAGES, METRICS):
+    for registry in (OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, STAGES, METRICS):
         print(f"{registry.kinds:12} {', '.join(registry)}")
     return 0
 

@@ -3,12 +3,9 @@
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from teleop_core.commands.arguments import command, setting_arguments
-
-if TYPE_CHECKING:
-    from teleop_core.slave.slave_sim import SlaveSimParameters
 
 _EPILOG = """\
 without a table those of the RCRT-1's source are taken (ten runs to each of six points), with the
@@ -47,20 +44,16 @@ def add(commands: Any) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.commands.progress import shown_progress
     from teleop_core.evaluation.command import check_place
-    from teleop_core.fitting.fit import fit
-    from teleop_core.fitting.table import PUBLISHED, read_rests
-    from teleop_core.robots import load_robot_set
+    from teleop_core.fitting import fit_plant
 
     for file in (arguments.json, arguments.out):
         if file is not None:
             check_place(file)
-    parameters = _parameters(arguments)
-    robot = load_robot_set(parameters.robot, parameters.geometry)
-    table = read_rests(arguments.table or PUBLISHED, robot)
     with shown_progress("fitting") as progress:
-        found = fit(
-            table, parameters, arguments.free, lambda share: progress(round(100.0 * share), 100)
-        )
+        found = fit_plant(
+            arguments.table, robot=arguments.robot, free=arguments.free, files=arguments.config,
+            texts=arguments.settings, progress=lambda share: progress(round(100.0 * share), 100),
+        )  # fmt: skip
     print(found)
     if arguments.json is not None:
         arguments.json.write_text(json.dumps(found.to_json(), indent=1) + "\n", encoding="utf-8")
@@ -69,13 +62,3 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.out.write_text(found.parameter_file(), encoding="utf-8")
         print(f"parameters: {arguments.out}; take them with --config {arguments.out}")
     return 0
-
-
-def _parameters(arguments: argparse.Namespace) -> "SlaveSimParameters":
-    """The slave of the fit: its own settings over the hardware plant and the source's PID."""
-    from teleop_core.session.configuration import configure
-
-    given = [f"robot={arguments.robot}", "plant=hardware", "controller=source_pid"]
-    made = configure(None, arguments.config, settings=[*given, *arguments.settings])
-    group: SlaveSimParameters = made.group("slave_sim")
-    return group
