@@ -128,7 +128,7 @@ def test_evaluate_prints_a_table_and_writes_json_and_page(teleop, recording, tmp
         (["--set", "fine_gain"], ["fine_gain", "key=value"]),
         (["--set", "fine_gain=200"], ["fine_gain", "200", "between"]),
         (["--set", "fine_gain=nan"], ["fine_gain", "nan", "finite"]),
-        (["--set", "fixture.wall=wet"], ["wet", "soft, hard"]),
+        (["--set", "fixture.wall=wet"], ["wet", "damped, hard"]),
         (["--set", "fixture.box.size=[1, 2]"], ["fixture.box.size", "3 values"]),
         (["--set", "pid.kp=[1.0]"], ["pid.kp", "6 values"]),
         (["--duration", "-1"], ["duration", "-1", "between"]),

@@ -61,7 +61,7 @@ class HumanParameters:
     time_per_bit: float = parameter(
         0.17, unit="s", lower=0.0, upper=2.0, fixed=True,
         doc="what each bit of difficulty adds to the duration of a submovement",
-        source="assumed: 6 bit/s, between mouse (Soukoreff, MacKenzie 2004) and stylus (Fitts 1954)",
+        source="assumed: 6 bit/s, between mouse (Soukoreff, MacKenzie 2004) and pen (Fitts 1954)",
     )  # fmt: skip
     time_spread: float = parameter(
         0.27, lower=0.0, upper=1.0, fixed=True, doc="standard deviation of its logarithm",
