@@ -1,0 +1,74 @@
+"""Joint steps: how each joint of a slave under a control law answers a step, and rests after it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.geometry import Array
+from teleop_core.signals import TICK_NS
+from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+
+_STEP_S = 0.02  # a step is as large as what a joint makes in this time at full speed
+_SETTLED_TICKS, _WAIT_TICKS, _REST_TICKS = 300, 1500, 2000
+
+
+class StepAnswer(NamedTuple):
+    """How a slave answers steps of its joints, one joint after the other.
+
+    Attributes:
+        overshoot: What each joint (n,) makes beyond its goal at the most, share of the step.
+        rest_error: Distance of the tip, by the encoders, from where the setpoints put it: root
+            mean square over the rests after all steps [m].
+        rest_travel: Largest difference of what an encoder shows during a rest of two seconds,
+            largest of all steps, for each joint (n,) [counts].
+    """
+
+    overshoot: Array
+    rest_error: float
+    rest_travel: Array
+
+
+def answer_to_steps(parameters: SlaveSimParameters) -> StepAnswer:
+    """Step each joint by itself, from home, towards the middle of its range.
+
+    Args:
+        parameters: Of the slave. Its reference filter should be off, and its start at home.
+    """
+    n = SlaveSim(parameters).robot.n
+    overshoot, travel, errors = np.zeros(n), np.zeros(n), []
+    for joint in range(n):
+        over, error, moved = _one_step(SlaveSim(parameters), joint)
+        overshoot[joint] = over
+        errors.append(error)
+        travel = np.maximum(travel, moved)
+    return StepAnswer(overshoot, float(np.sqrt(np.mean(np.square(errors)))), travel)
+
+
+def _one_step(slave: SlaveSim, joint: int) -> tuple[float, float, Array]:
+    """Overshoot [share], rest error of the tip [m] and travel at rest (n,) [counts] of a step."""
+    robot = slave.robot
+    drives, n = robot.drives, robot.n
+    assert drives is not None
+    goal = robot.home.copy()
+    _measured(slave, goal, slave.lead + _SETTLED_TICKS)
+    toward = 1.0 if goal[joint] <= 0.5 * (robot.lower[joint] + robot.upper[joint]) else -1.0
+    step = toward * _STEP_S * drives.speed_limit[joint]
+    goal[joint] += step
+    moved = _measured(slave, goal, _WAIT_TICKS)
+    rests = _measured(slave, goal, _REST_TICKS)
+    beyond = float(np.max((moved[:, joint] - goal[joint]) / step))
+    tips = robot.fk(rests[::20])[:, :3, 3] - robot.fk(goal)[:3, 3]
+    error = float(np.sqrt(np.mean(np.sum(tips**2, axis=1))))
+    return max(beyond, 0.0), error, np.ptp(rests[:, :n], axis=0) / drives.encoder_step
+
+
+def _measured(slave: SlaveSim, goal: Array, ticks: int) -> Array:
+    """What the encoders show (ticks, n) under a constant command."""
+    row, n = slave.signals, slave.robot.n
+    rows = np.empty((ticks, n))
+    for k in range(ticks):
+        row["now_ns"] += TICK_NS
+        row["slave_servo_jp"], row["slave_servo_jp_ns"] = goal, row["now_ns"]
+        slave.step()
+        rows[k] = row["slave_measured_js"][:n]
+    return rows
