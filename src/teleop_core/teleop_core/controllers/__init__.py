@@ -103,6 +103,10 @@ def _checked(name: str, part: object) -> Controller:
     for field in ("gains", "control", "begin", "shift"):
         if not callable(getattr(part, field)):
             raise PartError("controller", name, f"one whose {field} can be called")
+    if not isinstance(part.uses_model, bool):
+        raise PartError(
+            "controller", name, f"one whose uses_model is a bool, not {part.uses_model!r}"
+        )
     return part
 
 

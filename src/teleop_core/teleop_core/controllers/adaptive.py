@@ -66,8 +66,8 @@ class AdaptiveParameters:
         source="assumed: a joint gives by a few encoder counts before it slips",
     )  # fmt: skip
     dead_band: float = parameter(
-        1.0, lower=0.0, upper=100.0, doc="encoder counts of error from which nothing is learned",
-        source="derived: from 0.5 on, a setpoint between two counts lets the joint rest",
+        0.5, lower=0.0, upper=100.0, doc="encoder counts of error from which nothing is learned",
+        source="derived: the nearest count is never farther, so that the joint may rest there",
     )  # fmt: skip
 
 

@@ -46,8 +46,8 @@ class ComputedTorqueParameters:
         source="assumed: the middle, √12, of the rule of two to six",
     )  # fmt: skip
     dead_band: float = parameter(
-        1.0, lower=0.0, upper=100.0, doc="encoder counts of error that the integral does not sum",
-        source="derived: from 0.5 on, a setpoint between two counts lets the joint rest",
+        0.5, lower=0.0, upper=100.0, doc="encoder counts of error that the integral does not sum",
+        source="derived: the nearest count is never farther, so that the joint may rest there",
     )  # fmt: skip
 
 
