@@ -87,10 +87,10 @@ SPIN = pointer(independent_acceleration, ACCELERATION)
 
 def one_tick_error(rate, steps):
     """Error of position and speed, relative to the start speed, of a joint that friction stops."""
-    q, dq = np.zeros(1), np.ones(1)
-    one, none = np.ones(1), np.zeros(1)
-    effort = np.array([0.3 * rate])
-    integrate(SPIN, one, rate * one, none, one, steps, effort, q, dq, DT)
+    q, dq, effort = np.zeros(6), np.ones(6), np.full(6, 0.3 * rate)
+    slave = SlaveSim(SlaveSimParameters())
+    slave.parameters["viscous"], slave.parameters["coulomb"] = rate, 0.0
+    integrate(SPIN, np.ones(6), slave.parameters, slave.state, steps, effort, q, dq, DT)
     exact = expm(np.array([[0, 1, 0], [0, -rate, 1], [0, 0, 0]]) * 1e-3) @ [0.0, 1.0, effort[0]]
     return max(abs(q[0] - exact[0]) / 1e-3, abs(dq[0] - exact[1]))
 
@@ -120,8 +120,8 @@ def test_more_steps_change_the_path_of_the_arm_less_and_less():
         q, dq = MIDDLE.copy(), np.array([1.0, -1.0, 0.02, 1.0, -1.0, 1.0])
         for _ in range(100):
             integrate(
-                slave.arm.acceleration, slave.arm.dynamics, DRIVES.viscous, DRIVES.coulomb,
-                DRIVES.friction_speed, steps, effort, q, dq, DT,
+                slave.arm.acceleration, slave.arm.dynamics, slave.parameters, slave.state, steps,
+                effort, q, dq, DT,
             )  # fmt: skip
         ends.append(q)
     in_counts = np.array([np.abs((b - a) / COUNT).max() for a, b in pairwise(ends)])
