@@ -1,0 +1,42 @@
+"""Compare control laws on the plant that predicts the built arm: error, and what it costs.
+
+`teleop experiment controllers` does it with several hands, steps and rests, and draws it.
+"""
+
+import sys
+
+import numpy as np
+
+import teleop_core as tc
+
+LAWS = {
+    "source_pid": "the published controller",
+    "pid": "more integral action, a filtered derivative",
+    "computed_torque": "knows the robot's model",
+    "disturbance_observer": "estimates what else acts on a joint, and cancels it",
+    "friction_compensation": "feeds dry friction forward, too",
+    "adaptive": "learns friction and load as it goes",
+}
+
+
+def main(duration: float = 46.0) -> None:
+    """Print a row for each law; errors are those that the encoders see."""
+    limit = tc.load_robot("rcrt1").drives.effort_limit
+    print(f"{'law':22} {'RMS':>7} {'max':>7}  effort jumps by (RMS of a tick)")
+    for law, what in LAWS.items():
+        recording = tc.run("coarse_box", duration=duration, plant="hardware", controller=law)
+        follows = recording["slave/setpoint_cp"].stamp_ns > 0
+        wanted, seen = (
+            recording[topic][["x", "y", "z"]][follows]
+            for topic in ("slave/setpoint_cp", "slave/measured_cp")
+        )
+        error = 1e6 * np.linalg.norm(seen - wanted, axis=1)
+        joints = recording["slave/measured_js"]
+        names = [name for name in joints.columns if name.endswith(".effort")]
+        jumps = np.diff(joints[names][follows] / limit, axis=0)
+        rms, jump = np.sqrt(np.mean(error**2)), 100.0 * np.sqrt(np.mean(jumps**2))
+        print(f"{law:22} {rms:4.0f} µm {error.max():4.0f} µm  {jump:4.1f} % of the limit   {what}")
+
+
+if __name__ == "__main__":
+    main(*map(float, sys.argv[1:2]))
