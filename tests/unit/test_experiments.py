@@ -128,6 +128,18 @@ def test_bench_of_the_same_seed_gives_the_same_bits():
     assert first.score.to_json() == second.score.to_json()
 
 
+def test_streams_of_an_old_session_come_back_with_the_same_bits(monkeypatch):
+    monkeypatch.setattr("teleop_core.experiments.bench._WHOLE", 1)
+    bench = Bench()
+    old = bench.session("coarse_box", settings=SHORT)
+    before = old["slave/measured_cp"]
+    bench.session("coarse_box", 9, SHORT)
+    again = old["slave/measured_cp"]
+    assert again is not before
+    assert np.array_equal(again.values, before.values)
+    assert bench.runs == 2
+
+
 def test_bench_refuses_a_negative_seed_and_names_topics_that_it_keeps():
     with pytest.raises(ParameterError, match="seed"):
         Bench(-1)

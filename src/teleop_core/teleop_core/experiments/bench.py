@@ -15,6 +15,7 @@ from teleop_core.slave.slave_sim import SlaveSimParameters
 Setting = float | str | bool | tuple[float, ...] | tuple[str, ...]
 Settings = Mapping[str, Setting]
 Progress = Callable[[int, int], None]
+_WHOLE = 16  # sessions whose streams are kept, 25 MB each
 SEEDS = 3
 """Sessions with different hands of which figures are the mean."""
 # What experiments look at; the rest of a recording, most of its memory, is let go.
@@ -33,13 +34,18 @@ class Session:
         name: Scenario.
         seed: Its seed.
         score: What it is worth.
-        streams: Streams by topic.
+        read: Gives the streams by topic.
     """
 
     name: str
     seed: int
     score: Score
-    streams: Mapping[str, Stream]
+    read: Callable[[], Mapping[str, Stream]]
+
+    @property
+    def streams(self) -> Mapping[str, Stream]:
+        """Streams by topic; of an older session it is run again, to the same bits."""
+        return self.read()
 
     def __getitem__(self, topic: str) -> Stream:
         """A stream by its topic.
@@ -47,9 +53,10 @@ class Session:
         Raises:
             UnknownNameError: It was not recorded, or is not kept.
         """
-        if topic not in self.streams:
-            raise UnknownNameError("topic", topic, self.streams)
-        return self.streams[topic]
+        streams = self.streams
+        if topic not in streams:
+            raise UnknownNameError("topic", topic, streams)
+        return streams[topic]
 
     def places_mm(self, topic: str) -> Array:
         """Positions (N, 3) [mm] of a stream of poses, in the slave's base."""
@@ -90,6 +97,7 @@ class Bench:
         self.seed, self.progress = seed, progress
         self._settings = dict(settings or {})
         self._known: dict[object, Session] = {}
+        self._streams: dict[object, Mapping[str, Stream]] = {}  # of the last sessions
 
     @property
     def seeds(self) -> range:
@@ -116,10 +124,24 @@ class Bench:
         """
         number = self.seed if seed is None else seed
         given = self._settings | dict(settings or {})
-        key = (scenario, number, tuple(sorted(given.items(), key=lambda item: item[0])))
+        key = (scenario, number, tuple((name, repr(given[name])) for name in sorted(given)))
         if key not in self._known:
-            self._known[key] = self._run(scenario, number, given)
+            score, streams = self._run(scenario, number, given)
+            self._keep(key, streams)
+
+            def read() -> Mapping[str, Stream]:
+                if key not in self._streams:
+                    self._keep(key, self._run(scenario, number, given)[1])
+                return self._streams[key]
+
+            self._known[key] = Session(scenario, number, score, read)
         return self._known[key]
+
+    def _keep(self, key: object, streams: Mapping[str, Stream]) -> None:
+        """Keep streams, and let go of the oldest ones when there are many."""
+        self._streams[key] = streams
+        if len(self._streams) > _WHOLE:
+            del self._streams[next(iter(self._streams))]
 
     def sessions(self, scenario: str, settings: Settings | None = None) -> list[Session]:
         """The same session by several hands; see :meth:`session`."""
@@ -138,12 +160,13 @@ class Bench:
         assert isinstance(group, SlaveSimParameters)
         return group
 
-    def _run(self, scenario: str, seed: int, settings: Settings) -> Session:
+    def _run(
+        self, scenario: str, seed: int, settings: Settings
+    ) -> tuple[Score, Mapping[str, Stream]]:
         from teleop_core.api import run
 
         recording = run(scenario, seed=seed, settings=settings, progress=self.progress)
-        streams = {name: recording[name] for name in _KEPT}
-        return Session(scenario, seed, recording.score(), streams)
+        return recording.score(), {name: recording[name] for name in _KEPT}
 
 
 def mean(values: Iterable[float]) -> float:
