@@ -140,7 +140,11 @@ FRICTIONLESS = {"plant": "ideal", "coulomb": (0.0,) * 6}
 def test_true_model_leaves_nothing_to_correct_where_there_is_no_dry_friction():
     by_model = tracking_error(slave("computed_torque", **FRICTIONLESS))
     by_joint = tracking_error(
-        slave("friction_compensation", own={"friction_compensation.share": 0.0}, **FRICTIONLESS)
+        slave(
+            "friction_compensation",
+            own={"friction_compensation.friction_share": 0.0},
+            **FRICTIONLESS,
+        )
     )
     # Rounding of the encoders is 0.3 counts; efforts are held for a tick.
     assert (by_model[:3] < 1.5).all()
@@ -148,7 +152,7 @@ def test_true_model_leaves_nothing_to_correct_where_there_is_no_dry_friction():
 
 
 def test_friction_that_is_fed_forward_is_most_of_the_error_that_friction_makes():
-    name = "friction_compensation.share"
+    name = "friction_compensation.friction_share"
     without, with_it = (
         tracking_error(slave("friction_compensation", faults=STEADY, own={name: share}))
         for share in (0.0, 0.8)

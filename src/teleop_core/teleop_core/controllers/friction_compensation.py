@@ -49,11 +49,11 @@ class FrictionCompensationParameters:
         doc="pole of the filters of motion over that of the loop, where encoder noise allows it",
         source="assumed: the middle, √12, of the rule of two to six",
     )  # fmt: skip
-    share: float = parameter(
+    friction_share: float = parameter(
         0.8, lower=0.0, upper=1.5, doc="share of known dry friction that is fed forward",
         source="assumed: less than all of it, for what is too much pushes the joint ahead",
     )  # fmt: skip
-    counts: float = parameter(
+    friction_counts: float = parameter(
         4.0, lower=0.1, upper=1000.0, doc="encoder counts of travel that turn dry friction on",
         source="assumed: a joint gives by a few encoder counts before it slips",
     )  # fmt: skip
@@ -115,9 +115,9 @@ def friction_compensation_gains(
     )
     kp, ki, kd = critically_damped_gains(drives.inertia, viscous, pole)
     fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
-    friction, count = p.share * known_friction(robot), drives.encoder_step
+    friction, count = p.friction_share * known_friction(robot), drives.encoder_step
     columns = (
-        kp, ki, kd, drives.inertia, viscous, fading, friction, p.counts * count,
+        kp, ki, kd, drives.inertia, viscous, fading, friction, p.friction_counts * count,
         p.dead_band * count, linear_range(robot, pole, 3.0),
     )  # fmt: skip
     return np.stack(columns, axis=1)

@@ -59,7 +59,7 @@ def _one_step(slave: SlaveSim, joint: int) -> tuple[float, float, Array]:
     beyond = float(np.max((moved[:, joint] - goal[joint]) / step))
     tips = robot.fk(rests[::20])[:, :3, 3] - robot.fk(goal)[:3, 3]
     error = float(np.sqrt(np.mean(np.sum(tips**2, axis=1))))
-    return max(beyond, 0.0), error, np.ptp(rests[:, :n], axis=0) / drives.encoder_step
+    return max(beyond, 0.0), error, np.round(np.ptp(rests[:, :n], axis=0) / drives.encoder_step)
 
 
 def _measured(slave: SlaveSim, goal: Array, ticks: int) -> Array:
