@@ -4,7 +4,11 @@ from teleop_core.experiments.bench import Settings
 
 PREDICTED: Settings = {"plant": "hardware", "controller": "source_pid"}
 """The source's machine under the source's controller."""
-OURS: Settings = {"plant": "hardware", "controller": "pid"}
-"""The same machine under our controller."""
-RESTING: Settings = OURS
+OURS: Settings = {"plant": "hardware", "controller": "disturbance_observer"}
+"""The same machine under a controller of ours.
+
+Of the laws that track within 3 x 11.4 µm in both modes (experiment ``controllers``) it is the one
+without overshoot, and with the least change of effort from tick to tick.
+"""
+RESTING: Settings = {"plant": "hardware", "controller": "pid"}
 """For tests whose gains the source tuned for no error at rest, tracking ignored (appendix E)."""
