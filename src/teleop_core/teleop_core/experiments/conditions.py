@@ -8,7 +8,8 @@ OURS: Settings = {"plant": "hardware", "controller": "disturbance_observer"}
 """The same machine under a controller of ours.
 
 Of the laws that track within 3 x 11.4 µm in both modes (experiment ``controllers``) it is the one
-without overshoot, and with the least change of effort from tick to tick.
+without overshoot, with the least change of effort from tick to tick, and whose angles stay below
+the published largest ones near home too.
 """
 RESTING: Settings = {"plant": "hardware", "controller": "pid"}
 """For tests whose gains the source tuned for no error at rest, tracking ignored (appendix E)."""
