@@ -1,4 +1,4 @@
-"""Write what documents say about the code from the code: parameters, topics, scores, the diagram.
+"""Write what documents say about the code from the code: lists, the diagram, the plant's numbers.
 
 python docs/generate.py            write the pages
 python docs/generate.py --check    say which of them differ, and fail if one does
@@ -10,14 +10,20 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from teleop_core.evaluation import key_table
+from teleop_core.geometry import Array
 from teleop_core.graph import Graph, Link, build_graph
+from teleop_core.parameters import specs
+from teleop_core.plants.hardware import HardwareParameters
+from teleop_core.robots import Robot, load_robot
+from teleop_core.robots.hardware import NUMBERS
 from teleop_core.session.configuration import parameter_rows
 from teleop_core.session.layers import declared_groups
 from teleop_core.topics import DIAGNOSTICS, Kind, Topic
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTE = "<!-- Written by docs/generate.py; change the code, not this page. -->"
-BEGIN, END = "<!-- graph: written by docs/generate.py -->", "<!-- end of graph -->"
+GRAPH = "<!-- graph: written by docs/generate.py -->", "<!-- end of graph -->"
+PLANT = "<!-- numbers: written by docs/generate.py -->", "<!-- end of numbers -->"
 VALUES = {
     Kind.POSE: "x, y, z [m], quaternion w, x, y, z",
     Kind.TWIST: "linear x, y, z [m/s], angular x, y, z [rad/s]",
@@ -113,13 +119,46 @@ def diagram(graph: Graph) -> str:
     return "\n".join(lines)
 
 
-def with_diagram(text: str, graph: Graph) -> str:
-    """A document with the diagram between its markers."""
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
+def plant_numbers(robot: Robot) -> str:
+    """Numbers of the hardware plant for a robot, with how each is known."""
+    known, model = robot.hardware, robot.dynamics
+    assert known is not None
+    assert known.links is not None
+    assert model is not None
+    joints, links = robot.joint_names, known.links.named()
+    values = {name: per_joint(getattr(known, name)) for name in NUMBERS}
+    pairs = zip(*known.coupling.nonzero(), strict=True)
+    values["coupling"] = ", ".join(
+        f"{joints[i]} moves by {known.coupling[i, j]:.3g} of the lag of {joints[j]}"
+        for i, j in pairs
+    )
+    values["links"] = f"d3 {1e3 * links['d3']:+.1f} mm, and {len(links) - 1} small ones"
+    values["dynamics"] = ", ".join(
+        f"{symbol} = {known.dynamics[place]:.4g} kg·m" for symbol, place in model.unknown.items()
+    )
+    rows = [f"| `{name}` | {text} | {known.sources[name]} |" for name, text in values.items()]
+    for spec in specs(HardwareParameters):
+        if spec.source:
+            rows.append(
+                f"| `{spec.name}` | {f'{spec.default} {spec.unit}'.strip()} | {spec.source} |"
+            )
+    head = [f"| number | {', '.join(joints)} [SI] | how it is known |", "|---|---|---|"]
+    return "\n".join([*head, *rows])
+
+
+def per_joint(values: Array) -> str:
+    """Numbers of all joints with three digits; one if all are alike."""
+    texts = [f"{value:.3g}" for value in values]
+    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
+
+
+def between(text: str, markers: tuple[str, str], written: str) -> str:
+    """A document with what is written between two markers."""
+    before, begin, rest = text.partition(markers[0])
+    _, end, after = rest.partition(markers[1])
     if not (begin and end):
-        raise SystemExit(f"a document must hold {BEGIN} and {END}")
-    return f"{before}{BEGIN}\n{diagram(graph)}\n{END}{after}"
+        raise SystemExit(f"a document must hold {markers[0]} and {markers[1]}")
+    return f"{before}{begin}\n{written}\n{end}{after}"
 
 
 def pages() -> Iterator[tuple[Path, str]]:
@@ -129,7 +168,10 @@ def pages() -> Iterator[tuple[Path, str]]:
     yield docs / "topics.md", topics_page(graph)
     yield docs / "scores.md", scores_page()
     for path in (ROOT / "README.md", docs / "how_a_sample_travels.md"):
-        yield path, with_diagram(path.read_text(encoding="utf-8"), graph)
+        yield path, between(path.read_text(encoding="utf-8"), GRAPH, diagram(graph))
+    plant = docs / "plant.md"
+    numbers = plant_numbers(load_robot("rcrt1"))
+    yield plant, between(plant.read_text(encoding="utf-8"), PLANT, numbers)
 
 
 def main() -> int:

@@ -161,6 +161,21 @@ def test_own_experiment_stands_beside_those_of_the_package(tmp_path):
     assert all(0.01 < float(error) < 2.0 for error in beside.groups())
 
 
+def test_plant_of_published_rests_predicts_the_published_errors_and_an_ideal_one_does_not(tmp_path):
+    text = run("predict_the_machine", tmp_path)
+    bias = re.search(r"bias\.theta1 = ([\d.]+) \(([\d.]+) to ([\d.]+)\)", text)
+    assert bias is not None
+    assert 0.03 < float(bias[2]) < float(bias[1]) < float(bias[3]) < 0.06
+    published, predicted, ours = (
+        numbers(rf"{word} ([\d.]+)", text) for word in ("published", "predicted", "with ours")
+    )
+    assert len(published) == 2
+    for printed, without, better in zip(published, predicted, ours, strict=True):
+        assert abs(without / printed - 1.0) < 0.15
+        assert better < 0.15 * without
+    assert numbers(r"on an ideal plant: ([\d.]+)", text)[0] < 0.6 * predicted[0]
+
+
 def test_recording_becomes_a_data_frame_and_a_page(tmp_path):
     text = run("bag_to_pandas", tmp_path)
     ticks = VirtualTime(configure("coarse_box")).lead + 10_000
