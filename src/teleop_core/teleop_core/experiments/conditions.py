@@ -9,7 +9,7 @@ OURS: Settings = {"plant": "hardware", "controller": "disturbance_observer"}
 
 Of the laws that track within 3 x 11.4 µm in both modes (experiment ``controllers``) it is the one
 without overshoot, with the least change of effort from tick to tick, and whose angles stay below
-the published largest ones near home too.
+half a degree near home too, though not below the published largest yaw of the coarse mode.
 """
 RESTING: Settings = {"plant": "hardware", "controller": "pid"}
 """For tests whose gains the source tuned for no error at rest, tracking ignored (appendix E)."""
