@@ -15,6 +15,7 @@ from teleop_core.controllers.disturbance_observer import (
 from teleop_core.controllers.motion import (
     FRICTION_SHARE,
     MEMORY,
+    SLOWEST_RATIO,
     approach,
     beyond,
     closeness,
@@ -141,16 +142,19 @@ def test_one_encoder_count_shakes_no_joint_loose(axis):
             gains, memory, zero.copy(), seen, zero.copy(), drives.effort_limit.copy(), DT, effort
         )
         efforts.append(effort[axis])
-    assert 0.0 < abs(efforts[1] - efforts[0]) <= FRICTION_SHARE * known_friction(ARM)[axis] * 1.001
+    change, friction = abs(efforts[1] - efforts[0]), known_friction(ARM)[axis]
+    is_slowest = -math.log(gains[axis, 3]) / DT <= 1.001 * SLOWEST_RATIO * drives.bandwidth[axis]
+    # Where filters may not be slower it is a little more, yet less than what friction holds.
+    assert 0.0 < change <= (1.0 if is_slowest else 1.001 * FRICTION_SHARE) * friction
 
 
 def test_filters_are_slower_where_encoders_are_coarse_for_the_friction_there_is():
     pole = ARM.drives.bandwidth.copy()
     fading = fading_of(ARM, pole, 3.5, stiffness=3.0, damping=3.0)
     bandwidth = -np.log(fading) / DT
-    assert (bandwidth >= pole * (1.0 - 1e-9)).all()
+    assert (bandwidth >= 2.0 * pole * (1.0 - 1e-9)).all()
     assert (bandwidth <= 3.5 * pole * (1.0 + 1e-9)).all()
     assert np.allclose(
         bandwidth[1:4], 3.5 * pole[1:4], rtol=1e-9, atol=0
     )  # friction is large there
-    assert (bandwidth[4:] < 1.5 * pole[4:]).all()
+    assert np.allclose(bandwidth[4:], 2.0 * pole[4:], rtol=1e-9, atol=0)

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.signal import lsim
 
-from teleop_core.controllers.pid import PID, THIRD, PidParameters, pid_control
+from teleop_core.controllers.pid import PID, THIRD, PidParameters, pid_control, pid_step
+from teleop_core.kernels import kernel
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.signals import DT, TICK_NS
@@ -37,19 +38,25 @@ class Axis:
         self.limit = np.array([drives.effort_limit[axis] if is_limited else 1e300])
         self.count = drives.encoder_step[axis] if is_rounded else 0.0
 
-    def answer(self, goal, ticks, memory=None):
+    def answer(self, goal, ticks):
         """Positions (ticks,) after a step of the setpoint from rest at 0."""
-        q = dq = 0.0
-        memory, effort, trace = np.zeros((1, 4)), np.zeros(1), np.empty(ticks)
-        for k in range(ticks):
-            seen = round(q / self.count) * self.count if self.count else q
-            pid_control(
-                self.gains, memory, np.array([goal]), np.array([seen]), np.zeros(1), self.limit,
-                DT, effort,
-            )  # fmt: skip
-            q, dq, _ = self.step @ (q, dq, effort[0])
-            trace[k] = q
+        trace = np.empty(ticks)
+        answer(self.gains, self.step, self.limit, self.count, goal, trace)
         return trace
+
+
+@kernel
+def answer(gains, step, limit, count, goal, trace):
+    """Write positions of one axis under the law, tick by tick; a count of 0 rounds nothing."""
+    memory, effort, setpoint = np.zeros((1, 4)), np.zeros(1), np.full(1, goal)
+    seen, zero, q, dq = np.zeros(1), np.zeros(1), 0.0, 0.0
+    for k in range(trace.shape[0]):
+        seen[0] = round(q / count) * count if count > 0.0 else q
+        pid_control(gains, memory, setpoint, seen, zero, limit, DT, effort)
+        ahead = step[0, 0] * q + step[0, 1] * dq + step[0, 2] * effort[0]
+        dq = step[1, 0] * q + step[1, 1] * dq + step[1, 2] * effort[0]
+        q = ahead
+        trace[k] = q
 
 
 @pytest.mark.parametrize(("name", "axis"), AXES)
@@ -109,6 +116,25 @@ def test_effort_is_that_of_the_textbook_s_weighted_law(setpoints, weight, place)
         # What the lag remembers of the time before, when the setpoint was 0.
         wanted = kp * (weight * r - place) + total
         assert math.isclose(effort[0], wanted, rel_tol=1e-9, abs_tol=1e-9)
+
+
+@given(
+    st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=1, max_size=60),
+    st.sampled_from(range(6)),
+)
+def test_whole_setpoint_is_the_law_without_weights_to_the_bit(pairs, axis):
+    robot = ROBOTS["rcrt1"]
+    gains = PID.gains(PidParameters(), robot, robot.drives.viscous)[[axis]].copy()
+    limit, memory, plain = robot.drives.effort_limit[[axis]], np.zeros((1, 4)), np.zeros(3)
+    effort = np.empty(1)
+    for setpoint, measured in pairs:
+        pid_control(
+            gains, memory, np.array([setpoint]), np.array([measured]), np.zeros(1), limit, DT,
+            effort,
+        )  # fmt: skip
+        same = pid_step(setpoint, measured, gains[0, :3].copy(), plain, 0.0, limit[0], DT)
+        assert effort[0] == same
+    assert np.array_equal(memory[0, :3], plain)
 
 
 def test_without_integral_action_the_weight_leaves_the_law_as_it_is():

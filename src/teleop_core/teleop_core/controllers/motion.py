@@ -35,6 +35,8 @@ FRICTION_SHARE = 0.5
 """What one encoder count may change of an effort: shares of the drive's limit, of dry friction."""
 APPROACH_SHARE = 0.5
 """Share of a drive's limit that an error may take before it counts as less, see approach()."""
+SLOWEST_RATIO = 2.0
+"""Pole of the filters over that of the loop, at the least."""
 _HALVINGS = 50
 
 
@@ -154,13 +156,13 @@ def fading_of(
 
     The rule: ``ratio`` times as fast as the loop, but so slow that one encoder count changes the
     effort by no more than :data:`FRICTION_SHARE` of known dry friction, so that the noise of an
-    encoder shakes no joint loose, and no more than :data:`EFFORT_SHARE` of the drive's limit; and
-    not slower than the loop.
+    encoder shakes no joint loose, and no more than :data:`EFFORT_SHARE` of the drive's limit. It is
+    :data:`SLOWEST_RATIO` times as fast all the same, without which the loop would not be damped.
 
     Args:
         robot: Robot with drives.
         pole: Of the closed loop (n,) [rad/s].
-        ratio: Pole of the filters over that of the loop, > 1.
+        ratio: Pole of the filters over that of the loop, >= 1.
         stiffness: Proportional action over ``inertia pole²``.
         damping: Action on the speed over ``inertia pole``.
         rejection: Action on the unexplained acceleration over ``inertia``.
@@ -173,7 +175,7 @@ def fading_of(
     room = EFFORT_SHARE * drives.effort_limit
     room = np.where(friction > 0.0, np.minimum(room, FRICTION_SHARE * friction), room)
     allowed = room / (drives.inertia * drives.encoder_step)
-    low, high = pole.copy(), np.maximum(ratio, 1.0) * pole
+    low, high = min(ratio, SLOWEST_RATIO) * pole, ratio * pole
     if_fast = _per_count(high, pole, stiffness, damping, rejection) <= allowed
     slow, fast = low.copy(), high.copy()
     for _ in range(_HALVINGS):
