@@ -21,7 +21,8 @@ LAWS = {
 
 def main(duration: float = 46.0) -> None:
     """Print a row for each law; errors are those that the encoders see."""
-    limit = tc.load_robot("rcrt1").drives.effort_limit
+    drives = tc.load_robot("rcrt1").drives
+    assert drives is not None
     print(f"{'law':22} {'RMS':>7} {'max':>7}  effort jumps by (RMS of a tick)")
     for law, what in LAWS.items():
         recording = tc.run("coarse_box", duration=duration, plant="hardware", controller=law)
@@ -33,7 +34,7 @@ def main(duration: float = 46.0) -> None:
         error = 1e6 * np.linalg.norm(seen - wanted, axis=1)
         joints = recording["slave/measured_js"]
         names = [name for name in joints.columns if name.endswith(".effort")]
-        jumps = np.diff(joints[names][follows] / limit, axis=0)
+        jumps = np.diff(joints[names][follows] / drives.effort_limit, axis=0)
         rms, jump = np.sqrt(np.mean(error**2)), 100.0 * np.sqrt(np.mean(jumps**2))
         print(f"{law:22} {rms:4.0f} µm {error.max():4.0f} µm  {jump:4.1f} % of the limit   {what}")
 

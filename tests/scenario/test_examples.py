@@ -242,6 +242,15 @@ def test_commands_take_the_parts_of_the_examples(tmp_path):
     assert "jerk" in done.stdout
 
 
+def test_laws_of_the_table_track_better_from_row_to_row(tmp_path):
+    text = run("compare_controllers", tmp_path)
+    errors = numbers(r"\n\w+ +(\d+) µm", text)
+    assert len(errors) == 6
+    assert errors == sorted(errors, reverse=True)
+    assert errors[0] > 200.0
+    assert all(error <= 34.0 for error in errors[2:])
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_example_needs_the_public_api_alone(name):
     tree = ast.parse((EXAMPLES / f"{name}.py").read_text(encoding="utf-8"))
