@@ -53,6 +53,7 @@ def test_setting_with_its_stage_sets_that_parameter_alone():
 def test_bare_key_sets_every_stage_that_has_it():
     layer = parse_setting("robot=mma")
     assert layer == {"inverse_kinematics": {"robot": "mma"}, "slave_sim": {"robot": "mma"}}
+    assert parse_setting("seed=5") == {"haptic_master": {"seed": 5}, "slave_sim": {"seed": 5}}
 
 
 @pytest.mark.parametrize(
@@ -62,7 +63,7 @@ def test_bare_key_sets_every_stage_that_has_it():
         ("duration=1e1", "teleop", "duration", 10.0),
         (" duration = 3 ", "teleop", "duration", 3.0),
         ("hand.mass=0.2", "haptic_master", "hand.mass", 0.2),
-        ("seed=5", "haptic_master", "seed", 5),
+        ("haptic_master.seed=5", "haptic_master", "seed", 5),
         ("operator.kind=circle", "haptic_master", "operator.kind", "circle"),
         ("operator.bag=17", "haptic_master", "operator.bag", "17"),
         ("operator.center=[0, 0.01, 1e-3]", "haptic_master", "operator.center", (0.0, 0.01, 0.001)),

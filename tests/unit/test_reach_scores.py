@@ -355,8 +355,8 @@ def test_marks_of_published_figures_need_99_percent_and_the_table_says_so(path, 
     limits[5000 : 5000 + lost_ms] = Limit.WORKSPACE
     session.reach(session.stamps, limits)
     text = table_of(evaluate(session.write(path)))
-    assert "≤" in text
-    body = text.split("met:")[0].rpartition("\n")[0]  # without the caption, which explains them
+    assert "(0.338)" in text
+    body = text.split("agrees,")[0].rpartition("\n")[0]  # without the caption, which explains them
     has_marks = MET in body or NOT_MET in body
     assert has_marks is (told is None)
     assert ("too little to compare" in text) is (told is not None)
@@ -381,4 +381,4 @@ def test_recordings_of_before_have_dashes_and_no_marks(path):
         assert line.split()[-1] == "–"
     line = next(line for line in text.splitlines() if "too little to compare" in line)
     assert line.strip().endswith("not known")
-    assert MET not in text.split("met:")[0].rpartition("\n")[0]
+    assert MET not in text.split("agrees,")[0].rpartition("\n")[0]
