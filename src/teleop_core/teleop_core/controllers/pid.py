@@ -42,8 +42,9 @@ def critically_damped_gains(
     characteristic polynomial ``inertia (s + bandwidth)³``, critically damped: what disturbs it dies
     away without swinging. Its answer to the setpoint r is ``bandwidth² (3 b s + bandwidth) /
     (s + bandwidth)³``. With the whole setpoint in the proportional action, b = 1, the zero makes
-    a step overshoot by a quarter all the same, 10-22 % with friction; with b = 1/3 it cancels a
-    pole, ``bandwidth² / (s + bandwidth)²`` is left, and no step overshoots.
+    a step overshoot by 25 % all the same, 20 % at 1 kHz, and less where the setpoint moves no
+    faster than the drive. With b = 1/3 it cancels a pole, ``bandwidth² / (s + bandwidth)²`` is
+    left, and no step overshoots.
 
     Args:
         inertia: Inertias (n,) [kg·m² or kg], > 0.
