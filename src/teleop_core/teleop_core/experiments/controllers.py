@@ -17,7 +17,7 @@ from teleop_core.evaluation.figure import (
 )
 from teleop_core.evaluation.published import COARSE, FINE
 from teleop_core.experiments.bench import Bench, Session, Settings, mean, pooled
-from teleop_core.experiments.drawing import DARK, axis, level, line, points
+from teleop_core.experiments.drawing import DARK, Trace, axis, level, line, points
 from teleop_core.experiments.experiment import Experiment
 from teleop_core.experiments.joint_steps import StepAnswer, answer_to_steps
 from teleop_core.experiments.outcome import Findings, Row, percent
@@ -153,9 +153,14 @@ def _step_rows(answers: Mapping[str, StepAnswer]) -> list[Row]:
 def _measure(bench: Bench) -> Findings:
     rows, figures = [], []
     for scenario in MODES:
-        found = {law: [tracking_of(s) for s in compared(bench, scenario, law)] for law in LAWS}
+        found, traces = {}, []
+        for law, color in zip(LAWS, _COLORS, strict=True):
+            sessions = compared(bench, scenario, law)
+            # Read at once, for a bench lets go of what its older sessions recorded.
+            found[law] = [tracking_of(session) for session in sessions]
+            traces.append(_error_trace(sessions[0], law, color))
         rows += _tracking_rows(scenario, found)
-        figures += [_trade_figure(scenario, found), _error_figure(bench, scenario)]
+        figures += [_trade_figure(scenario, found), _error_figure(scenario, traces)]
     rows += _step_rows({law: steps_of(bench, law) for law in LAWS})
     return Findings(tuple(rows), tuple(figures), _NOTES)
 
@@ -190,14 +195,14 @@ def _trade_figure(scenario: str, found: Mapping[str, list[Tracking]]) -> Figure:
     return Figure(f"Error and its price, {MODES[scenario].mode}", sentence, traces, layout, 420)
 
 
-def _error_figure(bench: Bench, scenario: str) -> Figure:
-    traces = []
-    for law, color in zip(LAWS, _COLORS, strict=True):
-        session = compared(bench, scenario, law)[0]
-        kept = session.is_followed
-        wanted, seen = (session.places_mm(f"slave/{k}_cp")[kept] for k in ("setpoint", "measured"))
-        error = 1e3 * np.linalg.norm(seen - wanted, axis=1)[::_CURVE]
-        traces.append(line(session.time[kept][::_CURVE], error, law, color, 1.0, "µm"))
+def _error_trace(session: Session, law: str, color: str) -> Trace:
+    kept = session.is_followed
+    wanted, seen = (session.places_mm(f"slave/{k}_cp")[kept] for k in ("setpoint", "measured"))
+    error = 1e3 * np.linalg.norm(seen - wanted, axis=1)[::_CURVE]
+    return line(session.time[kept][::_CURVE], error, law, color, 1.0, "µm")
+
+
+def _error_figure(scenario: str, traces: list[Trace]) -> Figure:
     layout = {"xaxis": time_axis(), "yaxis": axis("tracking error", "µm", type="log")}
     sentence = "Distance of the tip from its setpoint, at the encoders, one hand."
     return Figure(f"Tracking error, {MODES[scenario].mode}", sentence, traces, layout, 420)
