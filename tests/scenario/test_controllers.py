@@ -68,3 +68,14 @@ def test_sessions_compared_differ_in_their_hands_alone(bench):
     sessions = compared(bench, "fine_box", "adaptive")
     assert [one.seed for one in sessions] == [5, 6, 7]
     assert {one.name for one in sessions} == {"fine_box"}
+
+
+def test_law_that_learns_suffers_least_from_friction_that_is_not_as_known(bench):
+    twice = tuple(2.0 * value for value in load_robot("rcrt1").hardware.coulomb)
+    settings = {"plant": "hardware", "plant.hardware.coulomb": twice}
+    known, learned = (
+        tracking_of(bench.session("coarse_box", settings={**settings, **LAWS[law]})).rms
+        for law in ("friction_compensation", "adaptive")
+    )
+    assert learned < 0.8 * known
+    assert learned <= GOAL_UM
