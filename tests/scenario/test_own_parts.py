@@ -7,7 +7,7 @@ import pytest
 
 from teleop_core.bags.reader import Bag
 from teleop_core.controllers import register_controller
-from teleop_core.controllers.pid import PID, pid_control
+from teleop_core.controllers.source_pid import SOURCE_PID, source_pid_control
 from teleop_core.errors import PartError
 from teleop_core.fixtures import register_fixture
 from teleop_core.fixtures.box import BOX
@@ -267,7 +267,8 @@ def test_sphere_holds_the_hand_at_the_same_distance_in_all_directions():
 
 
 def test_plain_controller_gives_the_same_bits_as_the_same_law_compiled(own_parts, plain):
-    register_controller(replace(PID, name="plain", control=pid_control.py_func))
+    law = source_pid_control.py_func
+    register_controller(replace(SOURCE_PID, name="plain", control=law))
     assert_same_streams(session("controller=plain", ticks=300), plain[:300])
 
 
@@ -283,7 +284,7 @@ def test_other_axis_map_moves_the_slave_along_other_axes():
     line = ("operator=line", "operator.size=[0.02, 0.0, 0.0]", "rotation=0.0",
             "operator.center=[0.0, 0.0, 0.0]", "operator.tilt=[0.0, 0.0, 0.0]")  # fmt: skip
     still = (*line, "approach_time=0.5", "operator.period=2.0", "buttons.fixture=[]",
-             "buttons.clutch=[]", "tremor_amplitude=0.0")  # fmt: skip
+             "buttons.clutch=[]", "tremor_amplitude=0.0", "starts_at_home=false")  # fmt: skip
     axes = {"['-z', '-x', '+y']": (1, -1.0), "['+x', '+y', '+z']": (0, 1.0),
             "['+y', '+z', '+x']": (2, 1.0), "['-x', '-y', '+z']": (0, -1.0)}  # fmt: skip
     for text, (axis, sign) in axes.items():
