@@ -166,9 +166,9 @@ def _measure(bench: Bench) -> Findings:
 
 
 _NOTES = (
-    "Every law has its gains by its own rule from the drive table; four numbers that the laws share "
-    "were looked at on the hand of seed 1 before they were fixed. Dry friction is known to the laws "
-    "as its fitted mean, not as it wanders.",
+    "Every law has its gains by its own rule from the drive table; four numbers that laws share "
+    "were looked at on the hand of seed 1 before they were fixed. Dry friction is known to the "
+    "laws as its fitted mean, not as it wanders.",
     "The true tip is 5.5 mm off by the d3 offset that calibration finds (teleop calibrate); no law "
     "at the encoders sees it, nor play and tendons. About its mean is what would be left.",
     "The plant has no elastic joints and no delay of drives beyond the tick; a machine that has "
