@@ -197,7 +197,10 @@ MASTER_MEASURED_CV = Topic("master/measured_cv", Kind.TWIST, SAMPLED, "master_ba
 MASTER_MEASURED_CF = Topic("master/measured_cf", Kind.WRENCH, SAMPLED, "master_base")
 MASTER_BUTTONS = Topic("master/buttons", Kind.BUTTONS, SAMPLED, "master_base")
 MASTER_CONTACT = Topic(
-    "master/contact", Kind.NUMBERS, SAMPLED, "master_base",
+    "master/contact",
+    Kind.NUMBERS,
+    SAMPLED,
+    "master_base",
     columns=("number", "taken", "returned", "friction", "largest_force"),
 )
 """Energy of the present contact, or the last one: how many there were, what the motors' force took
