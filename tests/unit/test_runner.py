@@ -56,11 +56,12 @@ def test_arms_that_begin_farther_away_are_waited_for_before_the_recorded_hand_mo
     again = api.replay(at_home)
     for topic in ("slave/setpoint_js", "slave/measured_cp"):
         assert np.array_equal(again[topic].values, at_home[topic].values)
-    later = api.replay(at_home, settings={"slave_sim.start": []})
+    elsewhere = {"slave_sim.start": [], "slave_sim.starts_at_home": False}
+    later = api.replay(at_home, settings=elsewhere)
     state, first_ns = at_home["teleop/state"], int(at_home["master/measured_cp"].stamp_ns[0])
     follows_ns = int(state.stamp_ns[np.argmax(state["is_following"] > 0.0)])
     waited = (follows_ns - first_ns) // TICK_NS
-    lead = VirtualTime(configure("coarse_box")).lead
+    lead = VirtualTime(configure("coarse_box", settings=["starts_at_home=false"])).lead
     assert len(later["slave/measured_js"]) == len(at_home["slave/measured_js"]) + lead - waited
     commands, hand = later["slave/servo_cp"][["x", "y", "z"]], later["master/measured_cp"]
     moved = hand[["z", "x", "y"]] * (-1.0, -1.0, 1.0)  # in the slave's axes

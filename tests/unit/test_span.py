@@ -21,7 +21,9 @@ def recording():
     # The hand begins 3.7 s after the recording, when the slave has reached its start posture.
     buttons = {"clutch": (5.5, 6.5), "fixture": (1.0,)}
     settings = {f"buttons.{name}": times for name, times in buttons.items()}
-    return tc.run("coarse_box", duration=10.0, approach_time=2.0, settings=settings)
+    return tc.run(
+        "coarse_box", duration=10.0, approach_time=2.0, starts_at_home=False, settings=settings
+    )
 
 
 @pytest.fixture(scope="module")
