@@ -99,7 +99,7 @@ class HumanParameters:
         source="assumed: fits the figures of people",
     )  # fmt: skip
     passing: float = parameter(
-        0.7, lower=0.0, upper=1.0, fixed=True, doc="share of targets at which the hand rests not",
+        0.75, lower=0.0, upper=1.0, fixed=True, doc="share of targets at which the hand rests not",
         source="assumed: fits the figures of people",
     )  # fmt: skip
     overlap: float = parameter(
