@@ -77,6 +77,18 @@ def test_numbers_that_made_rests_come_back_from_them(published):
         assert abs(again.value(f"wander.{name}") - 0.2) < 0.08
 
 
+def test_plain_squares_believe_point_1_and_weigh_less(published, found):
+    free = ["coulomb.theta2", "weight.m2b_L0b"]
+    robust, plain = (fit(published, slave(), free, loss=loss) for loss in ("cauchy", "linear"))
+    assert robust.value("weight.m2b_L0b") == pytest.approx(found.value("weight.m2b_L0b"), rel=0.05)
+    assert plain.value("weight.m2b_L0b") < 0.6 * robust.value("weight.m2b_L0b")
+
+
+def test_an_unknown_loss_is_refused(published):
+    with pytest.raises(UnknownNameError, match="cauchy, huber"):
+        fit(published, slave(), loss="tukey")
+
+
 def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published):
     free = default_free(ARM, published)
     assert "coulomb.d3" not in free

@@ -34,6 +34,10 @@ def add(commands: Any) -> None:
         metavar="NAME",
         help="what to fit (default: what the table can tell)",
     )
+    parser.add_argument(
+        "--loss", default="cauchy", metavar="NAME",
+        help="cauchy, huber, soft_l1 or linear: how fast what no model explains is let go",
+    )  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument(
         "--out", type=Path, metavar="FILE.yaml", help="write the plant as parameters, for --config"
@@ -52,7 +56,8 @@ def _run(arguments: argparse.Namespace) -> int:
     with shown_progress("fitting") as progress:
         found = fit_plant(
             arguments.table, robot=arguments.robot, free=arguments.free, files=arguments.config,
-            texts=arguments.settings, progress=lambda share: progress(round(100.0 * share), 100),
+            texts=arguments.settings, loss=arguments.loss,
+            progress=lambda share: progress(round(100.0 * share), 100),
         )  # fmt: skip
     print(found)
     if arguments.json is not None:

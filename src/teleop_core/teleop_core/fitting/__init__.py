@@ -10,10 +10,11 @@
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from teleop_core.fitting.fit import FitError, FitResult, Fitted, default_free, fit
+from teleop_core.fitting.fit import LOSSES, FitError, FitResult, Fitted, default_free, fit
 from teleop_core.fitting.table import PUBLISHED, RestTable, read_rests
 
 __all__ = [
+    "LOSSES",
     "PUBLISHED",
     "FitError",
     "FitResult",
@@ -37,6 +38,7 @@ def fit_plant(
     free: Sequence[str] | None = None,
     files: Iterable[Path | str] = (),
     texts: Iterable[str] = (),
+    loss: str = "cauchy",
     progress: Callable[[float], None] = _silent,
 ) -> FitResult:
     """Fit the plant ``hardware`` of a robot to where its joints came to rest.
@@ -47,6 +49,7 @@ def fit_plant(
         free: What is fitted, as of :func:`fit`; None for what the table can tell.
         files: Parameter files of the slave; what nothing says is the source's PID.
         texts: Parameters of the slave over them, ``key=value``.
+        loss: One of :data:`LOSSES`: how fast points that no model explains are let go.
         progress: Hears the share that is done, 0 to 1.
 
     Raises:
@@ -60,4 +63,5 @@ def fit_plant(
     made = configure(None, [Path(file) for file in files], [*given, *texts])
     slave = made.group("slave_sim")
     arm = load_robot_set(slave.robot, slave.geometry)
-    return fit(read_rests(Path(table or PUBLISHED), arm), slave, free, progress)
+    rests = read_rests(Path(table or PUBLISHED), arm)
+    return fit(rests, slave, free, progress, loss=loss)

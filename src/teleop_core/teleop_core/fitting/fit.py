@@ -31,6 +31,15 @@ _UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
 _WANDER = 0.3  # with which the answer to wandering friction is measured
 
 
+LOSSES: dict[str, Callable[[Array], Array]] = {
+    "cauchy": lambda r: 1.0 / (1.0 + r**2),
+    "huber": lambda r: 1.0 / np.maximum(1.0, np.abs(r)),
+    "soft_l1": lambda r: 1.0 / np.sqrt(1.0 + r**2),
+    "linear": np.ones_like,
+}
+"""Losses by the names of scipy, each with the weight of a residual: how fast it lets go."""
+
+
 class FitError(TeleopError):
     """A fit has no answer: it does not converge, or its parameters cannot be told apart."""
 
@@ -219,11 +228,13 @@ def fit(
     parameters: SlaveSimParameters,
     free: Sequence[str] | None = None,
     progress: Callable[[float], None] = lambda share: None,
+    *,
+    loss: str = "cauchy",
 ) -> FitResult:
     """Fit numbers of the plant ``hardware`` to where a machine came to rest.
 
-    Residuals count in standard deviations of the runs, with Cauchy's loss, which lets go of points
-    that no such model explains. Intervals are those of M-estimates. The wandering of friction
+    Residuals count in standard deviations of the runs; Cauchy's loss lets go of points that no
+    such model explains. Intervals are those of M-estimates. The wandering of friction
     follows afterwards, from the spread of the runs.
 
     Args:
@@ -232,15 +243,19 @@ def fit(
         free: ``coulomb.<joint>``, ``bias.<joint>``, ``weight.<name>``; None for
             :func:`default_free`.
         progress: Hears the share that is done.
+        loss: One of :data:`LOSSES`.
 
     Raises:
         ParameterError: Another plant.
+        UnknownNameError: No such loss.
         UnknownNameError: ``free`` names what cannot be fitted.
         FitError: The fit does not converge, or parameters cannot be told apart; they are named.
     """
     robot = load_robot_set(parameters.robot, parameters.geometry)
     if parameters.plant.kind.kind != "hardware":
         raise ParameterError("slave_sim.plant", parameters.plant.kind.kind, "hardware")
+    if loss not in LOSSES:
+        raise UnknownNameError("loss", loss, LOSSES)
     names = default_free(robot, table) if free is None else tuple(free)
     _insist_on_known(names, robot)
     problem = _Problem(robot, parameters, table, names)
@@ -251,14 +266,14 @@ def fit(
     progress(0.1)
     found = least_squares(
         problem.residuals, start, jac=problem.slopes, bounds=(lower, np.inf),  # type: ignore[arg-type]
-        loss="cauchy", max_nfev=_ROUNDS, xtol=1e-4, ftol=1e-4,
+        loss=loss, max_nfev=_ROUNDS, xtol=1e-4, ftol=1e-4,
     )  # fmt: skip
     if not found.success:
         raise FitError(
             f"the fit did not converge in {_ROUNDS} rounds; its cost is {found.cost:.3g}"
         )
     progress(0.7)
-    return _result(problem, found.x, problem.slopes(found.x), progress)
+    return _result(problem, found.x, problem.slopes(found.x), LOSSES[loss], progress)
 
 
 def _insist_on_known(names: Sequence[str], robot: Robot) -> None:
@@ -290,13 +305,16 @@ def _insist_on_identifiable(names: Sequence[str], slopes: Array) -> None:
 
 
 def _result(
-    problem: _Problem, x: Array, slopes: Array, progress: Callable[[float], None]
+    problem: _Problem,
+    x: Array,
+    slopes: Array,
+    weigh: Callable[[Array], Array],
+    progress: Callable[[float], None],
 ) -> FitResult:
     residuals = problem.residuals(x)
     used = np.abs(slopes).max(axis=1) > 0.0
     freedom = max(int(used.sum()) - len(x), 1)
-    # Covariance of an M-estimate (Huber 1967) of the loss ln(1 + r²), which is Cauchy's.
-    weights = 1.0 / (1.0 + residuals**2)
+    weights = weigh(residuals)  # covariance of an M-estimate: Huber 1967
     bend = np.linalg.inv(slopes.T @ (slopes * weights[:, None]))
     pull = slopes * (weights * residuals)[:, None]
     covariance = used.sum() / freedom * bend @ (pull.T @ pull) @ bend
