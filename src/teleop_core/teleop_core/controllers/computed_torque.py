@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.controllers import Controller, per_joint
+from teleop_core.controllers import Controller, fields, per_joint
 from teleop_core.controllers.motion import (
     MEMORY,
     approach,
@@ -26,7 +26,6 @@ from teleop_core.controllers.motion import (
 )
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
-from teleop_core.parameters import parameter
 from teleop_core.robots.robot import Robot
 
 _INTEGRAL, _WANTED = MEMORY, MEMORY + 1
@@ -36,19 +35,9 @@ _INTEGRAL, _WANTED = MEMORY, MEMORY + 1
 class ComputedTorqueParameters:
     """Poles; an empty list means: from the robot's drive table."""
 
-    bandwidth: tuple[float, ...] = parameter(
-        (), unit="rad/s", lower=0.1, upper=500.0, doc="triple closed-loop pole of each joint",
-        source="assumed: the drive table's, as of pid",
-    )  # fmt: skip
-    filter_ratio: float = parameter(
-        3.5, lower=1.0, upper=10.0,
-        doc="pole of the filters of motion over that of the loop, where encoder noise allows it",
-        source="assumed: the middle, √12, of the rule of two to six",
-    )  # fmt: skip
-    dead_band: float = parameter(
-        0.5, lower=0.0, upper=100.0, doc="encoder counts of error that the integral does not sum",
-        source="derived: the nearest count is never farther, so that the joint may rest there",
-    )  # fmt: skip
+    bandwidth: tuple[float, ...] = fields.bandwidth("triple")
+    filter_ratio: float = fields.ratio("filters of motion")
+    dead_band: float = fields.dead_band("that the integral does not sum")
 
 
 @kernel

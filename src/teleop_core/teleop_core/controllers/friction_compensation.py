@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.controllers import Controller, per_joint
+from teleop_core.controllers import Controller, fields, per_joint
 from teleop_core.controllers.motion import (
     MEMORY,
     approach,
@@ -30,7 +30,6 @@ from teleop_core.controllers.motion import (
 from teleop_core.controllers.pid import critically_damped_gains
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
-from teleop_core.parameters import parameter
 from teleop_core.robots.robot import Robot
 
 _INTEGRAL = MEMORY
@@ -40,27 +39,11 @@ _INTEGRAL = MEMORY
 class FrictionCompensationParameters:
     """Poles and what is known of friction; an empty list means: from the robot's drive table."""
 
-    bandwidth: tuple[float, ...] = parameter(
-        (), unit="rad/s", lower=0.1, upper=500.0, doc="triple closed-loop pole of each joint",
-        source="assumed: the drive table's, as of pid",
-    )  # fmt: skip
-    filter_ratio: float = parameter(
-        3.5, lower=1.0, upper=10.0,
-        doc="pole of the filters of motion over that of the loop, where encoder noise allows it",
-        source="assumed: the middle, √12, of the rule of two to six",
-    )  # fmt: skip
-    friction_share: float = parameter(
-        0.8, lower=0.0, upper=1.5, doc="share of known dry friction that is fed forward",
-        source="assumed: less than all of it, for what is too much pushes the joint ahead",
-    )  # fmt: skip
-    friction_counts: float = parameter(
-        4.0, lower=0.1, upper=1000.0, doc="encoder counts of travel that turn dry friction on",
-        source="assumed: a joint gives by a few encoder counts before it slips",
-    )  # fmt: skip
-    dead_band: float = parameter(
-        0.5, lower=0.0, upper=100.0, doc="encoder counts of error that the integral does not sum",
-        source="derived: the nearest count is never farther, so that the joint may rest there",
-    )  # fmt: skip
+    bandwidth: tuple[float, ...] = fields.bandwidth("triple")
+    filter_ratio: float = fields.ratio("filters of motion")
+    friction_share: float = fields.friction_share("that is fed forward")
+    friction_counts: float = fields.friction_counts()
+    dead_band: float = fields.dead_band("that the integral does not sum")
 
 
 @kernel
