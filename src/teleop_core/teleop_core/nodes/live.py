@@ -63,21 +63,41 @@ def live(
     ):
         session = _Session(configuration, out, console, observer, Path(folder), env)
         session.crews = _crews(configuration.graph, is_composed=is_composed)
-        with _terminable():
+        with session.interrupt.caught():
             session.run()
 
 
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Let SIGTERM end the session as Ctrl-C does; outside the main thread nothing changes."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+class _Interrupt:
+    """Whether Ctrl-C or SIGTERM came; a KeyboardInterrupt alone is lost in a finaliser."""
+
+    def __init__(self) -> None:
+        self.has_come = False
+
+    def __call__(self, *_: object) -> None:
+        self.has_come = True
+        raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Interrupt what runs now, if the signal came.
+
+        Raises:
+            KeyboardInterrupt: It did.
+        """
+        if self.has_come:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """Take both signals meanwhile; outside the main thread nothing changes."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = {number: signal.signal(number, self) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
 class _Session:
@@ -99,6 +119,7 @@ class _Session:
         self._parameters.write_text(parameter_file(configuration, str(out)))
         self._children: dict[str, Child] = {}
         self._ready = 0.0
+        self.interrupt = _Interrupt()
         self.crews = _crews(self._graph, is_composed=False)
 
     def run(self) -> None:
@@ -153,11 +174,13 @@ class _Session:
                 self._say(f"{shown:3d}/{self._duration:g} s  {self._line()}")
 
     def _check_alive(self) -> None:
+        self.interrupt.check()
         for child in self._children.values():
             child.check()
 
     def _check(self) -> None:
-        """Make sure that all processes run and all nodes report."""
+        """Make sure that nobody stops it, all processes run and all nodes report."""
+        self.interrupt.check()
         for crew in self.crews:
             for name in [name for name in crew if name in self._children]:
                 child = self._children[name]
