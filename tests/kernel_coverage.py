@@ -25,7 +25,7 @@ TESTS = (
     "inverse_kinematics", "operators", "end_stops", "rcrt1", "rcrt1_dynamics", "stewart", "rps3",
     "four_bar", "scara", "planar_3r", "five_axis", "puma560", "mma", "mma_models", "mma_balance",
     "mma_ik", "three_finger_hand", "scara_stewart", "dh", "dh_arms", "robots", "fixture_parts",
-    "controller_parts", "limits", "interpolation",
+    "controller_parts", "limits", "interpolation", "source_pid", "rigid_body", "motion_estimates",
 )  # fmt: skip
 # Seconds of simulated time or thousands of poses, on lines that others reach too.
 SLOW = (
