@@ -14,6 +14,7 @@ from teleop_core.robots import load_robot
 from teleop_core.robots.hardware import ENTRIES, Hardware
 from teleop_core.robots.link_errors import LinkErrors
 from teleop_core.session.configuration import configure
+from teleop_core.signals import TICK_NS
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 
 ARM = load_robot("rcrt1")
@@ -60,6 +61,18 @@ def test_bias_and_weight_push_a_joint_without_friction_off_by_their_size_over_kp
     step = ARM.drives.encoder_step
     assert np.abs(off - expected)[[0, 1, 3, 4, 5]].max() < 2 * step.max()
     assert abs(off[1]) > 10 * step[1]  # the weight is felt
+
+
+@pytest.mark.parametrize("law", ["pid", "friction_compensation", "adaptive"])
+def test_a_law_that_can_hold_bias_and_weight_begins_in_balance(law):
+    # Without friction whatever is not held moves axis 1, of the bias, or 2, of the weight, at once.
+    made = SlaveSim(slave(controller=law, starts_at_home=True,
+                          **{"plant.hardware.without": ("friction", "wandering")}))  # fmt: skip
+    for tick in range(1, 301):
+        made.signals["now_ns"] = tick * TICK_NS
+        made.step()
+        off = np.abs(made.arm.q - ARM.home)[:2]
+        assert (off < 1.5 * ARM.drives.encoder_step[:2]).all(), tick
 
 
 def test_encoders_see_nothing_that_lies_behind_them():

@@ -13,7 +13,7 @@ from teleop_core.evaluation.score import Score, Session
 from teleop_core.evaluation.summary import side_by_side
 
 MET, NOT_MET = "✓", "✗"
-LABEL_WIDTH, COLUMN_WIDTH = 26, 18
+COLUMN_WIDTH = 18
 
 
 def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
@@ -23,7 +23,8 @@ def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
         scores: One or more.
         width: Room on the terminal, in characters.
     """
-    fitting = max(1, (width - LABEL_WIDTH) // COLUMN_WIDTH)
+    label = max((len(f"  {line.label} {line.unit} ") for line in side_by_side(scores)), default=0)
+    fitting = max(1, (width - label) // COLUMN_WIDTH)
     return [score_table(scores[i : i + fitting]) for i in range(0, len(scores), fitting)]
 
 

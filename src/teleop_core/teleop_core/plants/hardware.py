@@ -35,7 +35,7 @@ class HardwareParameters:
     """Which faults there are, numbers in place of the robot's, and what no robot states."""
 
     without: tuple[str, ...] = parameter(
-        (), choices=tuple(FAULTS), doc="faults that are left out, to see what they add"
+        (), choices=tuple(FAULTS), fixed=True, doc="faults that are left out, to see what they add"
     )
     coulomb: tuple[float, ...] = parameter(
         (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the robot's"
@@ -52,8 +52,9 @@ class HardwareParameters:
         doc="half width of the play behind each encoder; empty: the robot's",
     )  # fmt: skip
     weights: tuple[str, ...] = parameter(
-        (), doc="symbol=value of the dynamics that the source does not state; empty: the robot's"
-    )
+        (), fixed=True,
+        doc="symbol=value of the dynamics that the source does not state; empty: the robot's",
+    )  # fmt: skip
     bristle_frequency: float = parameter(
         250.0, unit="rad/s", lower=10.0, upper=2000.0,
         doc="at which a joint swings on its friction before it slips",

@@ -313,7 +313,8 @@ class SlaveSim(RunningStage):
         s["noise"] = (
             np.random.SeedSequence(self._seed).generate_state(self.robot.n) % 2147483646 + 1
         )
-        held = self._gravity() * (1.0 - self.parameters["compensated"])
+        relieved = self._gravity(arm.model) * self.parameters["compensated"]
+        held = self._gravity(arm.dynamics) - relieved - self.parameters["bias"]
         self._law.begin(arm.memory, np.array(s["measured"]), held)
         row, transform = self.signals, np.empty((4, 4))
         row["slave_setpoint_js"] = home
@@ -342,7 +343,8 @@ class SlaveSim(RunningStage):
         compensated = {
             "published": robot.dynamics.compensated, "all": 1.0, "none": 0.0
         }[parameters.gravity_compensation]  # fmt: skip
-        self._law.shift(self.arm.memory, self._gravity() * (p["compensated"] - compensated))
+        relieved = self._gravity(self.arm.model)
+        self._law.shift(self.arm.memory, relieved * (p["compensated"] - compensated))
         p["compensated"] = compensated
         lag = parameters.reference_filter
         p["is_filtered"], p["filter_gain"] = lag.is_on, lag.gain
@@ -393,11 +395,11 @@ class SlaveSim(RunningStage):
         table = self._law.gains(parameters.controller.kind.parameters, self.robot, viscous)
         return np.array(table, dtype=np.float64, order="C")
 
-    def _gravity(self) -> Array:
-        """Effort (n,) that holds the arm where it is [N·m or N]."""
+    def _gravity(self, dynamics: Array) -> Array:
+        """Effort (n,) that holds an arm of these dynamics where it is [N·m or N]."""
         assert self.robot.dynamics is not None
         effort = np.zeros(self.robot.n)
-        self.robot.dynamics.gravity(self.arm.q, self.arm.dynamics, effort)
+        self.robot.dynamics.gravity(self.arm.q, dynamics, effort)
         return effort
 
     @property
