@@ -16,7 +16,7 @@ from teleop_core.evaluation.html_table import html_table
 from teleop_core.evaluation.packing import bits_within, deflated, pack
 from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_core.evaluation.preview import preview
-from teleop_core.evaluation.published import SOURCE
+from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE
 from teleop_core.evaluation.score import Score, facts
 from teleop_core.evaluation.scoring import Study
 from teleop_core.evaluation.traces import spacing_s
@@ -129,7 +129,8 @@ def _header(scores: Sequence[Score]) -> str:
     return (
         "<h1>Teleoperation report</h1>\n"
         f'<p class="facts">Scores beside the published figures of the RCRT-1 ({escape(SOURCE)}), '
-        "presumably taken against the filtered reference too.</p>\n"
+        "presumably taken against the filtered reference too. ✓ agrees, ✗ does not: position RMS "
+        f"within {100.0 * POSITION_SHARE:.0f} %, angles within a factor of {ANGLE_FACTOR:g}.</p>\n"
         f"<nav>{links}</nav>"
     )
 
