@@ -1,12 +1,15 @@
 """MCAP file being written: whole chunks behind each other, an index at the end.
 
-Nothing is buffered: what :meth:`McapFile.append` has accepted is with the operating system. The
-file can be finished at the end of any of its whole chunks, which is what happens on a full disk.
+Nothing is buffered: what :meth:`McapFile.append` has accepted is with the operating system. A
+chunk that could not be written whole is cut off again; whole chunks are never given up.
 """
 
+import os
+import shutil
 import struct
 import zlib
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -80,7 +83,7 @@ class McapFile:
         self._compression, self._compress = compression.encode(), compress
         self._chunks: list[_Written] = []
         self._metadata: list[MetadataIndex] = []
-        self._file = path.open("xb", buffering=0)
+        self._file = path.open("x+b", buffering=0)
         start = MAGIC + encode(Header("ros2", f"teleop_core {__version__}"), *schemas, *channels)
         for name, entries in metadata.items():
             record = encode(Metadata(name, entries))
@@ -139,12 +142,13 @@ class McapFile:
         counts = {channel: len(entries) for channel, entries in chunk.index.items()}
         self._chunks.append(_Written(record, counts, at + len(index)))
 
-    def drop_last(self) -> bool:
-        """Give up the last chunk, to make room; False if there is none."""
-        if not self._chunks:
-            return False
-        self._chunks.pop()
-        return True
+    def sync(self) -> None:
+        """Wait until what was appended is on the disk: it outlasts a loss of power then.
+
+        Raises:
+            OSError: The disk refuses it.
+        """
+        os.fdatasync(self._file.fileno())
 
     def statistics(self) -> Statistics:
         """Numbers and times of the messages in whole chunks."""
@@ -164,12 +168,44 @@ class McapFile:
         """Write index and footer behind the last whole chunk.
 
         Raises:
-            OSError: There is no room; :meth:`drop_last` makes some, then try again.
+            OSError: There is no room for them; the file ends behind its last whole chunk.
         """
+        try:
+            self._cut()
+            end = encode(DataEnd(0))
+            self._write(end + self._summary(self._end + len(end)) + MAGIC)
+        except OSError:
+            with suppress(OSError):
+                self._cut()
+            raise
+
+    def _cut(self) -> None:
+        """Take away what stands behind the last whole chunk."""
         self._file.seek(self._end)
         self._file.truncate()
-        end = encode(DataEnd(0))
-        self._write(end + self._summary(self._end + len(end)) + MAGIC)
+
+    @property
+    def place(self) -> Path | None:
+        """Where the file is now, also if somebody moved it; None if it was removed."""
+        own = os.fstat(self._file.fileno())
+        with suppress(OSError):
+            if os.path.samestat(own, self.path.stat()):
+                return self.path
+        if not own.st_nlink:
+            return None
+        with suppress(OSError):  # Linux tells
+            return Path(os.readlink(f"/proc/self/fd/{self._file.fileno()}"))
+        return self.path
+
+    def copy_to(self, path: Path) -> None:
+        """Write all that is in the file to a new one, as after its removal.
+
+        Raises:
+            OSError: The new one exists already or cannot be written.
+        """
+        self._file.seek(0)
+        with path.open("xb") as copy:
+            shutil.copyfileobj(self._file, copy, 1 << 20)
 
     def _summary(self, start: int) -> bytes:
         groups = {

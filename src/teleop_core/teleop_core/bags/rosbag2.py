@@ -1,8 +1,9 @@
 """The rosbag2 side of a recording: topics as MCAP records, and ``metadata.yaml``."""
 
+import errno
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -152,10 +153,13 @@ def write_metadata(directory: Path, text: str) -> None:
     Raises:
         OSError: Not written.
     """
-    draft = directory / "metadata.yaml.part"
+    draft, final = directory / "metadata.yaml.part", directory / "metadata.yaml"
     try:
+        if final.exists():  # of another recording, into whose directory ours was moved
+            raise FileExistsError(errno.EEXIST, f"{final.name} is there already", str(final))
         draft.write_text(text, encoding="utf-8")
-        draft.replace(directory / "metadata.yaml")
+        draft.replace(final)
     except OSError:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
         raise

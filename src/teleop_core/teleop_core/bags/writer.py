@@ -7,7 +7,6 @@ that the same calls give the same bytes. Everything given to the writer is copie
 import queue
 import threading
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -15,7 +14,7 @@ from types import TracebackType
 import numpy as np
 
 from teleop_core.bags import compression as compressions
-from teleop_core.bags import rosbag2
+from teleop_core.bags import ending, rosbag2
 from teleop_core.bags.chunks import Messages, Single, Stretch, assemble, split
 from teleop_core.bags.layouts import SECOND_NS, Layout, Stamps, Values, layout
 from teleop_core.bags.mcap_file import McapFile
@@ -24,7 +23,8 @@ from teleop_core.errors import ParameterError, RecordingError, ShapeError, Unkno
 from teleop_core.topics import Kind, Topic
 
 CHUNK_BYTES = 1 << 20
-QUEUE_LENGTH = 8  # blocks, or seconds of live messages, that wait for a slow disk
+QUEUE_LENGTH = 8
+"""Seconds of a session that wait for a slow disk, before callers wait too."""
 METADATA_NAME = "teleop_core"
 Block = Mapping[Topic, tuple[Stamps, Values, Stamps]]
 
@@ -56,6 +56,9 @@ class BagWriter:
         compression: Takes the place of ``parameters.compression``.
         metadata: Names and texts stored with the recording: configuration, seed.
         start_ns: Log time at which the session starts, [ns].
+        hold_ns: Longest log time for which single messages wait for more of them, [ns]. Shorter
+            than a second means a live recording: what was handed over is brought to the disk at
+            once, so that neither the end of the process nor a loss of power costs more.
 
     Raises:
         RecordingError: The path exists already or cannot be written.
@@ -71,8 +74,9 @@ class BagWriter:
         compression: str | None = None,
         metadata: Mapping[str, str] | None = None,
         start_ns: int = 0,
+        hold_ns: int = SECOND_NS,
     ) -> None:
-        self.path, self._start_ns = Path(path), start_ns
+        self.path, self._start_ns, self._hold_ns = Path(path), start_ns, hold_ns
         self.parameters = parameters or RecordingParameters()
         if compression is not None:
             self.parameters = replace(self.parameters, compression=compression)
@@ -93,7 +97,9 @@ class BagWriter:
         self._failure: BaseException | None = None
         self._is_open = True
         self._mcap = self._create({METADATA_NAME: dict(metadata or {})})
-        self._jobs: queue.Queue[Messages | None] = queue.Queue(maxsize=QUEUE_LENGTH)
+        self._jobs: queue.Queue[Messages | None] = queue.Queue(
+            maxsize=QUEUE_LENGTH * max(1, SECOND_NS // hold_ns)
+        )
         self._worker = threading.Thread(target=self._work, name="bag writer", daemon=True)
         self._worker.start()
 
@@ -136,8 +142,10 @@ class BagWriter:
         self._singles.append((channel.number, channel.recorded, log_ns, publish_ns, data))
         channel.recorded += 1
         self._bytes += len(data)
-        if self._bytes > CHUNK_BYTES or log_ns - self._first_ns >= SECOND_NS:
+        if self._bytes > CHUNK_BYTES:
             self.flush()
+        else:
+            self.flush_older(log_ns)
 
     def write_block(self, block: Block) -> None:
         """Record samples of streams, at best about a second of them at a time.
@@ -169,6 +177,18 @@ class BagWriter:
             RecordingError: Writing has failed, now or earlier.
         """
         self._hand_over([])
+
+    def flush_older(self, now_ns: int) -> None:
+        """Hand single messages to the disk if the first of them has waited long enough.
+
+        Args:
+            now_ns: Log time now, [ns]; a clock that was set back lets nothing wait for longer.
+
+        Raises:
+            RecordingError: Writing has failed, now or earlier.
+        """
+        if self._singles and abs(now_ns - self._first_ns) >= self._hold_ns:
+            self.flush()
 
     def close(self) -> None:
         """Write what is left and finish the recording; further calls do nothing.
@@ -219,50 +239,24 @@ class BagWriter:
 
     def _work(self) -> None:
         jobs = iter(self._jobs.get, None)
+        stopped: OSError | None = None
         try:
             for stretches, singles in jobs:
                 for part in split(stretches, singles, CHUNK_BYTES):
                     self._mcap.append(assemble(*part))
-            self._finish()
+                if self._hold_ns < SECOND_NS and self._jobs.empty():
+                    self._mcap.sync()
         except OSError as error:
-            self._failure = self._salvage(error)
+            stopped = error
         except BaseException as error:  # a fault of ours: what is written stays readable
             self._failure = error
-            with suppress(OSError):
-                self._finish()
+        try:
+            told = ending.end(self.path, self._mcap, self._start_ns, stopped)
+            self._failure = self._failure or told
         finally:
             self._mcap.close()
         for _ in jobs:  # callers must never wait for a dead thread
             pass
-
-    def _finish(self) -> None:
-        """End the file and the directory behind the last chunk for which there is room."""
-        while True:
-            try:
-                self._mcap.finish()
-                mcap = self._mcap
-                rosbag2.write_metadata(
-                    self.path,
-                    rosbag2.metadata_text(
-                        mcap.path, mcap.schemas, mcap.channels, mcap.statistics(), self._start_ns
-                    ),
-                )
-            except OSError:
-                if not self._mcap.drop_last():
-                    raise
-            else:
-                return
-
-    def _salvage(self, error: OSError) -> RecordingError:
-        reason = f"cannot be written any further ({error.strerror}); "
-        try:
-            self._finish()
-        except OSError:
-            return RecordingError(self.path, reason + "nothing could be saved")
-        safe = self._mcap.statistics()
-        seconds = max(0, safe.message_end_time - self._start_ns) / SECOND_NS
-        text = f"the first {seconds:.1f} s ({safe.message_count} messages) are safe"
-        return RecordingError(self.path, reason + text)
 
 
 def _stretch(

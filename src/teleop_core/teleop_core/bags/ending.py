@@ -1,0 +1,77 @@
+"""Ending of a recording: index and metadata, for which recorded messages are never given up."""
+
+from pathlib import Path
+
+from teleop_core.bags import rosbag2
+from teleop_core.bags.layouts import SECOND_NS
+from teleop_core.bags.mcap_file import McapFile
+from teleop_core.errors import RecordingError
+
+
+def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None) -> Exception | None:
+    """Finish file and directory, wherever they are now.
+
+    Args:
+        path: Directory as it was made.
+        file: What was written to it, whole chunk by whole chunk.
+        start_ns: Log time at which the session started, [ns].
+        stopped: What kept a chunk from being written; None if all were.
+
+    Returns:
+        What to tell who recorded; None if all is where it should be.
+    """
+    found = file.statistics()
+    if stopped is None:
+        what = f"all {found.message_count} messages"
+    else:
+        seconds = max(0, found.message_end_time - start_ns) / SECOND_NS
+        what = f"the first {seconds:.1f} s ({found.message_count} messages)"
+    said = f"cannot be written any further ({stopped.strerror}); " if stopped else ""
+    try:
+        home = _finished(path, file, start_ns)
+    except OSError as error:
+        kept = file.place
+        if kept is None:
+            reason = f"was removed and cannot be made again ({error.strerror}); nothing is left"
+            return RecordingError(path, said + reason)
+        reason = f"cannot be finished ({error.strerror}), but holds {what}; "
+        return RecordingError(kept.parent, f"{said}{reason}`teleop recover {kept}` completes it")
+    if home == path:
+        return RecordingError(path, f"{said}was removed meanwhile, and is there again with {what}")
+    if home is not None:
+        return RecordingError(path, f"{said}was moved or removed meanwhile; {what} are in {home}")
+    return RecordingError(path, f"{said}{what} are safe") if stopped else None
+
+
+def _finished(path: Path, file: McapFile, start_ns: int) -> Path | None:
+    """Write what ends a recording; where it is, unless it was where it was made all the time.
+
+    Raises:
+        OSError: Something could not be written; every chunk is still there.
+    """
+    file.finish()
+    place = file.place
+    is_moved = place != file.path
+    if place is None:
+        place = _made_again(path, file)
+    text = rosbag2.metadata_text(place, file.schemas, file.channels, file.statistics(), start_ns)
+    rosbag2.write_metadata(place.parent, text)
+    return place.parent if is_moved else None
+
+
+def _made_again(path: Path, file: McapFile) -> Path:
+    """Copy of a file that was removed, which is still there for who writes it.
+
+    Raises:
+        OSError: It cannot be written, neither where it was nor beside it.
+    """
+    try:
+        return _copy(file, path)
+    except OSError:
+        return _copy(file, path.with_name(f"{path.name}_rescued"))
+
+
+def _copy(file: McapFile, home: Path) -> Path:
+    home.mkdir(parents=True, exist_ok=True)
+    file.copy_to(home / file.path.name)
+    return home / file.path.name

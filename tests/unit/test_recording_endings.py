@@ -1,0 +1,132 @@
+"""Ends of recordings when their directory is moved, removed or in the way, and on a full disk."""
+
+import resource
+import shutil
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+
+from teleop_core import topics
+from teleop_core.bags.reader import Bag, recover
+from teleop_core.bags.source import McapSource
+from teleop_core.bags.writer import BagWriter
+from teleop_core.errors import RecordingError
+
+JOINTS = tuple("abcdef")
+TOPIC = topics.SLAVE_MEASURED_JS
+SECONDS = 4
+MS = 1_000_000
+
+
+def second(number: int) -> dict:
+    times = np.arange(number * 1000, (number + 1) * 1000) * MS
+    values = np.random.default_rng(number).normal(size=(1000, TOPIC.width(6)))
+    return {TOPIC: (times, values, times)}
+
+
+def record(path: Path, meanwhile, **options) -> str:
+    """Record some seconds, do something before the last, and return what the writer told."""
+    writer = BagWriter(path, [TOPIC], JOINTS, compression="none", **options)
+    for number in range(SECONDS):
+        if number == SECONDS - 1:
+            meanwhile(path)
+        writer.write_block(second(number))
+    with pytest.raises(RecordingError) as told:
+        writer.close()
+    return str(told.value)
+
+
+def assert_holds(path: Path, count: int = SECONDS * 1000) -> None:
+    """Every reader finds all messages."""
+    series = Bag(path).read(TOPIC)
+    np.testing.assert_array_equal(series.stamp_ns, np.arange(count) * MS)
+    with AnyReader([path]) as reader:
+        assert sum(1 for _ in reader.messages()) == count
+
+
+def test_a_moved_directory_is_finished_where_it_is_and_its_new_place_told(tmp_path):
+    told = record(tmp_path / "bag", lambda path: path.rename(tmp_path / "elsewhere"))
+    assert f"all 4000 messages are in {tmp_path / 'elsewhere'}" in told
+    assert "\n" not in told
+    assert_holds(tmp_path / "elsewhere")
+
+
+def test_a_removed_directory_is_made_again_with_every_message(tmp_path):
+    told = record(tmp_path / "bag", shutil.rmtree)
+    assert "was removed meanwhile, and is there again with all 4000 messages" in told
+    assert_holds(tmp_path / "bag")
+
+
+def test_a_removed_directory_whose_name_is_taken_is_made_beside_it(tmp_path):
+    def replace(path: Path) -> None:
+        shutil.rmtree(path)
+        path.write_text("taken")
+
+    told = record(tmp_path / "bag", replace)
+    assert f"all 4000 messages are in {tmp_path / 'bag_rescued'}" in told
+    assert_holds(tmp_path / "bag_rescued")
+
+
+def test_metadata_that_cannot_be_written_cost_no_message(tmp_path):
+    told = record(tmp_path / "bag", lambda path: (path / "metadata.yaml").mkdir())
+    assert "holds all 4000 messages" in told
+    assert f"`teleop recover {tmp_path / 'bag'}/bag_0.mcap` completes it" in told
+    assert (tmp_path / "bag" / "bag_0.mcap").stat().st_size > 4000 * TOPIC.width(6) * 8
+    out, count = recover(tmp_path / "bag" / "bag_0.mcap")
+    assert count == 4000
+    assert_holds(out)
+
+
+def test_a_file_moved_into_another_recording_leaves_that_one_alone(tmp_path):
+    with BagWriter(tmp_path / "other", [TOPIC], JOINTS) as writer:
+        writer.write_block(second(0))
+    before = (tmp_path / "other" / "metadata.yaml").read_bytes()
+    told = record(
+        tmp_path / "bag",
+        lambda path: (path / "bag_0.mcap").rename(tmp_path / "other" / "bag_0.mcap"),
+    )
+    assert (tmp_path / "other" / "metadata.yaml").read_bytes() == before
+    assert f"teleop recover {tmp_path / 'other' / 'bag_0.mcap'}" in told
+    out, count = recover(tmp_path / "other" / "bag_0.mcap", tmp_path / "saved")
+    assert (out, count) == (tmp_path / "saved", 4000)
+
+
+@pytest.fixture
+def file_limit() -> Iterator[None]:
+    """Files that a test makes may have a certain size from some time on."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.mark.parametrize("room", [10, 2000, 20_000, 100_000])
+def test_a_full_disk_costs_no_message_that_was_written_whole(file_limit, tmp_path, room):
+    """However little room is left: chunks are whole, and recover finds them all."""
+
+    def fill(path: Path) -> None:
+        file = path / "bag_0.mcap"
+        while McapSource(file, is_whole=False).contents.counts.total() < 3000:
+            writer.flush()
+        size = file.stat().st_size + room
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+
+    path = tmp_path / "bag"
+    writer = BagWriter(path, [TOPIC], JOINTS, compression="none")
+    for number in range(SECONDS):
+        if number == SECONDS - 1:
+            fill(path)
+        writer.write_block(second(number))
+    with pytest.raises(RecordingError) as told:
+        writer.close()
+    resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    assert "(3000 messages)" in str(told.value)
+    if "recover" in str(told.value):
+        path, count = recover(path)
+        assert count == 3000
+    assert_holds(path, 3000)
