@@ -23,11 +23,13 @@ from teleop_core.bags.layouts import (
     layout_of,
 )
 from teleop_core.bags.reports import Report, read_reports, report
+from teleop_core.bags.ros_types import deserialise
 from teleop_core.topics import Kind
 
 __all__ = [
     "SECOND_NS", "Layout", "Refusal", "Report", "Stamps", "Values", "check", "discover", "layout",
-    "layout_of", "read_numbers", "read_reports", "read_values", "report", "write_values",
+    "layout_of", "read_any", "read_numbers", "read_reports", "read_values", "report",
+    "write_values",
 ]  # fmt: skip
 
 QUATERNION_TOLERANCE = 1e-3
@@ -41,6 +43,7 @@ class Refusal(Enum):
     NOT_NEWER = "its stamp is not newer than the last one"
     WRONG_NAMES = "lacks a name that it must have, as of a joint of the robot"
     WRONG_LENGTH = "has too few or too many numbers"
+    MALFORMED = "has bytes that are no message of its type"
 
 
 def check(kind: Kind, stamp_ns: int, values: Values, last_stamp_ns: int | None) -> Refusal | None:
@@ -86,9 +89,30 @@ def read_values(
     return stamp.sec * SECOND_NS + stamp.nanosec, np.array(values, dtype=np.float64)
 
 
+def read_any(
+    kind: Kind, data: bytes, joint_names: tuple[str, ...] = ()
+) -> tuple[int, Values] | Refusal:
+    """Stamp [ns] and values of the bytes of any message of a kind; or why it cannot be used.
+
+    Args:
+        kind: What the values are.
+        data: Bytes from anywhere.
+        joint_names: As of :func:`read_values`.
+    """
+    try:
+        message = deserialise(data, kind.ros_type)
+    except ValueError:
+        return Refusal.MALFORMED
+    return read_values(kind, message, joint_names)
+
+
 def read_numbers(data: bytes, columns: tuple[str, ...]) -> tuple[int, Values] | Refusal:
     """Stamp [ns] and the named numbers, shape (columns,), of a report; or why it has none."""
-    for found in read_reports(data):
+    try:
+        reports = read_reports(data)
+    except ValueError:
+        return Refusal.MALFORMED
+    for found in reports:
         try:
             row = [float(found.values[name]) for name in columns]
         except (KeyError, ValueError):

@@ -1,5 +1,6 @@
 """Reading recordings, our own and those of others, as columns or message by message."""
 
+import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from teleop_core.bags.messages import Report, read_reports
+from teleop_core.bags.messages import Refusal, Report, read_reports
 from teleop_core.bags.ordered import in_order
 from teleop_core.bags.recovery import recover
 from teleop_core.bags.series import Column, Series, join, kind_of
@@ -159,6 +160,11 @@ class Bag:
                 except ValueError as error:
                     raise RecordingError(self.path, f"{name} {error}") from error
             yield block
+        for column in columns.values():
+            if column.total and column.left_out.total() == column.total:
+                raise RecordingError(self.path, f"has nothing to read: {column.notes()[0]}")
+            for note in column.notes():
+                warnings.warn(f"{self.path.name}: {note}", stacklevel=4)
 
     def _records(self, names: Iterable[str]) -> Iterator[tuple[McapSource, Records]]:
         for source in self._sources:
@@ -180,12 +186,18 @@ class Bag:
             RecordingError: The topic is missing or carries something else.
         """
         self.require([topic])
-        out = []
+        out: list[Report] = []
+        left_out = 0
         for _, _, _, data in self.raw([topic]):
             try:
                 out += read_reports(data)
-            except ValueError as error:
-                raise RecordingError(self.path, f"{_name(topic)}: {error}") from error
+            except ValueError:
+                left_out += 1
+        if left_out:
+            note = f"{_name(topic)}: {left_out} messages, each {Refusal.MALFORMED.value}"
+            if not out:
+                raise RecordingError(self.path, f"has nothing to read: {note}")
+            warnings.warn(f"{self.path.name}: left out of {note}", stacklevel=2)
         return out
 
     def raw(

@@ -1,13 +1,15 @@
 """Series: the messages of one topic as columns, collected stretch by stretch."""
 
+from collections import Counter
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags import ros_types
 from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values, discover
-from teleop_core.bags.messages import Refusal, read_values
+from teleop_core.bags.messages import Refusal, read_any
 from teleop_core.bags.walk import gather
 from teleop_core.topics import BY_NAME, Kind
 
@@ -49,13 +51,21 @@ def kind_of(name: str, ros_type: str) -> Kind | None:
     return next((kind for kind in reversed(Kind) if kind.ros_type == ros_type), None)
 
 
+class UnreadableError(ValueError):
+    """Bytes are no message of their type."""
+
+
 class Column:
-    """Reader of one topic's messages.
+    """Reader of one topic's messages; what is no message of the topic is left out and counted.
 
     Args:
         name: Topic.
         kind: What its values are; for joints of a foreign topic the first message decides.
         joint_names: Wanted order of the joints; empty for that of the first message.
+
+    Attributes:
+        total: Number of messages seen.
+        left_out: Number of those that are none of the topic, by reason.
     """
 
     def __init__(self, name: str, kind: Kind, joint_names: tuple[str, ...]) -> None:
@@ -64,28 +74,50 @@ class Column:
         self.names: tuple[str, ...] = ()
         self.frame_id = ""
         self._is_new = True
+        self.total, self.left_out = 0, Counter[Refusal]()
 
     def read(self, data: Bytes, begins: Stamps, sizes: Stamps, log_ns: Stamps) -> Series:
         """Series of messages ``data[begins[i] : begins[i] + sizes[i]]``.
 
         Raises:
-            ValueError: A message is not what its topic promises; the text says why.
+            ValueError: The topic lacks joints that are wanted; the text says which.
         """
-        if self._is_new and len(begins):
-            self._learn(bytes(data[begins[0] : begins[0] + sizes[0]]))
-        stamps, values = self._fast(data, begins, sizes) or self._slow(data, begins, sizes)
-        return Series(stamps, log_ns.copy(), values, self.names, self.frame_id)
+        self.total += len(begins)
+        if self._is_new:
+            self._begin(data, begins, sizes)
+        found = self._fast(data, begins, sizes)
+        if found is not None:
+            return Series(found[0], log_ns.copy(), found[1], self.names, self.frame_id)
+        stamps, values, kept = self._slow(data, begins, sizes)
+        return Series(stamps, log_ns[kept], values, self.names, self.frame_id)
+
+    def notes(self) -> list[str]:
+        """What was left out, in words."""
+        return [
+            f"{self.name}: {count} of {self.total} messages are left out: each {reason.value}"
+            for reason, count in self.left_out.items()
+        ]
+
+    def _begin(self, data: Bytes, begins: Stamps, sizes: Stamps) -> None:
+        """Learn from the first message that can be read, of those of the commonest size first."""
+        usual = np.bincount(sizes).argmax() if len(sizes) else 0
+        for i in np.argsort(sizes != usual, kind="stable").tolist():
+            try:
+                self._learn(bytes(data[begins[i] : begins[i] + sizes[i]]))
+            except UnreadableError:
+                continue
+            self._is_new = False
+            return
 
     def _learn(self, first: bytes) -> None:
-        self._is_new = False
         if self.kind is Kind.STATE and self.name not in BY_NAME:
-            message = ros_types.deserialise(first, self.kind.ros_type)
+            message = self._deserialised(first)
             self.kind = Kind.STATE if len(message.velocity) else Kind.JOINTS
         self._layout = discover(self.kind, first)
         if self._layout is not None:
             names, self.frame_id = self._layout.joint_names, self._layout.frame_id
         else:
-            message = ros_types.deserialise(first, self.kind.ros_type)
+            message = self._deserialised(first)
             names, self.frame_id = tuple(getattr(message, "name", ())), message.header.frame_id
         self.names = (self._wanted or names) if names else ()
         if missing := [name for name in self.names if name not in names]:
@@ -107,17 +139,27 @@ class Column:
             values = values[:, columns]
         return stamps, values
 
-    def _slow(self, data: Bytes, begins: Stamps, sizes: Stamps) -> tuple[Stamps, Values]:
-        """Stamps and values message by message."""
-        stamps = np.empty(len(begins), np.int64)
-        values = np.empty((len(begins), self.kind.width(len(self.names))))
+    def _slow(self, data: Bytes, begins: Stamps, sizes: Stamps) -> tuple[Stamps, Values, list[int]]:
+        """Stamps and values message by message, and the places of the messages they are of."""
+        stamps: list[int] = []
+        values: list[Values] = []
+        kept: list[int] = []
         for i, (begin, size) in enumerate(zip(begins.tolist(), sizes.tolist(), strict=True)):
-            message = ros_types.deserialise(bytes(data[begin : begin + size]), self.kind.ros_type)
-            result = read_values(self.kind, message, self.names)
+            result = read_any(self.kind, bytes(data[begin : begin + size]), self.names)
             if isinstance(result, Refusal):
-                raise ValueError(f"has a message that {result.value}")
-            stamps[i], values[i] = result
-        return stamps, values
+                self.left_out[result] += 1
+                continue
+            kept.append(i)
+            stamps.append(result[0])
+            values.append(result[1])
+        width = self.kind.width(len(self.names))
+        return np.array(stamps, np.int64), np.array(values).reshape(-1, width), kept
+
+    def _deserialised(self, data: bytes) -> Any:
+        try:
+            return ros_types.deserialise(data, self.kind.ros_type)
+        except ValueError as error:
+            raise UnreadableError(str(error)) from error
 
 
 def join(parts: list[Series], column: Column) -> Series:

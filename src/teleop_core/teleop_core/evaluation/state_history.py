@@ -1,10 +1,12 @@
 """State history: what teleop/state said at any time, as columns and fixtures."""
 
+import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.bags.messages import Report
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import EvaluationError
 from teleop_core.evaluation.accumulators import Integers
@@ -95,8 +97,10 @@ NO_HISTORY = StateHistory(np.empty(0, np.int64), np.empty((0, len(STATE_FIELDS))
 def read_history(bag: Bag) -> StateHistory:
     """State history of a recording; empty if it has no teleop/state.
 
+    Reports of others that lack a field, or have one that is no number, are left out with a warning.
+
     Raises:
-        EvaluationError: A report lacks a field, or has one that is no number.
+        EvaluationError: No report can be read.
         RecordingError: The topic carries something else.
     """
     info = bag.topics.get(TELEOP_STATE.name)
@@ -104,18 +108,31 @@ def read_history(bag: Bag) -> StateHistory:
     rows: list[Array] = []
     fixtures: dict[ReportedFixture, int] = {}
     which: list[int] = []
+    wrong: list[EvaluationError] = []
     for report in bag.reports(TELEOP_STATE) if info is not None and info.count else ():
+        try:
+            row = _row(bag, report)
+            fixture = reported_fixture(report.values, row[_SIZE])
+        except EvaluationError as error:
+            wrong.append(error)
+            continue
         stamps.append(report.stamp_ns)
-        row = np.array(
-            [_number(bag, name, report.values.get(name, _SINCE.get(name))) for name in STATE_FIELDS]
-        )
         rows.append(row)
-        fixture = reported_fixture(report.values, row[_SIZE])
         which.append(fixtures.setdefault(fixture, len(fixtures)))
+    if wrong and not rows:
+        raise wrong[0]
+    if wrong:
+        warnings.warn(f"{wrong[0]}; reports left out: {len(wrong)}", stacklevel=2)
     columns = np.array(rows).reshape(len(rows), len(STATE_FIELDS))
     times, told = np.array(stamps, np.int64), np.array(which, np.int64)
     order = np.argsort(times, kind="stable")
     return StateHistory(times[order], columns[order], told[order], tuple(fixtures))
+
+
+def _row(bag: Bag, report: Report) -> Array:
+    return np.array(
+        [_number(bag, name, report.values.get(name, _SINCE.get(name))) for name in STATE_FIELDS]
+    )
 
 
 def _number(bag: Bag, name: str, text: str | None) -> float:

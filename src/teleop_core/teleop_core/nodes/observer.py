@@ -1,12 +1,13 @@
 """Observer: what all nodes of a graph say in ``diagnostics``."""
 
+import math
 import time
 from dataclasses import dataclass, field
 
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
 
+from teleop_core.bags.messages import read_reports
 from teleop_core.nodes.streams import Subscription, Waiter
 from teleop_core.topics import DIAGNOSTICS
 
@@ -23,8 +24,12 @@ class Status:
     arrival: float = 0.0
 
     def number(self, name: str) -> float:
-        """Value as a number, 0 if it is not reported."""
-        return float(self.values.get(name, "0"))
+        """Value as a number, 0 if it is not reported or no finite number."""
+        try:
+            number = float(self.values.get(name, "0"))
+        except ValueError:
+            return 0.0
+        return number if math.isfinite(number) else 0.0
 
 
 class Observer:
@@ -32,10 +37,15 @@ class Observer:
 
     Args:
         domain_id: DDS domain.
+
+    Attributes:
+        statuses: Newest report of each node.
+        malformed: Messages that were no reports.
     """
 
     def __init__(self, domain_id: int) -> None:
         self.statuses: dict[str, Status] = {}
+        self.malformed = 0
         self._context = Context()
         self._context.init(args=[], domain_id=domain_id)
         self._node = Node(
@@ -56,11 +66,15 @@ class Observer:
         """Take all reports that come within ``timeout`` [s] of the first one or of now."""
         self._waiter.wait(timeout)
         while (taken := self._reports.take()) is not None:
-            message = deserialize_message(taken[0], self._reports.type)
-            for status in message.status:
-                values = {pair.key: pair.value for pair in status.values}
-                level = int.from_bytes(status.level, "little")
-                self.statuses[status.name] = Status(level, status.message, values, time.monotonic())
+            try:
+                reports = read_reports(taken[0])
+            except ValueError:  # bytes of anybody, that are no report
+                self.malformed += 1
+                continue
+            for one in reports:
+                self.statuses[one.name] = Status(
+                    one.level, one.message, one.values, time.monotonic()
+                )
 
     def is_active(self, name: str) -> bool:
         """Whether a node has reported that it is at work."""

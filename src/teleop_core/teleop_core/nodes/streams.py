@@ -19,7 +19,6 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 
 from teleop_core.bags.messages import (
     Layout,
@@ -27,9 +26,9 @@ from teleop_core.bags.messages import (
     Values,
     check,
     layout,
+    read_any,
     read_numbers,
     read_reports,
-    read_values,
     report,
 )
 from teleop_core.geometry import Array
@@ -160,8 +159,7 @@ class Input:
         self._joint_names, self._target = topic.names(joint_names), target
         is_report = topic.kind is Kind.REPORT
         self._layout = None if is_report else layout(topic, joint_names)
-        if is_report:
-            read_reports(report(0, "", 0, "", {}))  # loads the message types, 60 ms
+        read_reports(report(0, "", 0, "", {}))  # loads the message types, 60 ms
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, Values]] = deque()
         self.received, self.refused = 0, Counter[Refusal]()
@@ -233,8 +231,7 @@ class Input:
         """Stamp and values of a message with other bytes than ours, or of a report."""
         if self._layout is None:
             return read_numbers(data, self.topic.columns)
-        message = deserialize_message(data, message_type(self.topic.kind.ros_type))
-        return read_values(self.topic.kind, message, self._joint_names)
+        return read_any(self.topic.kind, data, self._joint_names)
 
     def age(self) -> float:
         """Time since the last sound message was taken [s]; infinite before the first."""

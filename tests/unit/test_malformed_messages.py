@@ -1,0 +1,157 @@
+"""Malformed messages: bytes of anybody are read, or refused with a reason; nothing ends by them."""
+
+import struct
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+import teleop_core as tc
+from teleop_core import topics
+from teleop_core.bags import ros_types
+from teleop_core.bags.messages import (
+    Refusal,
+    check,
+    layout,
+    read_any,
+    read_numbers,
+    report,
+)
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.writer import BagWriter
+from teleop_core.errors import RecordingError
+from teleop_core.topics import Kind
+
+JOINTS = ("a", "b")
+NUMBERS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_MEASURED_JS, topics.SLAVE_SERVO_JP,
+           topics.MASTER_BUTTONS, topics.MASTER_MEASURED_CF, topics.MASTER_MEASURED_CV,
+           topics.SLAVE_REACH)  # fmt: skip
+GARBAGE = b"\0\1\0\0" + bytes(range(200, 256))
+SESSION_NAMES = (*(t.name for t in topics.STREAMS), topics.TELEOP_STATE.name)
+
+
+def sound(topic) -> bytes:
+    if topic.kind is Kind.REPORT:
+        return report(5, "x", 0, "fine", dict.fromkeys(topic.columns, "1"))
+    count = topic.width(len(JOINTS))
+    return layout(topic, JOINTS).encode_one(7, np.arange(count, dtype=float))
+
+
+@st.composite
+def damaged(draw, data: bytes) -> bytes:
+    """A message that was cut, lengthened, or had some of its bytes or lengths overwritten."""
+    out = bytearray(data[: draw(st.integers(0, len(data)))] if draw(st.booleans()) else data)
+    for at in draw(st.lists(st.integers(0, max(len(data) - 1, 0)), max_size=4)):
+        if at < len(out):
+            out[at] = draw(st.integers(0, 255))
+    if draw(st.booleans()) and len(out) > 8:
+        at = draw(st.integers(1, len(out) // 4 - 1)) * 4
+        length = draw(st.sampled_from([0, 1, 1 << 20, 1 << 28, (1 << 31) - 1, (1 << 32) - 1]))
+        struct.pack_into("<I", out, at, length)
+    return bytes(out) + draw(st.binary(max_size=12))
+
+
+@pytest.mark.parametrize("topic", NUMBERS, ids=lambda topic: topic.kind.name)
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_any_bytes_give_numbers_or_a_reason(topic, data):
+    garbage = data.draw(st.one_of(st.binary(max_size=300), damaged(sound(topic))))
+    names = topic.names(JOINTS)
+    found = layout(topic, JOINTS).decode_one(garbage) or read_any(topic.kind, garbage, names)
+    if not isinstance(found, Refusal):
+        stamp_ns, values = found
+        assert values.shape == (topic.width(len(JOINTS)),)
+        assert check(topic.kind, stamp_ns, values, None) in {None, *Refusal}
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.one_of(st.binary(max_size=300), damaged(sound(topics.TELEOP_STATE))))
+@example(b"")
+@example(GARBAGE)
+def test_any_bytes_of_a_report_give_numbers_or_a_reason(garbage):
+    found = read_numbers(garbage, topics.TELEOP_STATE.columns)
+    assert isinstance(found, Refusal) or found[1].shape == (len(topics.TELEOP_STATE.columns),)
+
+
+def test_what_is_no_message_is_refused_as_such():
+    assert read_any(Kind.POSE, b"\0\1\0\0abc") is Refusal.MALFORMED
+    assert read_any(Kind.POSE, sound(topics.SLAVE_MEASURED_CP)[:-1]) is Refusal.MALFORMED
+    assert read_numbers(GARBAGE, ("gain",)) is Refusal.MALFORMED
+    assert read_numbers(report(0, "x", 0, "", {"gain": "abc"}), ("gain",)) is Refusal.WRONG_NAMES
+
+
+def test_a_message_that_is_padded_as_rclpy_does_is_one():
+    """A JointState of three empty lists of doubles: rclpy adds four bytes to it."""
+    types = ros_types.typestore().types
+    header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](1, 2), "base")
+    none = np.zeros(0)
+    message = types["sensor_msgs/msg/JointState"](header, ["a"], np.ones(1), none, none)
+    data = ros_types.serialise(message)
+    for padding in (0, 4, 7):
+        found = ros_types.deserialise(data + bytes(padding), "sensor_msgs/msg/JointState")
+        assert (found.header.stamp.nanosec, len(found.effort)) == (2, 0)
+    with pytest.raises(ValueError, match="are no sensor_msgs"):
+        ros_types.deserialise(data + bytes(9), "sensor_msgs/msg/JointState")
+
+
+def recorded(path, *, bad=(), good=3):
+    """Recording of one pose topic in which messages number ``bad`` are no poses."""
+    topic = topics.SLAVE_MEASURED_CP
+    form = layout(topic, ())
+    with BagWriter(path, [topic], {}) as writer:
+        for i in range(good + len(bad)):
+            data = GARBAGE if i in bad else form.encode_one(i, np.arange(7.0) + i)
+            writer.write(topic, i, data)
+    return Bag(path)
+
+
+@pytest.mark.parametrize("bad", [(0,), (2,), (1, 3), (0, 4)])
+def test_a_recording_is_read_without_its_malformed_messages(tmp_path, bad):
+    bag = recorded(tmp_path / "bag", bad=bad)
+    with pytest.warns(UserWarning, match=f"{len(bad)} of {3 + len(bad)} messages are left out"):
+        series = bag.read("slave/measured_cp")
+    kept = [i for i in range(3 + len(bad)) if i not in bad]
+    assert series.stamp_ns.tolist() == series.log_ns.tolist() == kept
+    np.testing.assert_array_equal(series.values[:, 0], kept)
+
+
+def test_a_recording_of_malformed_messages_alone_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match=r"nothing to read.*3 of 3 messages"):
+        recorded(tmp_path / "bag", bad=(0, 1, 2), good=0).read("slave/measured_cp")
+
+
+def test_a_sound_recording_is_read_without_a_word(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(recorded(tmp_path / "bag").read("slave/measured_cp")) == 3
+
+
+@pytest.fixture(scope="module")
+def session():
+    return tc.run("coarse_box", duration=1.0)
+
+
+def copy_of(session, path, *, bad=()):
+    """The session on disk, with a malformed message amid those of the topics named ``bad``."""
+    by_name = {topic.name: topic for topic in topics.ALL}
+    given = set()
+    with BagWriter(path, topics.ALL, {}, metadata=session.metadata) as writer:
+        for name, _, log_ns, data in session.bag.raw():
+            writer.write(by_name[name], log_ns, data)
+            if name in bad and name not in given:
+                given.add(name)
+                writer.write(by_name[name], log_ns, GARBAGE)
+                if by_name[name].kind is Kind.REPORT:
+                    wrong = report(log_ns, name, 0, "", dict.fromkeys(by_name[name].columns, "abc"))
+                    writer.write(by_name[name], log_ns, wrong)
+    return tc.open_recording(path)
+
+
+def test_a_malformed_message_on_every_topic_leaves_the_scores_as_they_were(session, tmp_path):
+    whole = copy_of(session, tmp_path / "whole").score()
+    with pytest.warns(UserWarning, match="left out"):
+        score = copy_of(session, tmp_path / "bad", bad=SESSION_NAMES).score()
+    assert score.position_error_mm.rms == pytest.approx(whole.position_error_mm.rms, rel=1e-12)
+    assert score.value("motion.hand.sparc") == whole.value("motion.hand.sparc")
