@@ -226,11 +226,13 @@ class _Session:
         is_main = threading.current_thread() is threading.main_thread()
         before = signal.signal(signal.SIGINT, signal.SIG_IGN) if is_main else None
         try:
-            recorder = self._children.pop(RECORDER_NAME, None)
+            keepers = (self._children.pop(name, None) for name in (RECORDER_NAME, SESSION_NODE))
+            recorder = next(filter(None, keepers), None)  # whose exit code tells of the recording
             end_all(self._children.values())
             code = recorder.end() if recorder else 0
             if recorder and code:
-                raise SessionError(f"recorder ended with exit code {code}{recorder.last_words()}")
+                text = f"{recorder.name} ended with exit code {code}{recorder.last_words()}"
+                raise SessionError(text)
         finally:
             if before is not None:
                 signal.signal(signal.SIGINT, before)
