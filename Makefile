@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup demo test coverage lint format bench bench-setup clean
+.PHONY: setup crtk_msgs demo test coverage lint format bench bench-setup clean
 
 setup: $(VENV)/.installed
 
@@ -17,6 +17,11 @@ $(VENV)/.installed: constraints.txt src/teleop_core/setup.py
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
 	    -c constraints.txt -e 'src/teleop_core[ros,test]'
 	touch $@
+
+# CRTK's messages, which PyPI does not have; without a compiler they are left out, with a word.
+crtk_msgs: setup
+	@$(BIN)/python -c 'from crtk_msgs.msg import OperatingState' 2>/dev/null || \
+	    $(BIN)/python src/crtk_msgs/build_without_ament.py || true
 
 demo: setup
 	rm -rf $(OUT)/demo
@@ -40,7 +45,7 @@ format: setup
 # worker a crash of the middleware inside a test costs that test, not the run; it is run again, which
 # files that stay together would not allow. Elsewhere the tests of a file stay together: what they
 # compile, one process does.
-test: lint
+test: lint crtk_msgs
 	$(BIN)/pytest -n 2 --dist loadfile -m "not ros"
 	$(BIN)/pytest -n 1 -m ros
 
