@@ -1,6 +1,8 @@
 """What the recorder has heard is on the disk, whatever ends it."""
 
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -49,3 +51,19 @@ def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(peer
     assert "`teleop recover " in recorder.stderr.read_text()
     out, _ = recover(tmp_path / "bag")
     assert Bag(out).topics["master/measured_cp"].count > 1500
+
+
+@pytest.mark.parametrize("way", [(), ("--composed",)], ids=["processes", "composed"])
+def test_live_does_not_call_a_recording_that_moved_recorded(peer, tmp_path, way):
+    out = tmp_path / "bag"
+    command = [sys.executable, "-m", "teleop_core.cli", "live", "--duration", "2", *way]
+    with subprocess.Popen(
+        [*command, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as live:
+        peer.wait(lambda: list(out.glob("*.mcap")) or live.poll() is not None, "a recording")
+        out.rename(tmp_path / "moved")
+        said, told = live.communicate(timeout=120)
+    assert live.returncode == 2, said + told
+    assert str(tmp_path / "moved") in told
+    assert "next: teleop evaluate" not in said
+    assert Bag(tmp_path / "moved").topics["slave/measured_cp"].count > 1500
