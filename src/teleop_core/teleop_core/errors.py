@@ -8,12 +8,20 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
+from teleop_core.texts import LONGEST_LINE, one_line, printable, shown
+
 _SHOWN = 40
 """Alternatives that a message lists whole."""
 
 
 class TeleopError(Exception):
-    """Base of all errors of this package; its text is one line that a user can act on."""
+    """Base of all errors of this package; its text is one line that a user can act on.
+
+    What stands in it may come from files and topics: it is made printable, and cut if it is long.
+    """
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(one_line(text))
 
 
 class ParameterError(TeleopError, ValueError):
@@ -21,7 +29,7 @@ class ParameterError(TeleopError, ValueError):
 
     def __init__(self, name: str, value: object, requirement: str) -> None:
         self.name, self.value, self.requirement = name, value, requirement
-        super().__init__(f"{name} is {value!r}, must be {requirement}")
+        super().__init__(f"{name} is {shown(value)}, must be {requirement}")
 
 
 class UnknownNameError(ParameterError):
@@ -29,11 +37,11 @@ class UnknownNameError(ParameterError):
 
     def __init__(self, kind: str, value: object, alternatives: Iterable[str]) -> None:
         self.alternatives = tuple(alternatives)
-        shown = self.alternatives
-        if len(shown) > _SHOWN:
-            near = get_close_matches(str(value), shown, n=8, cutoff=0.3)
-            shown = (*(near or shown[:8]), f"… ({len(self.alternatives)} in all)")
-        super().__init__(kind, value, "one of: " + ", ".join(shown))
+        named = self.alternatives
+        if len(named) > _SHOWN or sum(map(len, named)) > LONGEST_LINE // 2:
+            near = get_close_matches(shown(value).strip("'"), named, n=8, cutoff=0.3)
+            named = (*(near or named[:8]), f"… ({len(self.alternatives)} in all)")
+        super().__init__(kind, value, "one of: " + ", ".join(named))
 
 
 class ClosureError(ParameterError):
@@ -81,4 +89,7 @@ class EvaluationError(TeleopError):
 
 
 class SessionError(TeleopError):
-    """A live session failed; the text names the node and the reason."""
+    """A live session failed; the text names the node and the reason, with its last lines below."""
+
+    def __init__(self, text: str) -> None:
+        Exception.__init__(self, printable(text))

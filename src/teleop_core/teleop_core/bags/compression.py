@@ -5,7 +5,12 @@ from collections.abc import Callable
 import lz4.frame
 import zstandard
 
+from teleop_core.texts import shown
+
 NAMES = ("zstd", "lz4", "none")
+LARGEST = 128 << 20
+"""Bytes of a chunk that is unpacked: a hundred times what ``ros2 bag`` and the mcap tools make, and
+three of them, which are unpacked ahead, still fit into any machine."""
 DamagedError = (zstandard.ZstdError, RuntimeError, ValueError, EOFError)
 
 
@@ -21,22 +26,35 @@ def compressor(name: str, level: int) -> Callable[[bytes], bytes]:
 def decompress(name: str, data: bytes, size: int) -> bytes:
     """Chunk of ``size`` bytes as it was before.
 
+    Nothing larger than :data:`LARGEST` is unpacked, whatever the chunk says of itself.
+
     Args:
         name: As in the chunk's record; empty for none.
         data: Compressed bytes.
         size: Bytes it must have, [bytes].
 
     Raises:
-        ValueError: Another size, or an unknown compression. Damage raises one of DamagedError.
+        ValueError: Another size, too large, or an unknown compression. Damage raises one of
+            DamagedError.
     """
-    if name == "zstd":
-        out = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
-    elif name == "lz4":
-        out = bytes(lz4.frame.decompress(data))
-    elif name == "":
-        out = data
-    else:
-        raise ValueError(f"compressed with {name!r}, must be zstd, lz4 or none")
+    if name not in {"zstd", "lz4", ""}:
+        raise ValueError(f"compressed with {shown(name)}, must be zstd, lz4 or none")
+    if name and size > LARGEST:
+        raise ValueError(f"{size} bytes when unpacked, must be at most {LARGEST}")
+    out = data if not name else _unzstd(data, size) if name == "zstd" else _unlz4(data, size)
     if len(out) != size:
         raise ValueError(f"{len(out)} bytes after decompression, must be {size}")
     return out
+
+
+def _unzstd(data: bytes, size: int) -> bytes:
+    """At most ``size`` bytes; what a frame says of its size is checked, since it is believed."""
+    told = zstandard.frame_content_size(data)
+    if told not in {-1, size}:  # -1: not told
+        raise ValueError(f"a frame of {told} bytes, must be {size}")
+    return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+
+
+def _unlz4(data: bytes, size: int) -> bytes:
+    """At most one byte more than ``size``."""
+    return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
 
+from teleop_core.bags.finding import mcap_files
 from teleop_core.bags.messages import Refusal, Report, read_reports
 from teleop_core.bags.ordered import in_order
 from teleop_core.bags.recovery import recover
@@ -16,6 +16,7 @@ from teleop_core.bags.series import Column, Series, join, kind_of
 from teleop_core.bags.source import McapSource, Records
 from teleop_core.bags.writer import METADATA_NAME
 from teleop_core.errors import RecordingError
+from teleop_core.texts import printable
 from teleop_core.topics import Kind, Topic
 
 __all__ = ["Bag", "Series", "TopicInfo", "recover"]
@@ -30,7 +31,7 @@ class TopicInfo:
 
 
 def _name(topic: Topic | str) -> str:
-    return topic.name if isinstance(topic, Topic) else topic.removeprefix("/")
+    return topic.name if isinstance(topic, Topic) else printable(topic.removeprefix("/"))
 
 
 class Bag:
@@ -53,7 +54,7 @@ class Bag:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        self._sources = [McapSource(file) for file in _files(self.path)]
+        self._sources = [McapSource(file) for file in mcap_files(self.path)]
         counts: Counter[str] = Counter()
         types: dict[str, str] = {}
         self.metadata: dict[str, str] = {}
@@ -63,9 +64,10 @@ class Bag:
                 name = _name(channel.topic)
                 counts[name] += found.counts[number]
                 schema = found.schemas.get(channel.schema_id)
-                types[name] = schema.name if schema else ""
+                types[name] = printable(schema.name) if schema else ""
             for record in found.metadata:
-                self.metadata |= record.metadata if record.name == METADATA_NAME else {}
+                if record.name == METADATA_NAME:
+                    self.metadata |= {n: printable(text) for n, text in record.metadata.items()}
         self.topics = {name: TopicInfo(types[name], counts[name]) for name in types}
         places = [place for source in self._sources for place in source.contents.places]
         if not counts.total() or not places:
@@ -220,40 +222,3 @@ class Bag:
 def _numbers(source: McapSource, name: str) -> list[int]:
     """Channels of a topic in one file; several publishers may have made several."""
     return [n for n, channel in source.contents.channels.items() if _name(channel.topic) == name]
-
-
-def _files(path: Path) -> list[Path]:
-    """MCAP files of a recording, in order.
-
-    Raises:
-        RecordingError: There are none.
-    """
-    if not path.exists():
-        raise RecordingError(path, "does not exist; give a recording's directory or .mcap file")
-    if path.is_file():
-        return [path]
-    mcaps, others = sorted(path.glob("*.mcap")), sorted(path.glob("*.db3"))
-    index = path / "metadata.yaml"
-    if not mcaps and others:
-        raise RecordingError(path, "has the storage sqlite3, must be mcap: `ros2 bag convert` it")
-    if not mcaps:
-        raise RecordingError(path, "is no recording: it holds no .mcap file")
-    if not index.exists():
-        reason = f"was not finished (no metadata.yaml); `teleop recover {path}` saves what is there"
-        raise RecordingError(path, reason)
-    return _listed(path, index)
-
-
-def _listed(path: Path, index: Path) -> list[Path]:
-    try:
-        information = yaml.safe_load(index.read_text(encoding="utf-8"))
-        information = information["rosbag2_bagfile_information"]
-        files = [path / Path(name).name for name in information["relative_file_paths"]]
-        mode = information.get("compression_mode") or "none"
-    except (yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
-        raise RecordingError(index, "is damaged; read the .mcap file beside it") from error
-    if str(mode).lower() != "none":
-        raise RecordingError(path, f"is compressed by {mode}; `ros2 bag convert` it to plain mcap")
-    if missing := [file.name for file in files if not file.exists()]:
-        raise RecordingError(path, f"lacks its files {', '.join(missing)}")
-    return files

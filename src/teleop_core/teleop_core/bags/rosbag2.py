@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 from mcap.records import Channel, Schema, Statistics
 
+from teleop_core import plain_yaml
 from teleop_core.bags import ros_types
 from teleop_core.errors import RecordingError
 from teleop_core.topics import Quality, Topic
@@ -67,8 +68,8 @@ def _text(value: Any) -> str:
 def _parsed(qos: str) -> Any:
     """Quality of service from a channel; none if it is not readable."""
     try:
-        return yaml.safe_load(qos) or []
-    except yaml.YAMLError:
+        return plain_yaml.parse(qos) or []
+    except plain_yaml.UnreadableError:
         return []
 
 

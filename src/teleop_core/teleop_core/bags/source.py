@@ -23,6 +23,7 @@ from teleop_core.bags.compression import DamagedError, decompress
 from teleop_core.bags.layouts import Bytes, Stamps
 from teleop_core.bags.mcap_file import MAGIC
 from teleop_core.errors import RecordingError
+from teleop_core.plain_yaml import UnreadableError, check_regular
 
 CUT_OFF = "was cut off while being recorded; `teleop recover {path}` saves what is there"
 _FOOTER_SIZE = 9 + 20
@@ -97,6 +98,7 @@ class McapSource:
     def __init__(self, path: Path, *, is_whole: bool = True) -> None:
         self.path = path
         try:
+            check_regular(path)
             with path.open("rb") as file:
                 self._check_magic(file, is_whole)
                 with damage_told(path, "its index"):
@@ -105,6 +107,8 @@ class McapSource:
                     )
         except OSError as error:
             raise RecordingError(path, f"cannot be read: {error.strerror}") from error
+        except UnreadableError as error:
+            raise RecordingError(path, str(error)) from error
 
     def _check_magic(self, file: BinaryIO, is_whole: bool) -> None:
         begin = file.read(len(MAGIC))

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import yaml
-
+from teleop_core import plain_yaml
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import ParameterError, TeleopError
 from teleop_core.geometry import Array
@@ -83,13 +82,13 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
 def _layer(bag: Bag) -> Layer:
     """What is stored about stages that are installed."""
     try:
-        content = yaml.safe_load(bag.metadata.get("configuration", ""))
+        content = plain_yaml.parse(bag.metadata.get("configuration", ""))
         if not isinstance(content, Mapping):
             return {}
         known = {SESSION, *STAGES}
         kept = {k: v for k, v in content.items() if str(k).rpartition("/")[2] in known}
         return parse_layer(kept, f"{bag.path}: configuration")
-    except (yaml.YAMLError, TeleopError):
+    except (plain_yaml.UnreadableError, TeleopError):
         return {}
 
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from teleop_core.bags.recording import RECORDER, RecordingParameters
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
@@ -18,7 +16,7 @@ from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.streams import Subscription
 from teleop_core.parameters import parameter
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.layers import parse_layer
+from teleop_core.session.layers import parse_text
 from teleop_core.session.runner import describe
 from teleop_core.stage import Stage
 from teleop_core.topics import DIAGNOSTICS, Quality, Topic
@@ -196,6 +194,5 @@ class RecorderNode(CoreNode):
 
 def _configuration(parameters: RecorderParameters) -> Configuration:
     """Configuration of the session, of defaults where none is given."""
-    content = yaml.safe_load(parameters.configuration) or {}
-    layer = parse_layer(content, "recorder.configuration")
+    layer = parse_text(parameters.configuration, "recorder.configuration")
     return Configuration.from_layers([layer], parameters.scenario)

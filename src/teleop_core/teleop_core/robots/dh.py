@@ -42,8 +42,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from teleop_core import plain_yaml
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.robots.dh_chain import (
     CONVENTIONS,
@@ -80,8 +79,8 @@ def load_table(path: Path | str) -> DhTable:
         OSError: The file cannot be read.
     """
     try:
-        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        content = plain_yaml.read(Path(path))
+    except plain_yaml.UnreadableError as error:
         raise ParameterError("table", str(path), f"a YAML file ({error})") from error
     return parse_table(content)
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from teleop_core import plain_yaml
 from teleop_core.errors import TeleopError, UnknownNameError
 from teleop_core.parameters import Spec, parameter, specs
 from teleop_core.stage import STAGES
+from teleop_core.texts import LONGEST_VALUE, shown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,12 +102,25 @@ def load_file(path: Path) -> Layer:
         TeleopError: The file is missing, is not YAML, or has another shape.
     """
     try:
-        content = yaml.safe_load(path.read_text())
+        content = plain_yaml.read(path)
     except OSError as error:
         raise TeleopError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise TeleopError(f"{path}: is not YAML: {' '.join(str(error).split())}") from error
+    except plain_yaml.UnreadableError as error:
+        raise TeleopError(f"{path}: {error}") from error
     return parse_layer(content, str(path))
+
+
+def parse_text(text: str, where: str) -> Layer:
+    """Values of the text of a ROS 2 parameter file; an empty one says nothing.
+
+    Raises:
+        TeleopError: It is not YAML, or has another shape.
+    """
+    try:
+        content = plain_yaml.parse(text)
+    except plain_yaml.UnreadableError as error:
+        raise TeleopError(f"{where}: {error}") from error
+    return parse_layer({} if content is None else content, where)
 
 
 def parse_layer(content: object, where: str) -> Layer:
@@ -161,11 +174,11 @@ def parse_setting(text: str) -> Layer:
     """
     key, equals, value_text = text.partition("=")
     if not equals:
-        raise TeleopError(f"--set {text!r} must be key=value")
+        raise TeleopError(f"--set {shown(text)} must be key=value")
     try:
-        value = yaml.safe_load(value_text)
-    except yaml.YAMLError as error:
-        raise TeleopError(f"--set {text!r}: the value is not YAML") from error
+        value = plain_yaml.parse(value_text)
+    except plain_yaml.UnreadableError as error:
+        raise TeleopError(f"--set {shown(text)}: the value {error}") from error
     return setting(key, value)
 
 
@@ -209,7 +222,9 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
     if len({spec.name for _, spec in ends.values()}) > 1:
         raise UnknownNameError("key", key, ends)  # several parameters end so
     if not ends:
-        near = difflib.get_close_matches(key, [*known, *(s.name for _, s in declared.values())])
+        near = difflib.get_close_matches(
+            key[:LONGEST_VALUE], [*known, *(s.name for _, s in declared.values())]
+        )
         raise UnknownNameError("key", key, near or declared)
     return list({stage: (stage, spec) for stage, spec in ends.values()}.values())
 

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag, Series
@@ -16,7 +15,7 @@ from teleop_core.geometry import Array
 from teleop_core.graph import RECORDER_NAME, Member
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.layers import SESSION, Layer, parse_layer
+from teleop_core.session.layers import SESSION, Layer, parse_text
 from teleop_core.session.virtual import BLOCK, VirtualTime, stamps_of
 from teleop_core.signals import STATE_FIELDS, TICK_NS
 from teleop_core.topics import TELEOP_STATE, Kind, Topic, limit_text
@@ -135,7 +134,7 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
         TeleopError: The stored configuration is not one.
     """
     text = bag.metadata.get("configuration")
-    layer = parse_layer(yaml.safe_load(text), f"{bag.path}: configuration") if text else {}
+    layer = parse_text(text, f"{bag.path}: configuration") if text else {}
     _begin_at_home(layer)
     return layer, bag.metadata.get("scenario", "")
 

@@ -1,0 +1,71 @@
+"""Finding the files of a recording: those that its ``metadata.yaml`` lists, beside it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from teleop_core import plain_yaml
+from teleop_core.errors import RecordingError
+from teleop_core.texts import shown
+
+METADATA = "metadata.yaml"
+
+
+def mcap_files(path: Path) -> list[Path]:
+    """MCAP files of a recording, in order.
+
+    Args:
+        path: Directory of a recording, or one ``.mcap`` file.
+
+    Raises:
+        RecordingError: There are none, or ``metadata.yaml`` is missing or not what it must be.
+    """
+    if not path.exists():
+        raise RecordingError(path, "does not exist; give a recording's directory or .mcap file")
+    if path.is_file():
+        return [path]
+    mcaps, others = sorted(path.glob("*.mcap")), sorted(path.glob("*.db3"))
+    index = path / METADATA
+    if not mcaps and others:
+        raise RecordingError(path, "has the storage sqlite3, must be mcap: `ros2 bag convert` it")
+    if not mcaps:
+        raise RecordingError(path, "is no recording: it holds no .mcap file")
+    if not index.exists():
+        reason = f"was not finished (no {METADATA}); `teleop recover {path}` saves what is there"
+        raise RecordingError(path, reason)
+    return _listed(path, index)
+
+
+def _listed(path: Path, index: Path) -> list[Path]:
+    """Files that the index lists; they are beside it, whatever folder it names."""
+    information = _information(index)
+    mode = information.get("compression_mode") or "none"
+    if str(mode).lower() != "none":
+        reason = f"is compressed by {shown(mode)}; `ros2 bag convert` it to plain mcap"
+        raise RecordingError(path, reason)
+    names = information.get("relative_file_paths")
+    if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
+        raise _damaged(index, "relative_file_paths must be a list of names of files")
+    plain = [Path(name).name for name in names]
+    if twice := [name for name in dict.fromkeys(plain) if plain.count(name) > 1]:
+        raise _damaged(index, f"it lists {twice[0]} {plain.count(twice[0])} times")
+    missing = [name for name in plain if name in {"", ".."} or not (path / name).is_file()]
+    if missing:
+        raise RecordingError(path, f"lacks its files {', '.join(missing)}")
+    return [path / name for name in plain]
+
+
+def _information(index: Path) -> Mapping[str, object]:
+    try:
+        content = plain_yaml.read(index)
+    except plain_yaml.UnreadableError as error:
+        raise _damaged(index, f"it {error}") from error
+    except OSError as error:
+        raise _damaged(index, f"it cannot be read: {error.strerror}") from error
+    found = content.get("rosbag2_bagfile_information") if isinstance(content, Mapping) else None
+    if not isinstance(found, Mapping):
+        raise _damaged(index, "it must hold rosbag2_bagfile_information with its entries")
+    return found
+
+
+def _damaged(index: Path, reason: str) -> RecordingError:
+    return RecordingError(index, f"is damaged: {reason}; give the .mcap file beside it instead")

@@ -1,0 +1,132 @@
+"""Plain YAML: what files and settings say, with bounds on what reading it can cost.
+
+It is YAML 1.1 as of PyYAML's safe loader, of which dates are texts, since no value here is one.
+Aliases are fine unless they lead back into themselves or multiply; so are numbers of a length that
+a number can have.
+"""
+
+import stat
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+LARGEST_TEXT = 1 << 20
+"""Bytes of a file: two seconds of reading. A recording's own parameters are five thousand."""
+MOST_VALUES = 50_000
+"""Values that a text may stand for, aliases counted as often as they are used."""
+LONGEST_NUMBER = 400
+"""Characters of a number: the longest double written out has 309 digits before its point."""
+_DATE = "tag:yaml.org,2002:timestamp"
+_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+
+
+class UnreadableError(ValueError):
+    """A text is not YAML as this package reads it; says why in one line."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe loader without dates."""
+
+    yaml_implicit_resolvers = {  # noqa: RUF012  (PyYAML's own form)
+        first: [(tag, form) for tag, form in entries if tag != _DATE]
+        for first, entries in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+
+
+def parse(text: str) -> Any:
+    """Value of a text: mappings, lists, texts, numbers, truth values or None.
+
+    Raises:
+        UnreadableError: It is not YAML, or would cost too much.
+    """
+    if len(text) > LARGEST_TEXT:
+        raise UnreadableError(f"has {len(text)} characters, must have at most {LARGEST_TEXT}")
+    try:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _count(node, {}, set())
+        return loader.construct_document(node)
+    except RecursionError:
+        raise UnreadableError("is nested too deeply") from None
+    except yaml.MarkedYAMLError as error:
+        raise UnreadableError(_told(error)) from error
+    except UnreadableError:
+        raise
+    # What constructors of explicit tags raise, such as of "!!int x", is of many kinds.
+    except (yaml.YAMLError, ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
+        raise UnreadableError(f"is not YAML: {' '.join(str(error).split())}") from error
+
+
+def _told(error: yaml.MarkedYAMLError) -> str:
+    said = " ".join(filter(None, (error.context, error.problem)))
+    mark = error.problem_mark or error.context_mark
+    place = f" (line {mark.line + 1}, column {mark.column + 1})" if mark else ""
+    return f"is not YAML: {said}{place}"
+
+
+def _count(node: yaml.Node, known: dict[int, int], within: set[int]) -> int:
+    """Values that a node stands for.
+
+    Raises:
+        UnreadableError: It is part of itself, or there are too many, or a number is too long.
+    """
+    if isinstance(node, yaml.ScalarNode):
+        if node.tag in _NUMBERS and len(node.value) > LONGEST_NUMBER:
+            text = f"has a number of {len(node.value)} characters, more than {LONGEST_NUMBER}"
+            raise UnreadableError(text)
+        return 1
+    if id(node) in within:
+        raise UnreadableError("has an alias that refers to itself")
+    if id(node) in known:
+        return known[id(node)]
+    within.add(id(node))
+    entries = node.value
+    if isinstance(node, yaml.MappingNode):
+        entries = [part for pair in node.value for part in pair]
+    total = 1 + sum(_count(entry, known, within) for entry in entries)
+    within.discard(id(node))
+    if total > MOST_VALUES:
+        raise UnreadableError(f"stands for more than {MOST_VALUES} values, by aliases perhaps")
+    known[id(node)] = total
+    return total
+
+
+def read(path: Path) -> Any:
+    """Value of a file, as :func:`parse`.
+
+    Raises:
+        OSError: The file cannot be read.
+        UnreadableError: It is a pipe or device, too large, not UTF-8, or not YAML.
+    """
+    return parse(read_text(path))
+
+
+def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
+    """Text of a regular file of at most so many bytes; raises as :func:`read`."""
+    try:
+        check_regular(path)
+        with path.open("rb") as file:
+            data = file.read(largest + 1)
+        if len(data) > largest:
+            raise UnreadableError(f"has more than {largest} bytes")
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise UnreadableError(f"is not UTF-8 ({error.reason} at byte {error.start})") from error
+
+
+def check_regular(path: Path) -> None:
+    """Make sure that a path leads to a file with an end, not to a pipe or a device.
+
+    Raises:
+        OSError: There is nothing to read.
+        UnreadableError: It is something else than a file.
+    """
+    try:
+        mode = path.stat().st_mode
+    except ValueError as error:  # a zero byte in its name
+        raise UnreadableError(f"is no name of a file: {error}") from error
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # reading a directory speaks for itself
+        raise UnreadableError("is a pipe or a device, must be a file")
