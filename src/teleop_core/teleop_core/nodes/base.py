@@ -3,23 +3,25 @@
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 
-from teleop_core.errors import ParameterError, TeleopError
+from teleop_core.errors import ParameterError, SessionError, TeleopError
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
-from teleop_core.nodes.loop import Loop
+from teleop_core.nodes.loop import PATIENCE, Loop
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.rate import Recent, Schedule, TickCounts
 from teleop_core.nodes.real_time import apply_options
-from teleop_core.nodes.streams import Input, message_type, profile
+from teleop_core.nodes.streams import Input, Unattended, message_type, profile
 from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.layers import RealTimeParameters
 from teleop_core.signals import TICK_NS
@@ -30,6 +32,10 @@ SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE,
     TransitionCallbackReturn.ERROR,
 )  # fmt: skip
+
+_GATE_PATIENCE = 1.0  # a tick of a whole session takes a hundredth of it on a busy machine
+_LOCK_PATIENCE = 1.0
+_NEWS = {"active": "at work", "finalized": "ended"}  # others: the state itself
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,6 +106,10 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self.lock = threading.Lock()  # held while the stage works or takes parameters
         self.gate = threading.Lock()  # held by a session while the node works in its thread
         self.ended, self.exit_code = Future(), 0
+        self.has_ended = False
+        """Whether the node was shut down: nothing more is to come from it."""
+        self.patience = PATIENCE
+        """Time without progress after which the loop counts as hung [s]."""
         self.has_own_loop = True
         """Whether the node works in a thread of its own, or in that of a whole session."""
         self.is_at_work = False
@@ -109,7 +119,11 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self._fresh_counts()
         self._word = "unconfigured"
         self._reporter = Reporter(self)
-        self.create_timer(1.0, self.report)
+        self._report_timer = self.create_timer(1.0, self._report_in_time)
+        self.ending = threading.Lock()
+        """Held while the end is told; shared by the nodes of a process, as ``ended`` is."""
+        own = self._service_change_state
+        own.callback = partial(self._change_state, own.callback)
 
     # -- what subclasses fill in -----------------------------------------------------------------
 
@@ -148,10 +162,30 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         """Names and texts to report beside the common ones."""
         return {}
 
+    def news(self, word: str) -> str:
+        """Line for the log when the node has come to another state, said in a word."""
+        return word
+
+    def abandon(self) -> None:
+        """Save what must not be lost, in any thread, when an orderly end has become impossible."""
+
+    # -- as the whole of a process ---------------------------------------------------------------
+
     @property
     def nodes(self) -> "tuple[CoreNode, ...]":
         """The nodes of a process that runs this one alone."""
         return (self,)
+
+    def watched(self) -> list[tuple[Loop, int]]:
+        """The loop that works now, with a number that grows while it does."""
+        loop = self._loop
+        if loop is None or not loop.is_ready:
+            return []
+        sent = sum(output.sent for output in tuple(self.ports.outputs.values()))
+        return [(loop, loop.turns + sent)]
+
+    def halt(self) -> None:
+        """Stop what works for several nodes: nothing here."""
 
     # -- topics ----------------------------------------------------------------------------------
 
@@ -214,7 +248,11 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop and close everything for good."""
-        return self._guard("shutdown", self._clear, "finalized")
+        self.has_ended = True
+        result = self._guard("shutdown", self._clear, "finalized")
+        if result is not SUCCESS:
+            self.exit_code = self.exit_code or 1
+        return result
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """After a crash: close everything, so that a supervisor can configure the node anew."""
@@ -223,27 +261,38 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
     def _begin(self) -> None:
         for entry in self.ports.all_inputs():
             entry.forget()
+        self._reported = b"", None
         self.start()
         self.is_at_work = True
         if self.has_own_loop:
             self.schedule.start()
-            self._loop = Loop(self.get_name(), self.turn, self.fail, self.prepare)
+            self._loop = Loop(
+                self.get_name(), self.turn, self.fail, self.prepare, self.patience
+            )  # fmt: skip
+            self._loop.start()
 
     def _halt(self) -> None:
         if not self.is_at_work:
             return
-        if self._loop is not None:
-            self._loop.stop()
-            self._loop = None
-        with self.gate:
-            self.is_at_work = False
+        loop, self._loop = self._loop, None
+        has_stopped = loop is None or loop.stop()
+        is_free = self.gate.acquire(timeout=_GATE_PATIENCE)
+        self.is_at_work = False
+        if is_free:
+            self.gate.release()
+        if not (has_stopped and is_free):  # its outputs are silent: who sends them hangs
+            raise SessionError(f"{self.member_name} hangs and is left behind")
         self.stop()
 
     def _clear(self) -> None:
-        self._halt()
-        if self.stage is not None:
-            self.teardown()
-        self._close()
+        try:
+            self._halt()
+        finally:
+            try:
+                if self.stage is not None:
+                    self.teardown()
+            finally:
+                self._close()
 
     def _guard(
         self, transition: str, action: Callable[[], None], word: str
@@ -257,6 +306,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
             self.get_logger().fatal(f"{transition} crashed:\n{traceback.format_exc()}")
             return ERROR
         self._word = word
+        self.get_logger().info(self.news(_NEWS.get(word, word)))
         self.report()
         return SUCCESS
 
@@ -273,13 +323,41 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         if self.options.autostart:
             self.end(1)
         elif self.executor is not None:
-            self.executor.create_task(self.trigger_deactivate)
+            self.executor.create_task(self._deactivate)
 
     def end(self, exit_code: int) -> None:
         """Let the process end; may be called from any thread."""
-        self.exit_code = self.exit_code or exit_code
-        if not self.ended.done():
-            self.ended.set_result(None)
+        with self.ending:  # whoever sees the end waits until all is said
+            self.exit_code = self.exit_code or exit_code
+            if not self.ended.done():
+                self.ended.set_result(None)
+
+    def _deactivate(self) -> None:
+        if self.is_at_work:  # a supervisor may have been faster
+            self.trigger_deactivate()
+
+    def finish(self) -> None:
+        """Shut down from whatever state the node is in; what was shut down stays so."""
+        self._report_timer.cancel()
+        if not self.has_ended:
+            self.trigger_shutdown()
+
+    def _change_state(self, change: Callable[..., Any], request: Any, response: Any) -> Any:
+        """Answer a service that asks for a transition; one that there is not is refused."""
+        try:
+            return change(request, response)
+        except rclpy_implementation.RCLError:  # it would end the process
+            wanted = request.transition.label or request.transition.id
+            self.get_logger().error(f"no transition {wanted} while {self._word}")
+            response.success = False
+            return response
+
+    @property
+    def subscriptions(self) -> Iterator[Any]:
+        """Those that the executor serves: others are opened and closed by any thread."""
+        for entry in tuple(super().subscriptions):
+            if not isinstance(entry.callback_group, Unattended):
+                yield entry
 
     # -- parameters ------------------------------------------------------------------------------
 
@@ -320,12 +398,15 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
     def _retune(self, parameters: Any) -> None:
         if self.stage is None or not hasattr(self.stage, "retune"):
             return
-        with self.lock:
-            try:
-                self.stage.retune(parameters)
-            except TeleopError:
-                self.stage.retune(self.parameters)
-                raise
+        if not self.lock.acquire(timeout=_LOCK_PATIENCE):
+            raise SessionError(f"{self.member_name} is in a step that takes too long; try again")
+        try:
+            self.stage.retune(parameters)
+        except TeleopError:
+            self.stage.retune(self.parameters)
+            raise
+        finally:
+            self.lock.release()
 
     # -- diagnostics -----------------------------------------------------------------------------
 
@@ -337,6 +418,15 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
     def counts(self) -> TickCounts:
         """What became of the ticks since the node was configured."""
         return self.schedule.counts
+
+    def _report_in_time(self) -> None:
+        """Report, once a second; what a part of others raises must not end the node."""
+        try:
+            self.report()
+        except Exception:
+            self.get_logger().error(
+                f"cannot report:\n{traceback.format_exc()}", throttle_duration_sec=60.0
+            )
 
     def report(self) -> None:
         """Publish how the node is."""

@@ -7,14 +7,21 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
+import time
 from collections import deque
 from collections.abc import Iterable
-from pathlib import Path
+from contextlib import suppress
+from typing import IO, Any, cast
 
 from teleop_core.errors import SessionError
 from teleop_core.nodes.discovery import announce_often
+from teleop_core.nodes.parent import VARIABLE
 
-_PATIENCE = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
+_PATIENCE = ((signal.SIGINT, 30.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
+_STILL_PATIENCE = ((signal.SIGINT, 2.0), (signal.SIGKILL, 5.0))  # of a process that stands still
+_STILL = 3.0  # a thread of its own speaks ten times a second, whatever the process is doing
+_STILL_STARTING = 60.0  # the interpreter loads, perhaps from a cold disk
 
 
 def environment() -> dict[str, str]:
@@ -61,27 +68,40 @@ def free_domain() -> str:
 
 
 class Child:
-    """Process of one node.
+    """Process of one node, or of a whole session.
+
+    It ends in order when this process does, however that comes about. Nothing is left of it on
+    disk: what it writes goes to a file without a name.
 
     Args:
         name: Stage with its namespace, or a whole session.
-        parameters: Parameter file.
-        folder: Where its output is kept.
+        parameters: Open parameter file.
         env: Its environment.
+
+    Attributes:
+        name: As given.
+        doing: What it says that it is doing: starting, compiling kernels, at work, ending.
+        is_told: Whether its end has been told already.
     """
 
-    def __init__(self, name: str, parameters: Path, folder: Path, env: dict[str, str]) -> None:
+    def __init__(self, name: str, parameters: IO[Any], env: dict[str, str]) -> None:
         arm, _, stage = name.rpartition("/")
-        self.name, self._log = name, folder / f"{name.replace('/', '.')}.log"
+        self.name, self.doing, self.is_told = name, "starting", False
+        self._line, theirs = socket.socketpair()
+        self._line.setblocking(False)
+        self._heard, self._text = time.monotonic(), b""
+        # Closed with us: nobody else knows its name.
+        self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
         command = [sys.executable, "-m", "teleop_core.nodes", stage]
-        command += ["--ros-args", "--params-file", str(parameters)]
+        command += ["--ros-args", "--params-file", f"/dev/fd/{parameters.fileno()}"]
         if arm:
             command += ["-r", f"__ns:=/{arm}"]
-        with self._log.open("wb") as log:
+        with theirs:
             # A session of its own: Ctrl-C on the terminal reaches us, and we end it in order.
             self._process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=env,
-                start_new_session=True,
+                command, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
+                env=env | {VARIABLE: str(theirs.fileno())}, start_new_session=True,
+                pass_fds=(theirs.fileno(), parameters.fileno()),
             )  # fmt: skip
 
     @property
@@ -90,18 +110,36 @@ class Child:
         return self._process.pid
 
     def check(self) -> None:
-        """Make sure that it runs.
+        """Make sure that it runs and says what it is doing.
 
         Raises:
-            SessionError: It has ended; says how, with what it wrote last.
+            SessionError: It has ended, or stands still; says how, with what it wrote last.
         """
         code = self._process.poll()
         if code is not None:
+            self.is_told = True
             raise SessionError(f"{self.name} ended with {_in_words(code)}{self.last_words()}")
+        if silence := self._silence():
+            text = f"{self.name} stands still: nothing heard of its process for {silence:.0f} s"
+            raise SessionError(text + self.last_words())
+
+    def _silence(self) -> float:
+        """Time since it was heard last [s]; 0 as long as that is no reason to worry."""
+        with suppress(OSError):
+            while came := self._line.recv(4096):
+                self._text += came
+        *words, self._text = self._text.split(b"\n")
+        if words:
+            self._heard, self.doing = time.monotonic(), words[-1].decode()
+        silence = time.monotonic() - self._heard
+        patience = _STILL if self.doing in {"at work", "ending"} else _STILL_STARTING
+        return silence if silence > patience else 0.0
 
     def last_words(self) -> str:
         """Last lines that it wrote, each indented on a line of its own."""
-        lines = self._log.read_text(errors="replace").splitlines()[-5:]
+        size = os.fstat(self._log.fileno()).st_size
+        tail = os.pread(self._log.fileno(), 20_000, max(0, size - 20_000))
+        lines = tail.decode(errors="replace").splitlines()[-8:]
         return ":" + "".join(f"\n  {line}" for line in lines) if lines else "; it wrote nothing"
 
     def ask(self) -> None:
@@ -111,7 +149,7 @@ class Child:
 
     def end(self) -> int:
         """End it, more and more firmly; returns its exit code."""
-        for number, patience in _PATIENCE:
+        for number, patience in _STILL_PATIENCE if self._silence() else _PATIENCE:
             if self._process.poll() is None:
                 self._process.send_signal(number)
             try:
@@ -125,10 +163,14 @@ def _in_words(code: int) -> str:
     return f"exit code {code}" if code >= 0 else f"signal {signal.Signals(-code).name}"
 
 
-def end_all(children: Iterable[Child]) -> None:
-    """End some processes side by side."""
+def end_all(children: Iterable[Child]) -> list[str]:
+    """End some processes side by side; returns what is to be told of their ends."""
     pending = list(children)
     for child in pending:
         child.ask()
+    failures = []
     for child in pending:
-        child.end()
+        code = child.end()
+        if code and not child.is_told:
+            failures.append(f"{child.name} ended with {_in_words(code)}{child.last_words()}")
+    return failures

@@ -1,14 +1,11 @@
 """Live session: the graph as one process per node, started, watched, recorded and stopped."""
 
-import signal
 import tempfile
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import yaml
 from rich.console import Console
@@ -16,6 +13,8 @@ from rich.console import Console
 from teleop_core.errors import RecordingError, SessionError
 from teleop_core.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.children import Child, end_all, environment
+from teleop_core.nodes.interrupt import Interrupt
+from teleop_core.nodes.leftovers import remove_leftovers
 from teleop_core.nodes.observer import WARNING, Observer, Status
 from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.session.configuration import Configuration
@@ -23,9 +22,14 @@ from teleop_core.session.layers import SESSION
 from teleop_core.session.links import link_texts
 
 START_TIMEOUT = 180.0
-"""A node must be at work within this time [s]; the first start ever compiles the kernels."""
-SILENCE = 10.0
-"""A node that has not reported for this long hangs [s]."""
+"""A node that is not at work, and gets no further, for this long never will be [s]."""
+SILENCE = 30.0
+"""A node at work that has not reported for this long serves nobody [s].
+
+Whether its process stands still, and whether its loop does, is found within seconds by others:
+:mod:`teleop_core.nodes.children` and :mod:`teleop_core.nodes.watch`.
+"""
+_NEWS_PERIOD = 5.0  # from line to line about a node that is long in starting [s]
 Crew = dict[str, tuple[str, ...]]
 """Processes that are started together, each with its nodes."""
 
@@ -57,47 +61,20 @@ def live(
     if out.exists():
         raise RecordingError(out, "exists already; choose another --out")
     env = environment()
+    remove_leftovers()
+    interrupt = Interrupt()
+    # A file without a name: there is nothing to remove, however this ends.
     with (
-        tempfile.TemporaryDirectory(prefix="teleop_live_") as folder,
+        tempfile.TemporaryFile("w+") as parameters,
+        interrupt.caught(),
         Observer(int(env["ROS_DOMAIN_ID"])) as observer,
     ):
-        session = _Session(configuration, out, console, observer, Path(folder), env)
+        parameters.write(parameter_file(configuration, str(out)))
+        parameters.flush()
+        session = _Session(configuration, console, observer, parameters, env, interrupt)
         session.crews = _crews(configuration.graph, is_composed=is_composed)
-        with session.interrupt.caught():
-            session.run()
-
-
-class _Interrupt:
-    """Whether Ctrl-C or SIGTERM came; a KeyboardInterrupt alone is lost in a finaliser."""
-
-    def __init__(self) -> None:
-        self.has_come = False
-
-    def __call__(self, *_: object) -> None:
-        self.has_come = True
-        raise KeyboardInterrupt
-
-    def check(self) -> None:
-        """Interrupt what runs now, if the signal came.
-
-        Raises:
-            KeyboardInterrupt: It did.
-        """
-        if self.has_come:
-            raise KeyboardInterrupt
-
-    @contextmanager
-    def caught(self) -> Iterator[None]:
-        """Take both signals meanwhile; outside the main thread nothing changes."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        before = {number: signal.signal(number, self) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+        session.tell_where(out)
+        session.run()
 
 
 class _Session:
@@ -106,24 +83,42 @@ class _Session:
     def __init__(
         self,
         configuration: Configuration,
-        out: Path,
         console: Console,
         observer: Observer,
-        folder: Path,
+        parameters: IO[Any],
         env: dict[str, str],
+        interrupt: Interrupt,
     ) -> None:
         self._duration = float(configuration.groups[SESSION].duration)
         self._graph = configuration.graph
-        self._console, self._observer, self._folder, self._env = console, observer, folder, env
-        self._parameters = folder / "parameters.yaml"
-        self._parameters.write_text(parameter_file(configuration, str(out)))
+        self._console, self._observer = console, observer
+        self._parameters, self._env, self._interrupt = parameters, env, interrupt
         self._children: dict[str, Child] = {}
         self._ready = 0.0
-        self.interrupt = _Interrupt()
         self.crews = _crews(self._graph, is_composed=False)
+
+    def tell_where(self, out: Path) -> None:
+        """Say how others find the nodes, and where they are recorded."""
+        domain, reach = (
+            self._env[name] for name in ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE")
+        )
+        join = f"ROS_DOMAIN_ID={domain} ROS_AUTOMATIC_DISCOVERY_RANGE={reach}"
+        self._say(f"ROS domain {domain}; to look in: {join} ros2 topic list")
+        self._say(f"recording to {out}")
 
     def run(self) -> None:
         """Start, watch and stop all nodes; the recorder comes first and goes last."""
+        try:
+            self._work()
+        except BaseException as error:
+            failures = self._stop()
+            if isinstance(error, SessionError) and failures:
+                raise SessionError("\n".join((str(error), *failures))) from error
+            raise
+        if failures := self._stop():
+            raise SessionError("\n".join(failures))
+
+    def _work(self) -> None:
         is_begun = False
         try:
             for crew in self.crews:
@@ -134,25 +129,25 @@ class _Session:
         except KeyboardInterrupt:
             if not is_begun:
                 raise SessionError("stopped before all nodes were ready") from None
-            self._console.print("stopped")
-        finally:
-            self._stop()
+            self._say("stopped")
 
     def _start(self, crew: Crew) -> None:
         for name in crew:
-            self._children[name] = Child(name, self._parameters, self._folder, self._env)
-        deadline = time.monotonic() + START_TIMEOUT
+            self._children[name] = Child(name, self._parameters, self._env)
         waiting = [node for nodes in crew.values() for node in nodes]
         home = {node: name for name, nodes in crew.items() for node in nodes}
+        progress = _Progress(self._children)
         while waiting:
             self._observer.listen(0.1)
-            self._check_alive()  # who compiles kernels, perhaps for all, reports later
+            self._check_alive()
             for name in [name for name in waiting if self._observer.is_active(name)]:
                 waiting.remove(name)
                 self._say(f"{name} is ready")
-            if waiting and time.monotonic() > deadline:
+            for line in progress.news():
+                self._say(line)
+            if waiting and progress.age() > START_TIMEOUT:
                 child = self._children[home[waiting[0]]]
-                reason = f"{waiting[0]} was not ready within {START_TIMEOUT:g} s"
+                reason = f"{waiting[0]} is not ready and got no further for {START_TIMEOUT:g} s"
                 raise SessionError(reason + child.last_words())
         self._ready = time.monotonic()
 
@@ -174,13 +169,13 @@ class _Session:
                 self._say(f"{shown:3d}/{self._duration:g} s  {self._line()}")
 
     def _check_alive(self) -> None:
-        self.interrupt.check()
+        self._interrupt.check()
         for child in self._children.values():
             child.check()
 
     def _check(self) -> None:
         """Make sure that nobody stops it, all processes run and all nodes report."""
-        self.interrupt.check()
+        self._interrupt.check()
         for crew in self.crews:
             for name in [name for name in crew if name in self._children]:
                 child = self._children[name]
@@ -220,22 +215,39 @@ class _Session:
         ]
 
     def _say(self, text: str) -> None:
-        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+        with suppress(OSError):  # who closed the terminal is not to hold up the end
+            self._console.print(text, highlight=False, markup=False, soft_wrap=True)
 
-    def _stop(self) -> None:
-        is_main = threading.current_thread() is threading.main_thread()
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN) if is_main else None
-        try:
-            keepers = (self._children.pop(name, None) for name in (RECORDER_NAME, SESSION_NODE))
-            recorder = next(filter(None, keepers), None)  # whose exit code tells of the recording
-            end_all(self._children.values())
-            code = recorder.end() if recorder else 0
-            if recorder and code:
-                text = f"{recorder.name} ended with exit code {code}{recorder.last_words()}"
-                raise SessionError(text)
-        finally:
-            if before is not None:
-                signal.signal(signal.SIGINT, before)
+    def _stop(self) -> list[str]:
+        """End all nodes in order, whatever signals come; returns what is to be told of it."""
+        self._interrupt.is_deaf = True
+        recorder = self._children.pop(RECORDER_NAME, None)
+        failures = end_all(self._children.values())
+        return failures + end_all([recorder] if recorder else [])
+
+
+class _Progress:
+    """What processes say while they start."""
+
+    def __init__(self, children: dict[str, Child]) -> None:
+        self._children = children
+        self._seen: dict[str, str] = {}
+        self._last = self._told = time.monotonic()
+
+    def news(self) -> list[str]:
+        """Lines about what takes long, now and then."""
+        seen = {name: child.doing for name, child in self._children.items()}
+        now = time.monotonic()
+        if seen != self._seen:
+            self._seen, self._last = seen, now
+        if now - self._told < _NEWS_PERIOD:
+            return []
+        self._told = now
+        return [f"{name}: {doing}" for name, doing in seen.items() if "compiling" in doing]
+
+    def age(self) -> float:
+        """Time since any of them got further [s]."""
+        return time.monotonic() - self._last
 
 
 def parameter_file(configuration: Configuration, out: str) -> str:

@@ -1,10 +1,15 @@
 """Loop: the thread of a node that does its work, beside the executor that serves its parameters."""
 
+import sys
 import threading
 import traceback
 from collections.abc import Callable
 
 from teleop_core.errors import TeleopError
+
+PATIENCE = 0.8
+"""A loop that has made nothing for this long hangs [s]."""
+_END_PATIENCE = 8.0  # the last turn may compile a kernel, or wait for a slow disk
 
 
 class Loop:
@@ -15,7 +20,16 @@ class Loop:
         turn: One turn; blocks for a tenth of a second at most.
         fail: Told in words, and whether it was expected, why a turn could not be finished; the
             loop has ended then.
-        prepare: Called once in the thread before the first turn.
+        prepare: Called once in the thread before the first turn, may take long; None if the turns
+            do it themselves.
+        patience: Time without any progress after which it counts as hung [s].
+
+    Attributes:
+        name: Name of the thread.
+        turns: Number of turns taken.
+        patience: As given.
+        is_ready: Whether it is prepared.
+        is_hung: Whether a watchdog has found it so.
     """
 
     def __init__(
@@ -23,25 +37,48 @@ class Loop:
         name: str,
         turn: Callable[[], None],
         fail: Callable[[str, bool], None],
-        prepare: Callable[[], None],
+        prepare: Callable[[], None] | None = None,
+        patience: float = PATIENCE,
     ) -> None:
+        self.name, self.turns, self.patience = name, 0, patience
+        self.is_ready = self.is_hung = False
         self._turn, self._fail, self._prepare = turn, fail, prepare
         self._is_running = True
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def start(self) -> None:
+        """Begin with the turns."""
         self._thread.start()
 
-    def stop(self) -> None:
-        """End after the present turn."""
+    def stop(self) -> bool:
+        """End after the present turn; whether it did, or is left behind because it hangs."""
         self._is_running = False
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        if threading.current_thread() is self._thread:
+            return True
+        self._thread.join(0.0 if self.is_hung else _END_PATIENCE)
+        return not self._thread.is_alive()
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it takes turns still."""
+        return self._thread.is_alive()
+
+    def place(self) -> str:
+        """Where its thread is now: the innermost calls, the last one last."""
+        frame = sys._current_frames().get(self._thread.ident or 0)
+        if frame is None:
+            return "  it has ended"
+        return "".join(traceback.format_stack(frame)[-6:]).rstrip()
 
     def _run(self) -> None:
         turn = self._turn
         try:
-            self._prepare()
+            if self._prepare is not None:
+                self._prepare()
+                self.is_ready = True
             while self._is_running:
                 turn()
+                self.turns += 1
         except TeleopError as error:
             self._fail(str(error), True)
         except Exception:  # a thread would die without a word

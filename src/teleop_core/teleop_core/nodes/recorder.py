@@ -116,6 +116,7 @@ class RecorderNode(CoreNode):
         super().__init__(stage, RecorderParameters, **options)
         self.channels: dict[str, _Channel] = {}
         self._graph = graph
+        self.patience = 10.0  # a slow disk is no reason to end a session
 
     def setup(self, parameters: RecorderParameters) -> None:
         """Make the recording's directory."""
@@ -160,6 +161,19 @@ class RecorderNode(CoreNode):
             except RecordingError:
                 self.exit_code = self.exit_code or 1  # the log says why
                 raise
+
+    def abandon(self) -> None:
+        """Close the recording where an orderly end has become impossible, in any thread."""
+        if self._loop is not None:
+            self._loop.stop()
+        if self.stage is not None:
+            if self.is_at_work and not self._is_broken:
+                self._drain()
+            self._writer.close()
+
+    def news(self, word: str) -> str:
+        """Where it records."""
+        return f"{word}: records to {self._writer.path}" if word == "at work" else word
 
     def _drain(self) -> None:
         came: list[Arrival] = []

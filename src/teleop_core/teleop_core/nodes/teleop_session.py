@@ -42,15 +42,31 @@ class TeleopSession:
         self._schedule = Schedule(time.monotonic_ns, time.sleep, last.options.max_catch_up)
         self._at_work: tuple[bool, ...] = ()
         self._pending: list[tuple[Output, int, int]] = []
-        Loop("session", self._turn, last.fail, last.prepare)
+        self._ticks = 0
+        self._loop = Loop("session", self._turn, last.fail)
+        self._loop.start()
 
     @property
     def nodes(self) -> tuple[CoreNode, ...]:
         """The nodes, recorder first and masters last: nothing that is sent is missed."""
         return (self._recorder, *reversed(self._stages))
 
+    def watched(self) -> list[tuple[Loop, int]]:
+        """The loop of all stages, and that of the recorder."""
+        own = [(self._loop, self._loop.turns + self._ticks)] if self._loop.is_ready else []
+        return [*own, *self._recorder.watched()]
+
+    def halt(self) -> None:
+        """Stop the loop; where it hangs, its nodes end without it."""
+        if not self._loop.stop():
+            for node in self._stages:
+                node.gate = threading.Lock()
+
     def _turn(self) -> None:
         """All ticks that are due, each through all stages."""
+        if not self._loop.is_ready and any(node.is_at_work for node in self.nodes):
+            self._stages[-1].prepare()  # now that all kernels are there
+            self._loop.is_ready = True
         with self._gate:
             at_work = tuple(node.is_at_work for node in self.nodes)
             if at_work != self._at_work:
@@ -65,6 +81,7 @@ class TeleopSession:
 
     def _tick(self, tick_ns: int) -> None:
         """One tick [ns, monotonic]; the gate keeps all nodes open until all is published."""
+        self._ticks += 1
         with self._gate:
             for node in self._stages:
                 if node.is_at_work:

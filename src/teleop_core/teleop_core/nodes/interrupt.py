@@ -1,0 +1,69 @@
+"""Interrupt: signals that end a live session in order, wherever its main thread is."""
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from teleop_core.nodes.watch import ENDS
+
+
+class Interrupt:
+    """Whether Ctrl-C or another such signal came; a KeyboardInterrupt alone is lost in a finaliser.
+
+    SIGTERM ends a session like Ctrl-C does, and so do SIGHUP, of a terminal that is closed, and
+    SIGQUIT.
+
+    Attributes:
+        has_come: Whether one did.
+        is_deaf: Whether further signals are noted only, as while the session is being ended.
+    """
+
+    def __init__(self) -> None:
+        self.has_come = self.is_deaf = False
+
+    def __call__(self, number: int, _: object) -> None:
+        """Note a signal, and interrupt what runs now."""
+        self.has_come = True
+        if number == signal.SIGHUP:
+            _leave_terminal()
+        if not self.is_deaf:
+            raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Interrupt what runs now, if a signal came.
+
+        Raises:
+            KeyboardInterrupt: It did.
+        """
+        if self.has_come:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """Take the signals meanwhile; outside the main thread nothing changes.
+
+        What is ignored stays so, such as SIGHUP under ``nohup``.
+        """
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = {n: signal.getsignal(n) for n in ENDS if signal.getsignal(n) != signal.SIG_IGN}
+        for number in before:
+            signal.signal(number, self)
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def _leave_terminal() -> None:
+    """Write to nowhere from now on: the terminal is gone, and writing to it would raise."""
+    with open(os.devnull, "w") as nowhere:
+        for file in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):
+                if file.isatty():
+                    os.dup2(nowhere.fileno(), file.fileno())

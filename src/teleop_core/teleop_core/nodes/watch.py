@@ -1,0 +1,153 @@
+"""Watch: the thread that sees to the end of a process, whatever its other threads are doing.
+
+It waits for signals and for the end of the parent, tells the parent what the process is doing, and
+finds loops that hang. An end is asked of the main thread, which brings it about in order. Where
+that thread does not come to it, the recording is closed from here, and the process left.
+"""
+
+import os
+import select
+import signal
+import threading
+import time
+from typing import Protocol
+
+from teleop_core.kernels.progress import compiled_count, is_compiling
+from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.loop import Loop
+from teleop_core.nodes.parent import Parent
+
+ENDS = tuple(
+    number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+)  # fmt: skip
+"""Signals that ask for an orderly end: Ctrl-C, a supervisor, a closed terminal, Ctrl-\\."""
+_PERIOD = 0.1
+_END_PATIENCE = 4.0  # until the main thread turns to the end
+_FLUSH_PATIENCE = 20.0  # until it has brought it about; a slow disk may need some
+
+
+class Crew(Protocol):
+    """What works in one process: a node, or several that are started in this order."""
+
+    @property
+    def nodes(self) -> tuple[CoreNode, ...]:
+        """The nodes."""
+        ...
+
+    def watched(self) -> list[tuple[Loop, int]]:
+        """The loops that work now, each with a number that grows while it does."""
+        ...
+
+    def halt(self) -> None:
+        """Stop what works for several nodes."""
+        ...
+
+
+def signal_pipe() -> int:
+    """File that signals of :data:`ENDS` write to.
+
+    Nothing is interrupted half-way, and the middleware is still there for an orderly end; the
+    main thread waits in C, where a handler in Python would not run. What is ignored from the
+    start stays so, such as SIGHUP under ``nohup``.
+    """
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    signal.set_wakeup_fd(writing)
+    for number in ENDS:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)
+    return reading
+
+
+class Watch:
+    """Watching thread of a process; works from its making until :meth:`close`.
+
+    Args:
+        crew: What is watched.
+        signals: File of :func:`signal_pipe`.
+        parent: Line to the parent, if there is one.
+
+    Attributes:
+        word: What the process is doing: starting, at work, ending.
+    """
+
+    def __init__(self, crew: Crew, signals: int, parent: Parent | None) -> None:
+        self.word = "starting"
+        self._crew, self._signals, self._parent = crew, signals, parent
+        self._first = crew.nodes[0]
+        self._still: dict[Loop, tuple[int, int]] = {}
+        self._asked: float | None = None
+        self._is_over = False
+        self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop to watch: the end has been brought about."""
+        self._is_over = True
+        self._thread.join()
+
+    def _run(self) -> None:
+        files: list[int | Parent] = [self._signals]
+        if self._parent is not None:
+            files.append(self._parent)
+        while not self._is_over:
+            ready = select.select(files, (), (), _PERIOD)[0]
+            if self._signals in ready:
+                os.read(self._signals, 64)
+                self._ask(0)
+            if self._parent in ready and self._parent is not None and self._parent.has_gone():
+                files.remove(self._parent)
+                self._first.get_logger().error("the session that started this is gone: ends")
+                self._ask(0)
+            if not ready:
+                self._look()
+
+    def _look(self) -> None:
+        """What is done ten times a second."""
+        if self._parent is not None:
+            self._parent.tell(self._doing())
+        if is_compiling():
+            self._still.clear()
+        elif self._asked is None:
+            self._find_hung()
+        if self._asked is not None:
+            patience = _FLUSH_PATIENCE if self.word == "ending" else _END_PATIENCE
+            if time.monotonic() - self._asked > patience:
+                self._leave()
+
+    def _doing(self) -> str:
+        count = compiled_count()
+        return f"compiling kernels ({count} so far)" if is_compiling() else self.word
+
+    def _find_hung(self) -> None:
+        """Count looks, not time: where this thread did not run, others had no chance either."""
+        still: dict[Loop, tuple[int, int]] = {}
+        for loop, number in self._crew.watched():
+            before, looks = self._still.get(loop, (-1, 0))
+            looks = looks + 1 if number == before else 0
+            still[loop] = number, looks
+            if looks * _PERIOD >= loop.patience and loop.is_alive:
+                self._give_up(loop)
+        self._still = still
+
+    def _give_up(self, loop: Loop) -> None:
+        loop.is_hung = True
+        text = f"{loop.name} hangs: nothing came of it for {loop.patience:g} s; it is here:"
+        self._first.get_logger().fatal(f"{text}\n{loop.place()}")
+        self._ask(1)
+
+    def _ask(self, exit_code: int) -> None:
+        """Ask the main thread to end the process."""
+        self._asked = self._asked or time.monotonic()
+        self._first.end(exit_code)
+
+    def _leave(self) -> None:
+        """End the process without the main thread, which hangs or compiles."""
+        code = max(node.exit_code for node in self._crew.nodes)
+        self._first.get_logger().error(f"cannot end in order ({self._doing()}): leaves at once")
+        is_starting = self.word == "starting"
+        try:
+            for node in self._crew.nodes:
+                node.abandon()
+        finally:
+            os._exit(code if is_starting else max(code, 1))
