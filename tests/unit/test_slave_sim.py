@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 
 from teleop_core.errors import ParameterError
 from teleop_core.kernels import pointer
+from teleop_core.operation import OperationParameters
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ACCELERATION, independent_acceleration
@@ -193,7 +194,7 @@ def test_compensation_keeps_axis_2_nearer_to_a_moving_setpoint():
 
 
 def test_command_filter_kicks_no_further_than_a_tick_at_full_speed():
-    bench = Bench()
+    bench = Bench(operation=OperationParameters(acceleration_share=1000.0, tool_speed=10.0))
     bench.go_to(MIDDLE)
     before = bench.setpoint
     bench.tick(MIDDLE + 0.05 * DRIVES.speed_limit)
@@ -255,12 +256,13 @@ def test_long_move_runs_at_the_speed_limit_and_recovers_without_windup(joint):
 
 def test_integral_stays_bounded_while_an_overload_holds_the_arm_back():
     # A friction far above the rated torque: the setpoint goes, the arm cannot.
-    bench = Bench(coulomb=(20.0, *DRIVES.coulomb[1:]))
+    told = OperationParameters(reported=("tracking", "tip", "effort"))
+    bench = Bench(coulomb=(20.0, *DRIVES.coulomb[1:]), operation=told)
     goal = ARM.home + np.array([0.2, 0, 0, 0, 0, 0])
     bench.trace(goal, 5000)
     integral = abs(bench.slave.arm.memory[0, 0])
     assert integral <= DRIVES.effort_limit[0]
-    bench.slave.retune(SlaveSimParameters())
+    bench.slave.retune(SlaveSimParameters(operation=told))
     joints, _ = bench.trace(goal, 2000)
     assert abs(joints[-1, 0] - goal[0]) <= COUNT[0]
     # An eighth of the way at most: a tenth of a second of full torque before it brakes.
@@ -321,9 +323,11 @@ def test_command_is_fresh_until_the_timeout_and_stale_after_it():
     assert statuses == [CommandStatus.FRESH] * TIMEOUT_TICKS + [CommandStatus.STALE]
 
 
-def test_last_reference_is_held_when_commands_end():
+def test_lone_command_is_reached_and_held():
     bench = Bench()
     bench.go_to(MIDDLE)
+    for _ in range(TIMEOUT_TICKS + 1):
+        bench.tick()
     goal = MIDDLE + 0.01 * DRIVES.speed_limit
     bench.tick(goal)
     for _ in range(3000):

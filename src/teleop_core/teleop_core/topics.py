@@ -7,6 +7,14 @@ arm called ``left`` has ``left/slave/servo_cp`` and so on.
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
+OPERATION = (
+    "state", "is_homed", "is_busy", "is_stopped", "fault", "fault_joint", "fault_value",
+    "fault_bound",
+)  # fmt: skip
+"""Numbers of ``slave/operation``: :class:`~teleop_core.operation.State`, flags,
+:class:`~teleop_core.operation.Fault`, the joint that it is about (-1: none), what was found and
+what it must not exceed."""
+
 
 class Quality(Enum):
     """How a topic is transported."""
@@ -120,7 +128,8 @@ class Stamp:
         text: The rule in words.
         of: Name of the topic whose stamp is passed on; empty where it is the time of sampling.
         is_in_force: Whether the writer itself says which command's stamp it is, because it may
-            hold an older one. Such a stamp may come again, and is 0 before the first command.
+            hold an older one. Such a stamp may come again, and is :data:`NO_COMMAND_NS` before the
+            first command.
     """
 
     text: str
@@ -128,6 +137,9 @@ class Stamp:
     is_in_force: bool = False
 
 
+NO_COMMAND_NS = 1
+"""Stamp of what is in force before the first command [ns]: older than any, but not 0, which CRTK
+reads as invalid."""
 SAMPLED = Stamp("sampling time")
 
 
@@ -230,6 +242,10 @@ SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, SAMPLED, "slave_base"
 SLAVE_MEASURED_CP = Topic("slave/measured_cp", Kind.POSE, SAMPLED, "slave_base")
 SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
 """Where the tip really is, which no encoder sees: only a simulator knows, or a tracker."""
+SLAVE_OPERATION = Topic("slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED,
+                        columns=OPERATION)  # fmt: skip
+"""Whether the slave may move, what stopped it, and what it takes to go on; sent where it changes.
+See :mod:`teleop_core.operation`."""
 TELEOP_STATE = Topic(
     "teleop/state", Kind.REPORT, passed_on("master/measured_cp"), quality=Quality.LATCHED,
     columns=(
@@ -247,5 +263,7 @@ STREAMS = (
     SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_TRUE_CP,
 )  # fmt: skip
 """Topics of the built-in stages that carry one message per tick."""
-ALL = (*STREAMS, TELEOP_STATE, DIAGNOSTICS)
+REPORTS = (SLAVE_OPERATION, TELEOP_STATE)
+"""Topics of the built-in stages that are sent where they change."""
+ALL = (*STREAMS, *REPORTS, DIAGNOSTICS)
 BY_NAME = {topic.name: topic for topic in ALL}

@@ -13,7 +13,13 @@ from teleop_core.evaluation.pose_errors import PoseErrors, pose_errors
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array
-from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
+from teleop_core.topics import (
+    NO_COMMAND_NS,
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+    Topic,
+)
 
 TRACKED: tuple[Topic, ...] = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
 """Topics that :func:`tracked` compares."""
@@ -53,7 +59,7 @@ def _track(window: Window) -> Tracked:
     partner = same_tick(all_measured.log_ns, setpoint.log_ns)[window.own(SLAVE_MEASURED_CP)]
     # Until a command is in force, as on the way to where it starts, the slave follows nobody.
     is_led = partner == NONE
-    is_led[~is_led] = setpoint.stamp_ns[partner[~is_led]] != 0
+    is_led[~is_led] = setpoint.stamp_ns[partner[~is_led]] > NO_COMMAND_NS
     measured, partner = measured.only(is_led), partner[is_led]
     poses, setpoints = measured.values, rows_of(setpoint, partner)
     commands = rows_of(command, latest(measured.stamp_ns, command.stamp_ns))

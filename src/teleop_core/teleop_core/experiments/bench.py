@@ -11,6 +11,7 @@ from teleop_core.evaluation import Score
 from teleop_core.geometry import Array
 from teleop_core.recording import Stream
 from teleop_core.slave.slave_sim import SlaveSimParameters
+from teleop_core.topics import NO_COMMAND_NS
 
 Setting = float | str | bool | tuple[float, ...] | tuple[str, ...]
 Settings = Mapping[str, Setting]
@@ -70,7 +71,7 @@ class Session:
     @property
     def is_followed(self) -> NDArray[np.bool_]:
         """Whether the slave follows the hand, for each of its poses (N,): not on its way there."""
-        return self["slave/setpoint_cp"].stamp_ns > 0
+        return self["slave/setpoint_cp"].stamp_ns > NO_COMMAND_NS
 
 
 def _silent(done: int, total: int) -> None:

@@ -12,7 +12,8 @@ from teleop_core.kernels import kernel
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.hardware import Hardware
 from teleop_core.signals import TICK_NS
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters, slave_step
+from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.step import slave_step
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 
 _FINE = 1e-4  # of an encoder step

@@ -45,6 +45,7 @@ from teleop_core.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
     MASTER_SERVO_CF,
+    NO_COMMAND_NS,
     SLAVE_REACH,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
@@ -160,7 +161,7 @@ def _follows(p: Any, s: Any, row: Any) -> bool:
     """Whether the slave had the last command in force, and the master has not paused since."""
     pause_ns = row.master_measured_cp_ns - s.last_ns
     lag_ns = s.last_ns - row.slave_setpoint_cp_ns
-    is_known = row.slave_setpoint_cp_ns != 0 and s.last_ns != 0
+    is_known = row.slave_setpoint_cp_ns > NO_COMMAND_NS and s.last_ns != 0
     return is_known and pause_ns <= p.pause_ns and lag_ns <= max(p.timeout_ns, 2 * pause_ns)
 
 

@@ -3,12 +3,10 @@
 import time
 from typing import Any
 
-from teleop_core.bags.reports import read_reports
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.streams import Waiter
-from teleop_core.session.runner import state_report
 from teleop_core.signals import DT
-from teleop_core.topics import Kind, Topic
+from teleop_core.topics import Topic
 
 
 class AnsweringNode(CoreNode):
@@ -27,18 +25,12 @@ class AnsweringNode(CoreNode):
         self._needed = [self.input(topic) for topic in self.description.needs]
         self._stamp_fields = (f"{self._trigger.field}_ns", "now_ns")
         self._waiter: Waiter | None = None
-        self._report = next((t for t in self.description.writes if t.kind is Kind.REPORT), None)
-        if self._report is not None:
-            self._reporter_of_state = self.open_publisher(self._report)
-            self._state = self.row[self._report.field]
-            read_reports(state_report(0, self._state))  # loads the message types, 60 ms
 
     def start(self) -> None:
         """Start from where the slave is, whatever was before."""
         self.stage.reset()
         for port in self.description.reads:
             self.row[f"{port.field}_ns"] = 0
-        self._reported: tuple[bytes, Any] = (b"", None)
 
     def turn(self) -> None:
         """Answer the next message."""
@@ -74,17 +66,7 @@ class AnsweringNode(CoreNode):
         self.ports.send(stamp_ns)
         self.counts.ticks += 1
         self.delay.put(time.time_ns() - stamp_ns)
-        if self._report is not None:
-            self._send_report(stamp_ns)
-
-    def _send_report(self, stamp_ns: int) -> None:
-        """Report the state if it, or a parameter that may be told beside it, has changed."""
-        bits, parameters = self._state.tobytes(), self.parameters
-        if bits == self._reported[0] and parameters is self._reported[1]:
-            return
-        self._reported = bits, parameters
-        described: dict[str, str] = getattr(self.stage, "described", dict)()
-        self._reporter_of_state.publish(state_report(stamp_ns, self._state, described))
+        self.send_report(stamp_ns)
 
     def concerns(self) -> list[str]:
         """Topics that are missing or silent."""

@@ -14,6 +14,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 
+from teleop_core.bags.reports import read_reports
 from teleop_core.errors import ParameterError, SessionError, TeleopError
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
@@ -24,9 +25,10 @@ from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.streams import Input, Unattended, message_type, profile
 from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.layers import RealTimeParameters
+from teleop_core.session.runner import report_of
 from teleop_core.signals import TICK_NS
 from teleop_core.stage import Stage, joints_of
-from teleop_core.topics import Topic
+from teleop_core.topics import Kind, Topic
 
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE,
@@ -116,6 +118,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self._loop: Loop | None = None
         self.ports = NO_PORTS
         self._own_publishers: list[Any] = []
+        self._report: Topic | None = None
+        self._reported: tuple[bytes, Any] = (b"", None)
         self._fresh_counts()
         self._word = "unconfigured"
         self._reporter = Reporter(self)
@@ -136,6 +140,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
             self.options.feeds, self.open_publisher,
         )  # fmt: skip
         self.row = self.ports.row
+        self._open_report()
 
     def turn(self) -> None:
         """One round of work; blocks for a tenth of a second at most."""
@@ -205,6 +210,26 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         publisher = self.create_lifecycle_publisher(kind, topic.name, profile(topic))
         self._own_publishers.append(publisher)
         return publisher
+
+    def _open_report(self) -> None:
+        """Open the topic that is sent where it changes, if the stage has one."""
+        own = (topic for topic in self.description.writes if topic.kind is Kind.REPORT)
+        self._report = next(own, None)
+        if self._report is not None:
+            self._report_publisher = self.open_publisher(self._report)
+            self._state = self.row[self._report.field]
+            read_reports(report_of(self._report, 0, self._state))  # loads the message types, 60 ms
+
+    def send_report(self, stamp_ns: int) -> None:
+        """Report the state if it, or a parameter that may be told beside it, has changed."""
+        if self._report is None:
+            return
+        bits, parameters = self._state.tobytes(), self.parameters
+        if bits == self._reported[0] and parameters is self._reported[1]:
+            return
+        self._reported = bits, parameters
+        described: dict[str, str] = getattr(self.stage, "described", dict)()
+        self._report_publisher.publish(report_of(self._report, stamp_ns, self._state, described))
 
     def input(self, port: Topic) -> Input:
         """What the node reads at a port, of several the one that others are added to."""

@@ -32,7 +32,7 @@ from teleop_core.bags.messages import (
     report,
 )
 from teleop_core.geometry import Array
-from teleop_core.topics import Kind, Quality, Topic
+from teleop_core.topics import NO_COMMAND_NS, Kind, Quality, Topic
 
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""
@@ -215,7 +215,7 @@ class Input:
     def _accept(self, stamp_ns: int, values: Values) -> bool:
         now_ns, last_ns = time.monotonic_ns(), self.stamp_ns
         may_repeat = self.topic.stamp.is_in_force or self._layout is None
-        if now_ns - self.arrival_ns > SILENCE_NS or (may_repeat and stamp_ns == 0):
+        if now_ns - self.arrival_ns > SILENCE_NS or (may_repeat and stamp_ns <= NO_COMMAND_NS):
             last_ns = None
         elif may_repeat and last_ns is not None:
             last_ns -= 1

@@ -29,6 +29,7 @@ class TickingNode(CoreNode):
             self.row["now_ns"] = now_ns
             self.advance(now_ns)
             self.ports.send(now_ns)
+            self.send_report(now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Make one step that starts at ``now_ns`` [ns]."""

@@ -15,6 +15,7 @@ from teleop_core.robots.parameters import RobotParameters
 from teleop_core.signals import DT, assign, copy
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
+    NO_COMMAND_NS,
     SLAVE_REACH,
     SLAVE_SERVO_CP,
     SLAVE_SERVO_JP,
@@ -124,7 +125,7 @@ def _explain(p: Any, solver: Any, reach: Array) -> None:
 @inner
 def _has_own_way(s: Any, solver: Any, row: Any, timeout_ns: int) -> bool:
     """Whether the slave does not follow: its setpoint is an old one, or moves by itself."""
-    if row.slave_setpoint_js_ns != 0:
+    if row.slave_setpoint_js_ns > NO_COMMAND_NS:
         return bool(s.last_ns - row.slave_setpoint_js_ns > timeout_ns)
     moves = False
     for i in range(solver.before.shape[0]):

@@ -13,12 +13,13 @@ from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 from teleop_core.geometry import Array
 from teleop_core.graph import RECORDER_NAME, Member
+from teleop_core.operation import operation_level, operation_text
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION, Layer, parse_text
 from teleop_core.session.virtual import BLOCK, VirtualTime, stamps_of
 from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import TELEOP_STATE, Kind, Topic, limit_text
+from teleop_core.topics import OPERATION, TELEOP_STATE, Kind, Topic, limit_text
 
 Progress = Callable[[int, int], None]
 
@@ -236,18 +237,26 @@ class NewSamples:
         return stamps[is_new], values[is_new], log_ns[is_new]
 
 
-def state_report(stamp_ns: int, state: Array, described: Mapping[str, str] | None = None) -> bytes:
-    """Message of teleop/state, as CDR bytes.
+def report_of(
+    topic: Topic, stamp_ns: int, row: Array, described: Mapping[str, str] | None = None
+) -> bytes:
+    """Message of a report's topic, as CDR bytes.
 
     Args:
+        topic: Such as :data:`~teleop_core.topics.TELEOP_STATE`.
         stamp_ns: Stamp [ns].
-        state: Row of :data:`STATE_FIELDS`.
+        row: Its numbers (columns,).
         described: Further names and texts, such as what the fixture is.
     """
-    values = {name: repr(float(value)) for name, value in zip(STATE_FIELDS, state, strict=True)}
-    more = dict(described or {})
-    text = state_text(state, more.get("fixture", "box"))
-    return report(stamp_ns, "teleop", 0, text, values | more)
+    values = {name: repr(float(value)) for name, value in zip(topic.columns, row, strict=True)}
+    more, name, level, text = dict(described or {}), topic.name, 0, ""
+    if topic.columns == STATE_FIELDS:
+        name, text = "teleop", state_text(row, more.get("fixture", "box"))
+    elif topic.columns == OPERATION:
+        numbers = dict(zip(OPERATION, row.tolist(), strict=True))
+        names = tuple(more.pop("joints", "").split())
+        level, text = operation_level(numbers), operation_text(numbers, names)
+    return report(stamp_ns, name, level, text, values | more)
 
 
 def state_text(state: Array, fixture: str = "box") -> str:
@@ -296,6 +305,6 @@ class _Report:
         changed = (states != np.vstack((self._last, states[:-1]))).any(axis=1)
         described: dict[str, str] = getattr(self._stage, "described", dict)()
         for i in np.flatnonzero(changed):
-            data = state_report(int(stamps[i]), states[i], described)
+            data = report_of(self._topic, int(stamps[i]), states[i], described)
             writer.write(self._topic, int(block["now_ns"][i]), data)
         self._last = np.array(states[-1])

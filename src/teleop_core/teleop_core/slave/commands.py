@@ -1,11 +1,16 @@
-"""Commands: how the slave takes references, moves its setpoint and comes to where it starts."""
+"""Commands: how the slave takes references, moves its setpoint, to a goal too, and stops it."""
 
+import math
 from enum import IntEnum
 from typing import Any
 
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner
 from teleop_core.mapping.filters import lag_step
+from teleop_core.operation.faults import Fault
+from teleop_core.operation.states import State
+from teleop_core.operation.watch import fail
+from teleop_core.signals import copy
 from teleop_core.slave.interpolation import begin_way
 
 
@@ -15,26 +20,110 @@ class CommandStatus(IntEnum):
     FRESH = 0  # followed
     STALE = 1  # none came for longer than the command timeout: the last one is held
     REFUSED = 2  # too far from the one in force to be the same motion: the last one is held
-    MOVING = 3  # on the way to where the slave starts: nothing is followed yet
+    MOVING = 3  # on the way to a goal, as to where the slave starts: nothing is followed
+    CLOSED = 4  # not enabled, or not homed: nothing is followed
 
 
 # Stamps this far ahead of the slave's clock are an error, not a clock that is a little ahead.
 _FUTURE_NS = 1_000_000_000
 # Commands that are further apart than this are no stream [ns].
 _SLOWEST_NS = 500_000_000
+AT_LIMITS, AT_ONCE, WITH_ARM = 0, 1, 2
+"""Ways in which a setpoint comes to rest."""
+# Parts of a way in which the tip's speed is looked at.
+_PARTS = 32
+_ENABLED, _SILENCE, _JUMP = int(State.ENABLED), int(Fault.SILENCE), int(Fault.JUMP)
 
 
 @inner
-def move_to_start(p: Any, s: Any) -> None:
-    """Make a tick of the cubic move from home to where the slave starts."""
+def plan_move(p: Any, s: Any, arm: Any, dt: float) -> None:
+    """Begin the cubic move from the setpoint to ``move_to``, as fast as all limits allow.
+
+    Joints keep their share of the speed limits and the acceleration of their drives, the tip its
+    speed, as far as a straight way through joint space of 32 parts tells.
+    """
+    longest = 0.0
+    for i in range(s.setpoint.shape[0]):
+        s.move_to[i] = min(max(s.move_to[i], p.lower[i]), p.upper[i])
+        s.move_from[i] = s.setpoint[i]
+        way = abs(s.move_to[i] - s.move_from[i])
+        longest = max(longest, 1.5 * way / (p.start_speed * p.speed_limit[i]))
+        longest = max(longest, math.sqrt(6.0 * way / p.braking[i]))
+    x, y, z = 0.0, 0.0, 0.0
+    for part in range(_PARTS + 1):
+        for i in range(s.setpoint.shape[0]):
+            arm.joints[i] = s.move_from[i] + part / _PARTS * (s.move_to[i] - s.move_from[i])
+        arm.fk(arm.joints, arm.geometry, arm.T)
+        if part > 0:
+            dx, dy, dz = arm.T[0, 3] - x, arm.T[1, 3] - y, arm.T[2, 3] - z
+            length = math.sqrt(dx * dx + dy * dy + dz * dz)
+            longest = max(longest, 1.5 * _PARTS * length / p.tool_speed)
+        x, y, z = arm.T[0, 3], arm.T[1, 3], arm.T[2, 3]
+    s.move_ticks, s.moved_ticks, s.must_plan = math.ceil(longest / dt), 0, 0
+
+
+@inner
+def advance_move(s: Any) -> None:
+    """Make a tick of the cubic move."""
+    if s.moved_ticks >= s.move_ticks:
+        return
     s.moved_ticks += 1
-    share = s.moved_ticks / p.start_ticks
+    share = s.moved_ticks / s.move_ticks
     share = share * share * (3.0 - 2.0 * share)
-    for i in range(p.home.shape[0]):
-        place = p.start[i] if s.moved_ticks == p.start_ticks else (
-            p.home[i] + share * (p.start[i] - p.home[i])
+    for i in range(s.setpoint.shape[0]):
+        place = s.move_to[i] if s.moved_ticks == s.move_ticks else (
+            s.move_from[i] + share * (s.move_to[i] - s.move_from[i])
         )  # fmt: skip
+        s.step[i] = place - s.setpoint[i]
         s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i] = place
+
+
+@inner
+def come_to_rest(p: Any, s: Any, how: int, dt: float) -> None:
+    """Stop the setpoint: at once, at what the drives can brake, or where the brakes hold the arm.
+
+    Args:
+        p: Parameters.
+        s: State; written.
+        how: :data:`AT_LIMITS`, as the drives can brake; :data:`AT_ONCE`, it stands still from this
+            tick on; or :data:`WITH_ARM`, the drives are off and it goes to where the arm is.
+        dt: Tick [s].
+    """
+    for i in range(s.setpoint.shape[0]):
+        step = s.step[i]
+        if how == WITH_ARM:
+            reach = p.speed_limit[i] * dt
+            step = min(max(s.measured[i] - s.setpoint[i], -reach), reach)
+        elif how == AT_ONCE:
+            step = 0.0
+        else:
+            less = p.braking[i] * dt * dt
+            step = max(0.0, step - less) if step > 0.0 else min(0.0, step + less)
+        before = s.setpoint[i]
+        s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
+        s.step[i] = s.setpoint[i] - before
+        s.command[i] = s.filtered[i] = s.setpoint[i]
+    s.span, s.ticks = 0, 1
+
+
+@inner
+def _not_followed(s: Any, row: Any) -> int:
+    """Status of an arm that follows nothing; what comes meanwhile is seen, and old later."""
+    s.seen_ns = max(s.seen_ns, row.slave_servo_jp_ns)
+    s.arrival_ns, s.in_row = 0, 0
+    return 3 if s.is_busy else 4
+
+
+@inner
+def _age_of_command(p: Any, s: Any, now_ns: int) -> int:
+    """FRESH or STALE; a stream of commands that was silent for too long pauses the arm."""
+    silence_ns = now_ns - s.arrival_ns
+    if silence_ns <= p.timeout_ns:
+        return 0
+    if s.in_row > 0 and 0 < p.outage_ns < silence_ns:
+        fault = _JUMP if s.refused > s.refused_before else _SILENCE
+        fail(p, s, fault, -1, 1e-9 * silence_ns, 1e-9 * p.outage_ns)
+    return 1
 
 
 @inner
@@ -48,9 +137,8 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
     if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
         s.refused += 1
         return 2
-    if s.moved_ticks < p.start_ticks:
-        s.seen_ns = max(s.seen_ns, stamp)
-        return 3
+    if s.state != _ENABLED or s.is_busy or not s.is_homed:
+        return _not_followed(s, row)
     if stamp > s.seen_ns:
         period_ns = min(stamp - s.seen_ns, _SLOWEST_NS) if s.seen_ns > 0 else 0
         s.seen_ns = stamp
@@ -59,17 +147,36 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
             near = abs(row.slave_servo_jp[i] - s.target[i]) <= p.speed_limit[i] * far
             if not near:  # NaN is not near either
                 s.refused += 1
+                _age_of_command(p, s, now_ns)
                 return 2
         # Commands whose stamps run ahead of the clock that they come by are as near as they come.
         begin_way(p, s, row.slave_servo_jp, min(period_ns, now_ns - s.arrival_ns), dt)
-        s.command_stamp_ns, s.arrival_ns = stamp, now_ns
-    return 1 if now_ns - s.arrival_ns > p.timeout_ns else 0
+        is_next = s.arrival_ns > 0 and now_ns - s.arrival_ns <= p.timeout_ns
+        s.in_row = s.in_row + 1 if is_next else 0
+        s.command_stamp_ns, s.arrival_ns, s.refused_before = stamp, now_ns, s.refused
+    return _age_of_command(p, s, now_ns)
+
+
+@inner
+def follows(p: Any, s: Any, now_ns: int) -> bool:
+    """Whether the setpoint goes to the command: it is fresh, or alone and no stream that broke."""
+    if s.state != _ENABLED or s.is_busy or not s.is_homed:
+        return False
+    return bool(now_ns - s.arrival_ns <= p.timeout_ns or s.in_row == 0)
 
 
 @inner
 def advance_setpoint(p: Any, s: Any, before: Array, dt: float) -> None:
-    """Filter the command and move the setpoint there, never faster than the drive can."""
+    """Filter the command and move the setpoint there, within the limits of speed and acceleration.
+
+    Args:
+        p: Parameters.
+        s: State; written.
+        before: Command (n,) of the last tick [rad or m].
+        dt: Tick [s].
+    """
     for i in range(before.shape[0]):
+        lagged = s.filtered[i]
         if p.is_filtered:
             s.filtered[i] = lag_step(
                 s.command[i], before[i], s.filtered[i], p.filter_gain, p.filter_zero,
@@ -79,4 +186,58 @@ def advance_setpoint(p: Any, s: Any, before: Array, dt: float) -> None:
             s.filtered[i] = s.command[i]
         reach = p.speed_limit[i] * dt
         step = min(max(s.filtered[i] - s.setpoint[i], -reach), reach)
-        s.setpoint[i] = min(max(s.setpoint[i] + step, p.lower[i]), p.upper[i])
+        most = p.acceleration[i] * dt * dt
+        if abs(step - s.step[i]) > most:
+            step = _eased(s.filtered[i] - s.setpoint[i], s.filtered[i] - lagged, s.step[i], most)
+            step = min(max(step, -reach), reach)
+        began = s.setpoint[i]
+        s.setpoint[i] = min(max(began + step, p.lower[i]), p.upper[i])
+        s.step[i] = s.setpoint[i] - began
+
+
+@inner
+def _eased(ahead: float, flow: float, step: float, most: float) -> float:
+    """Step of a setpoint that may change its step by ``most``, towards a place that moves on.
+
+    Relative to that place, which is ``ahead`` and moves by ``flow`` a tick, it goes no faster than
+    it can brake: from r, in steps of ``most``, the way to rest is r (r + most) / (2 most).
+    """
+    room = abs(ahead)
+    relative = 0.5 * (math.sqrt(most * (most + 8.0 * room)) - most)
+    relative = min(relative, room)
+    wanted = flow + (relative if ahead > 0.0 else -relative)
+    return min(max(wanted, step - most), step + most)
+
+
+@inner
+def limit_tool(p: Any, s: Any, arm: Any, last: Array, dt: float) -> None:
+    """Shorten the step of all joints where the tip would be too fast; write the setpoint's pose.
+
+    Args:
+        p: Parameters with ``tool_speed`` [m/s] and ``tool_acceleration`` [m/s²].
+        s: State with ``setpoint`` and its last ``step`` (n,); written.
+        arm: Its ``setpoint`` and ``T``, the pose of it, are written.
+        last: Pose (7,) of the setpoint a tick ago.
+        dt: Tick [s].
+    """
+    copy(s.setpoint, arm.setpoint)
+    arm.fk(arm.setpoint, arm.geometry, arm.T)
+    most = min(p.tool_speed * dt, s.tool_step + p.tool_acceleration * dt * dt)
+    step = _distance(arm.T, last)
+    if step > most:
+        share = most / step
+        for i in range(s.setpoint.shape[0]):
+            s.setpoint[i] -= (1.0 - share) * s.step[i]
+            s.step[i] *= share
+        if s.is_busy:
+            s.moved_ticks -= 1  # the move takes longer
+        copy(s.setpoint, arm.setpoint)
+        arm.fk(arm.setpoint, arm.geometry, arm.T)
+        step = _distance(arm.T, last)
+    s.tool_step = step
+
+
+@inner
+def _distance(T: Array, pose: Array) -> float:
+    dx, dy, dz = T[0, 3] - pose[0], T[1, 3] - pose[1], T[2, 3] - pose[2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)

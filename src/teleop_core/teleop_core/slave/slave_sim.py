@@ -2,14 +2,24 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from teleop_core.controllers import CONTROLLERS, per_joint
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array, pose_from_transform
-from teleop_core.kernels import inner, kernel, pointer, records
+from teleop_core.kernels import kernel, pointer
+from teleop_core.operation import (
+    Answer,
+    Event,
+    Fault,
+    OperationParameters,
+    State,
+    command_event,
+)
+from teleop_core.operation.states import answer_text, change
+from teleop_core.operation.watch import fail
 from teleop_core.parameters import Choice, choice, parameter
 from teleop_core.plants import PER_JOINT, PLANTS, Physics
 from teleop_core.robots import dh_kernels, load_robot_set
@@ -17,28 +27,27 @@ from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.robot import Robot
-from teleop_core.signals import DT, copy
-from teleop_core.slave.commands import (
-    advance_setpoint,
-    move_to_start,
-    take_command,
-)
-from teleop_core.slave.friction import bristle_damping, wander
-from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way
-from teleop_core.slave.joints import integrate
-from teleop_core.slave.rigid_body import write_model
+from teleop_core.signals import DT, assign
+from teleop_core.slave.friction import bristle_damping
+from teleop_core.slave.step import SPEED_LAG, Arm, slave_records, slave_step
 from teleop_core.slave.trajectory import shortest_move_time
-from teleop_core.slave.transmission import follow_encoders
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
+    NO_COMMAND_NS,
+    OPERATION,
     SLAVE_MEASURED_CP,
     SLAVE_MEASURED_JS,
+    SLAVE_OPERATION,
     SLAVE_SERVO_JP,
     SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
     SLAVE_TRUE_CP,
 )
 
+_TIMES = {
+    "heartbeat": "heartbeat_ns", "longest_outage": "outage_ns", "pressing_time": "pressing_ns"
+}  # fmt: skip
+_STOP, _PRESSED = int(Event.STOP), int(Fault.STOP)
 _FILTER_SOURCE = "published: Vongbunyong 2008, eq. 6.2.8"
 INTERPOLATIONS = ("none", "linear", "minimum_jerk")
 
@@ -118,140 +127,13 @@ class SlaveSimParameters(RobotParameters):
     plant: PlantParameters = field(default_factory=PlantParameters)
     controller: ControllerParameters = field(default_factory=ControllerParameters)
     reference_filter: ReferenceFilterParameters = field(default_factory=ReferenceFilterParameters)
+    operation: OperationParameters = field(default_factory=OperationParameters)
 
     def start_of(self, robot: Robot) -> Array:
         """Joints (n,) from which a robot follows [rad or m]."""
         if self.start:
             return np.array(self.start, dtype=np.float64)
         return robot.home.copy() if self.starts_at_home else robot.start.copy()
-
-
-def _records(n: int) -> tuple[Any, Any]:
-    """Parameter and state record of an arm with ``n`` joints."""
-    joints = (*PER_JOINT, "bristle_damping", "lower", "upper", "effort_limit", "speed_limit",
-              "compensated", "home", "start")  # fmt: skip
-    scalars = ("filter_gain", "filter_zero", "filter_pole", "wander_rate")
-    counts = ("is_filtered", "steps", "timeout_ns", "interpolation", "start_ticks")
-    rows = [(name, "f8", (n,)) for name in joints]
-    numbers = [(name, "f8") for name in scalars] + [(name, "i8") for name in counts]
-    moved = ("command", "filtered", "setpoint", "target", *WAY_FIELDS)
-    plant = ("measured", "speed", "bent", "grip", "astray", "carried")
-    state = [(name, "f8", (n,)) for name in (*moved, *plant)] + [("noise", "i8", (n,))]
-    stamps = (
-        "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "moved_ticks", "ticks", "span"
-    )  # fmt: skip
-    return records([*rows, *numbers])[0], records([*state, *((name, "i8") for name in stamps)])[0]
-
-
-class Arm(NamedTuple):
-    """Model, control law and motion of the arm: pointers and plain arrays, which kernels take."""
-
-    fk: Any
-    tip_fk: Any  # of the links as they were made
-    acceleration: Any
-    gravity: Any
-    control: Any
-    geometry: Array
-    tip_geometry: Array
-    coupling: Array
-    dynamics: Array
-    model: Array  # the dynamics that the control law knows
-    gains: Array
-    memory: Array  # of the control law
-    q: Array  # joint positions (n,) at the encoders, unrounded
-    dq: Array
-    effort: Array
-    setpoint: Array
-    measured: Array
-    feedforward: Array  # (n,); (2 n + n²,) for laws that take the model
-    limit: Array
-    joints: Array  # room for joints
-    tip: Array  # true joint positions (n,), behind the transmission
-    T: Array
-
-
-@inner
-def _measure(p: Any, s: Any, q: Array, dt: float) -> None:
-    """Read the encoders."""
-    for i in range(q.shape[0]):
-        measured = round(q[i] / p.encoder_step[i]) * p.encoder_step[i]
-        # Speed from encoder differences through a 5 ms low-pass: what a real drive reports.
-        s.speed[i] += ((measured - s.measured[i]) / dt - s.speed[i]) * (dt / (dt + 5e-3))
-        s.measured[i] = measured
-
-
-@inner
-def _control(p: Any, s: Any, arm: Any, dt: float) -> None:
-    """Write the effort that the control law asks for."""
-    n = arm.q.shape[0]
-    copy(s.setpoint, arm.setpoint)
-    copy(s.measured, arm.measured)
-    arm.gravity(arm.measured, arm.model, arm.feedforward[:n])
-    for i in range(n):
-        arm.feedforward[i] *= p.compensated[i]
-    if arm.feedforward.shape[0] > n:
-        copy(s.speed, arm.joints)
-        write_model(arm.acceleration, arm.model, arm.measured, arm.joints, arm.feedforward[n:])
-    arm.control(
-        arm.gains, arm.memory, arm.setpoint, arm.measured, arm.feedforward, arm.limit, dt,
-        arm.effort,
-    )  # fmt: skip
-
-
-@inner
-def _drive(p: Any, arm: Any) -> None:
-    """Make of the effort asked for the one that the motors give."""
-    for i in range(arm.q.shape[0]):
-        asked, limit, step = arm.effort[i], arm.limit[i], p.effort_step[i]
-        if step > 0.0:
-            asked = round(asked / step) * step
-        arm.effort[i] = min(max(asked + p.bias[i], -limit), limit)
-        # The motor gives no drive beyond its rated speed, fading out over the next tenth.
-        over = abs(arm.dq[i]) / p.speed_limit[i] - 1.0
-        if over > 0.0 and arm.effort[i] * arm.dq[i] > 0.0:
-            arm.effort[i] *= max(0.0, 1.0 - 10.0 * over)
-
-
-@kernel
-def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
-    """One control tick: write the slave's setpoint, measured and true topics, and command_status.
-
-    What is measured is sampled at the start of the tick, together with the setpoint it is held
-    against; then the arm moves on under constant effort.
-
-    Args:
-        p: Parameter record.
-        s: State record; written.
-        arm: :class:`Arm`; its motion is written.
-        row: Signals.
-        dt: Tick [s].
-    """
-    joints, n = arm.joints, arm.q.shape[0]
-    copy(s.command, joints)
-    row.command_status = take_command(p, s, row, dt)
-    if s.moved_ticks < p.start_ticks:
-        move_to_start(p, s)
-    else:
-        advance_on_way(p, s)
-        advance_setpoint(p, s, joints, dt)
-    _measure(p, s, arm.q, dt)
-    _control(p, s, arm, dt)
-    _drive(p, arm)
-    for i in range(n):
-        row.slave_setpoint_js[i] = s.setpoint[i]
-        row.slave_measured_js[i] = s.measured[i]
-        row.slave_measured_js[n + i] = s.speed[i]
-        row.slave_measured_js[2 * n + i] = arm.effort[i]
-    arm.fk(arm.setpoint, arm.geometry, arm.T)
-    pose_from_transform(arm.T, row.slave_setpoint_cp)
-    arm.fk(arm.measured, arm.geometry, arm.T)
-    pose_from_transform(arm.T, row.slave_measured_cp)
-    follow_encoders(p, s, arm.q, arm.coupling, arm.tip)
-    arm.tip_fk(arm.tip, arm.tip_geometry, arm.T)
-    pose_from_transform(arm.T, row.slave_true_cp)
-    row.slave_setpoint_js_ns = row.slave_setpoint_cp_ns = s.command_stamp_ns
-    wander(p, s)
-    integrate(arm.acceleration, arm.dynamics, p, s, p.steps, arm.effort, arm.q, arm.dq, dt)
 
 
 class SlaveSim(RunningStage):
@@ -270,7 +152,7 @@ class SlaveSim(RunningStage):
             raise ParameterError("slave_sim.robot", parameters.robot, "a robot with drives")
         n, model = self.robot.n, self.robot.dynamics
         super().__init__(SLAVE_SIM, n, dt)
-        self.parameters, self.state = _records(n)
+        self.parameters, self.state = slave_records(n)
         self._law = CONTROLLERS.find(parameters.controller.kind.kind)
         self._seed, physics = parameters.seed, self._physics(parameters)
         gains = self._gains(parameters, physics.viscous)
@@ -296,20 +178,21 @@ class SlaveSim(RunningStage):
         )  # fmt: skip
         self.kernel, self.arguments = slave_step, (self.parameters, self.state, self.arm)
         self._take_start(parameters)
+        self._take_script(parameters.operation)
         self.retune(parameters)
         self.reset()
 
     def reset(self) -> None:
         """Back to home, at rest, with no command in force."""
         s, home, arm = self.state, self.robot.home, self.arm
-        for name in ("command", "filtered", "setpoint", "target", *WAY_FIELDS):
-            s[name] = home if name not in WAY_FIELDS else 0.0
-        s["moved_ticks"] = s["ticks"] = s["span"] = 0
+        assign(s, 0)
+        for name in ("command", "filtered", "setpoint", "target", "move_from"):
+            s[name] = home
+        self._begin_operation()
         step = self.parameters["encoder_step"]
         s["measured"], s["speed"] = np.round(home / step) * step, 0.0
-        s["command_stamp_ns"] = s["arrival_ns"] = s["seen_ns"] = s["refused"] = 0
         arm.q[:], arm.dq[:], arm.effort[:], arm.memory[:] = home, 0.0, 0.0, 0.0
-        s["bent"], s["astray"], s["grip"], s["carried"] = 0.0, 0.0, 1.0, home
+        s["grip"], s["carried"] = 1.0, home
         s["noise"] = (
             np.random.SeedSequence(self._seed).generate_state(self.robot.n) % 2147483646 + 1
         )
@@ -318,7 +201,7 @@ class SlaveSim(RunningStage):
         self._law.begin(arm.memory, np.array(s["measured"]), held)
         row, transform = self.signals, np.empty((4, 4))
         row["slave_setpoint_js"] = home
-        row["slave_setpoint_js_ns"] = row["slave_setpoint_cp_ns"] = 0
+        row["slave_setpoint_js_ns"] = row["slave_setpoint_cp_ns"] = s["command_stamp_ns"]
         self.robot.kernels.fk(arm.q, arm.geometry, transform)
         pose_from_transform(transform, row["slave_setpoint_cp"])
 
@@ -352,6 +235,8 @@ class SlaveSim(RunningStage):
         p["steps"] = parameters.integration_steps
         p["timeout_ns"] = round(parameters.command_timeout * 1e9)
         p["interpolation"] = INTERPOLATIONS.index(parameters.interpolation)
+        p["start_speed"] = parameters.start_speed
+        self._take_operation(parameters.operation)
 
     def _take_start(self, parameters: SlaveSimParameters) -> None:
         """Plan the move from home to where the slave starts.
@@ -370,12 +255,12 @@ class SlaveSim(RunningStage):
             raise ParameterError("slave_sim.start", parameters.start, needed)
         speed = robot.drives.speed_limit * parameters.start_speed
         time = shortest_move_time(robot.home, start, speed)
-        p["home"], p["start"], p["start_ticks"] = robot.home, start, math.ceil(time / self.dt)
+        p["start"], self._start_ticks = start, math.ceil(time / self.dt)
 
     @property
     def lead(self) -> int:
         """Ticks of the move from home to where the slave starts; nothing is followed before."""
-        return int(self.parameters["start_ticks"])
+        return self._start_ticks
 
     def _physics(self, parameters: SlaveSimParameters) -> Physics:
         """Numbers of the plant, with the friction that the slave's own parameters give."""
@@ -402,10 +287,112 @@ class SlaveSim(RunningStage):
         self.robot.dynamics.gravity(self.arm.q, dynamics, effort)
         return effort
 
+    # -- operation -------------------------------------------------------------------------------
+
+    def _begin_operation(self) -> None:
+        """Enabled and on the way to where it starts, or disabled and not homed."""
+        s = self.state
+        s["command_stamp_ns"], s["fault_joint"] = NO_COMMAND_NS, -1
+        s["move_to"], s["move_ticks"] = self.parameters["start"], self._start_ticks
+        if self._starts_enabled:
+            s["state"] = State.ENABLED
+            s["is_homed"] = self._start_ticks == 0
+            s["is_busy"] = s["is_homing"] = self._start_ticks > 0
+
+    def _take_script(self, given: OperationParameters) -> None:
+        """Write the commands that come by themselves."""
+        self._starts_enabled, script = given.starts_enabled, given.script()
+        self.parameters["event_count"] = len(script)
+        for index, (seconds, event) in enumerate(script):
+            self.parameters["event"][index] = event
+            self.parameters["event_ns"][index] = round(seconds * 1e9)
+
+    def _take_operation(self, given: OperationParameters) -> None:
+        """Write bounds of motion and of faults; those that nobody gave follow from the drives."""
+        robot, p, drives = self.robot, self.parameters, self.robot.drives
+        assert drives is not None
+        p["braking"] = drives.effort_limit / drives.inertia
+        p["acceleration"] = p["braking"] * given.acceleration_share
+        reach = np.linalg.norm(robot.jacobian(robot.home)[:3], axis=0)
+        p["tool_speed"] = given.tool_speed or np.max(reach * drives.speed_limit)
+        p["tool_acceleration"] = given.tool_acceleration or np.max(reach * p["acceleration"])
+        p["lag"] = drives.speed_limit * given.longest_lag
+        p["tip_error"] = given.tip_error or p["tool_speed"] * given.longest_lag
+        p["overspeed"] = given.overspeed
+        p["rest_speed"] = 0.01 * drives.speed_limit + p["encoder_step"] / SPEED_LAG
+        p["effort_ticks"] = round(given.effort_time / self.dt)
+        for name in ("heartbeat", "longest_outage", "pressing_time"):
+            p[_TIMES[name]] = round(getattr(given, name) * 1e9)
+        p["brakes"] = given.standstill == "brake"
+        p["reported"] = [fault.word in given.reported for fault in Fault]
+
+    def request(self, event: Event | str) -> tuple[Answer, str]:
+        """Take a command such as ``"enable"`` between two ticks.
+
+        Args:
+            event: The command, one of :data:`~teleop_core.operation.states.COMMANDS`.
+
+        Returns:
+            What became of it, and the same in words.
+
+        Raises:
+            UnknownNameError: There is no such command.
+        """
+        asked = command_event(event) if isinstance(event, str) else event
+        before = State(int(self.state["state"]))
+        answer = Answer(_request(self.parameters, self.state, int(asked)))
+        return answer, answer_text(asked, answer, before)
+
+    def press(self, *, is_pressed: bool, now_ns: int) -> None:
+        """Take a message of the stop button: pressed, or not; either way it is alive.
+
+        Args:
+            is_pressed: Whether it is.
+            now_ns: Time [ns].
+        """
+        self.state["is_pressed"], self.state["heard_ns"] = is_pressed, now_ns
+        if is_pressed:
+            self.request(Event.STOP)
+
+    def fail(self, fault: Fault, value: float = 0.0, bound: float = 0.0) -> None:
+        """Take note of a fault that was found outside, as two publishers of commands.
+
+        Args:
+            fault: What was found; it does what :data:`~teleop_core.operation.FAULTS` says.
+            value: What was found, in the fault's unit.
+            bound: What it must not exceed.
+        """
+        _fail(self.parameters, self.state, int(fault), value, bound)
+
+    @property
+    def operation(self) -> dict[str, float]:
+        """Numbers of ``slave/operation`` by name, of the last tick."""
+        return dict(zip(OPERATION, self.signals["slave_operation"].tolist(), strict=True))
+
+    def described(self) -> dict[str, str]:
+        """Names of the joints, by which the report of the operation calls them."""
+        return {"joints": " ".join(self.robot.joint_names)}
+
     @property
     def refused(self) -> int:
         """Commands refused so far because they were jumps."""
         return int(self.state["refused"])
+
+
+@kernel
+def _request(p: Any, s: Any, event: int) -> int:
+    """Take a command; of a stop the fault is told."""
+    if event == _STOP:
+        was = s.is_stopped
+        fail(p, s, _PRESSED, -1, 0.0, 0.0)
+        return 1 if was else 0
+    return change(s, event)
+
+
+@kernel
+def _fail(p: Any, s: Any, fault: int, value: float, bound: float) -> None:
+    """Take note of a fault."""
+    fail(p, s, fault, -1, value, bound)
 
 
 SLAVE_SIM = Stage(
@@ -418,6 +405,7 @@ SLAVE_SIM = Stage(
         SLAVE_MEASURED_JS,
         SLAVE_MEASURED_CP,
         SLAVE_TRUE_CP,
+        SLAVE_OPERATION,
     ),
     notes=(("command_status", "i8"),),
     make=SlaveSim,

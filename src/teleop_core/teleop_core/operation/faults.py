@@ -1,0 +1,68 @@
+"""Faults: what may go wrong with an arm in operation, what it does then, and how it says so."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+
+class Fault(IntEnum):
+    """What went wrong; 0 for nothing."""
+
+    NONE = 0
+    STOP = 1
+    HEARTBEAT = 2
+    TRACKING = 3
+    TIP = 4
+    EFFORT = 5
+    OVERSPEED = 6
+    SILENCE = 7
+    JUMP = 8
+    JOINT_LIMIT = 9
+    CLOCK = 10
+    PUBLISHERS = 11
+    FLOOD = 12
+    STALL = 13
+    FORCE = 14
+
+    @property
+    def word(self) -> str:
+        """Its name in parameters and reports: ``"joint_limit"``."""
+        return self.name.lower()
+
+
+class Reaction(Enum):
+    """What the arm does."""
+
+    HOLD = "FAULT; the setpoint stands still at once, the drives hold the arm there"
+    BRAKE = "FAULT; drives off, brakes on: control is not to be trusted"
+    PAUSE = "PAUSED; it brakes at its limits, and goes on when it is told to resume"
+    REPORT = "it is told, and goes on"
+
+
+@dataclass(frozen=True)
+class FaultKind:
+    """Reaction, unit of the bound, and text of a fault."""
+
+    reaction: Reaction
+    text: str
+    unit: str = ""
+
+
+FAULTS: Mapping[Fault, FaultKind] = {
+    Fault.STOP: FaultKind(Reaction.HOLD, "emergency stop"),
+    Fault.HEARTBEAT: FaultKind(Reaction.HOLD, "no heartbeat of the emergency stop", "s"),
+    Fault.TRACKING: FaultKind(Reaction.BRAKE, "joint too far from its setpoint", "rad or m"),
+    Fault.TIP: FaultKind(Reaction.BRAKE, "tip too far from its setpoint", "m"),
+    Fault.EFFORT: FaultKind(Reaction.BRAKE, "drive at its effort limit for too long", "s"),
+    Fault.OVERSPEED: FaultKind(Reaction.BRAKE, "joint faster than its drive", "rad/s or m/s"),
+    Fault.SILENCE: FaultKind(Reaction.PAUSE, "no command for too long", "s"),
+    Fault.JUMP: FaultKind(Reaction.PAUSE, "commands too far from the one in force", "s"),
+    Fault.JOINT_LIMIT: FaultKind(Reaction.REPORT, "commands press a joint into its limit", "s"),
+    Fault.CLOCK: FaultKind(Reaction.PAUSE, "this machine's clock was stepped", "s"),
+    Fault.PUBLISHERS: FaultKind(Reaction.PAUSE, "two publishers on a command topic"),
+    Fault.FLOOD: FaultKind(Reaction.REPORT, "more messages than anybody needs", "1/s"),
+    Fault.STALL: FaultKind(Reaction.PAUSE, "the slave's own loop stood still", "s"),
+    Fault.FORCE: FaultKind(Reaction.REPORT, "force out of the range of its sensor", "N"),
+}
+"""What there is, with its reaction; those that a session names as ``reported`` only report."""
+NAMES = tuple(fault.word for fault in Fault if fault is not Fault.NONE)

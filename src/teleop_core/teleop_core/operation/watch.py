@@ -1,0 +1,137 @@
+"""Watch: finds the faults of an arm, plays its script of commands, tells how it is."""
+
+from typing import Any
+
+import numpy as np
+
+from teleop_core.geometry import Array
+from teleop_core.kernels import inner
+from teleop_core.operation.faults import FAULTS, Fault, Reaction
+from teleop_core.operation.parameters import MOST_EVENTS
+from teleop_core.operation.states import STATE_FIELDS, Event, State, change
+
+OPERATION_STATE = [
+    *STATE_FIELDS, ("must_brake", "i8"), ("told", "i8"), ("played", "i8"), ("first_ns", "i8"),
+    ("heard_ns", "i8"), ("pressed_ns", "i8"),
+]  # fmt: skip
+"""Scalars of a state record; beside them it has ``full_ticks`` (n,)."""
+OPERATION_PARAMETERS = [
+    ("brakes", "i8"), ("heartbeat_ns", "i8"), ("outage_ns", "i8"), ("effort_ticks", "i8"),
+    ("pressing_ns", "i8"), ("tip_error", "f8"), ("overspeed", "f8"),
+    ("reported", "i8", (len(Fault),)), ("event_count", "i8"), ("event", "i8", (MOST_EVENTS,)),
+    ("event_ns", "i8", (MOST_EVENTS,)),
+]  # fmt: skip
+"""Scalars and tables of a parameter record; beside them it has ``lag`` (n,) [rad or m]."""
+
+_REACTIONS = {Reaction.HOLD: 0, Reaction.BRAKE: 1, Reaction.PAUSE: 2, Reaction.REPORT: 3}
+_REACTION = np.array(
+    [3, *(_REACTIONS[FAULTS[fault].reaction] for fault in Fault if fault)], dtype=np.int64
+)
+_BRAKE, _PAUSE, _REPORT = 1, 2, 3
+_ENABLED, _PAUSED, _FAULT = int(State.ENABLED), int(State.PAUSED), int(State.FAULT)
+_DISABLED = int(State.DISABLED)
+_STOP, _FAILED, _LAPSED = int(Event.STOP), int(Event.FAILED), int(Event.LAPSED)
+_HEARTBEAT, _PRESSED = int(Fault.HEARTBEAT), int(Fault.STOP)
+_TRACKING, _TIP, _EFFORT = int(Fault.TRACKING), int(Fault.TIP), int(Fault.EFFORT)
+_OVERSPEED, _LIMIT = int(Fault.OVERSPEED), int(Fault.JOINT_LIMIT)
+# A joint this close to its limit [rad or m] is at it.
+_AT = 1e-9
+# A drive that gives this share of its limit gives all.
+_FULL = 0.999
+
+
+@inner
+def fail(p: Any, s: Any, fault: int, joint: int, value: float, bound: float) -> None:
+    """Take note of a fault, and do what it asks for; a fault in force is not overwritten."""
+    reaction = _REPORT if p.reported[fault] else _REACTION[fault]
+    if reaction == _REPORT:
+        s.told = fault
+        if s.fault != 0 or s.state == _FAULT:
+            return
+    elif reaction == _PAUSE:
+        if s.state != _ENABLED:
+            return
+        change(s, _LAPSED)
+    else:
+        if reaction == _BRAKE:
+            s.must_brake = 1
+        is_first = s.state != _FAULT
+        change(s, _STOP if fault in (_PRESSED, _HEARTBEAT) else _FAILED)
+        if not is_first:
+            return
+    s.fault, s.fault_joint, s.fault_value, s.fault_bound = fault, joint, value, bound
+
+
+@inner
+def begin_tick(p: Any, s: Any, now_ns: int) -> None:
+    """Play the commands whose time has come; a stop button that fell silent is pressed."""
+    if s.first_ns == 0:
+        s.first_ns = now_ns
+        s.heard_ns = max(s.heard_ns, now_ns)
+    while s.played < p.event_count and now_ns - s.first_ns >= p.event_ns[s.played]:
+        if p.event[s.played] == _STOP:
+            fail(p, s, _PRESSED, -1, 0.0, 0.0)
+        else:
+            change(s, p.event[s.played])
+        s.played += 1
+    if p.heartbeat_ns > 0 and now_ns - s.heard_ns > p.heartbeat_ns:
+        s.is_pressed = 1
+        fail(p, s, _HEARTBEAT, -1, 1e-9 * (now_ns - s.heard_ns), 1e-9 * p.heartbeat_ns)
+    if s.state != _FAULT:
+        s.must_brake = 0
+    if s.state == _ENABLED and s.fault != 0 and s.told == 0:
+        s.fault, s.fault_joint, s.fault_value, s.fault_bound = 0, -1, 0.0, 0.0
+    s.told = 0
+
+
+@inner
+def is_braked(p: Any, s: Any) -> bool:
+    """Whether the drives are off and brakes hold the arm."""
+    return bool(s.must_brake or (p.brakes and s.state in (_DISABLED, _FAULT)))
+
+
+@inner
+def watch_joints(p: Any, s: Any, effort: Array, dt: float) -> None:
+    """Find joints that are too far off, too fast, or at the end of what their drives can give."""
+    for i in range(effort.shape[0]):
+        off = abs(s.setpoint[i] - s.measured[i])
+        if not off <= p.lag[i]:  # NaN is too far as well
+            fail(p, s, _TRACKING, i, off, p.lag[i])
+        fast = p.overspeed * p.speed_limit[i]
+        if not abs(s.speed[i]) <= fast:
+            fail(p, s, _OVERSPEED, i, abs(s.speed[i]), fast)
+        is_full = abs(effort[i]) >= _FULL * p.effort_limit[i]
+        s.full_ticks[i] = s.full_ticks[i] + 1 if is_full else 0
+        if s.full_ticks[i] > p.effort_ticks:
+            fail(p, s, _EFFORT, i, s.full_ticks[i] * dt, p.effort_ticks * dt)
+
+
+@inner
+def watch_tip(p: Any, s: Any, setpoint: Array, measured: Array) -> None:
+    """Find a tip, poses (7,), that is too far from its setpoint."""
+    square = 0.0
+    for i in range(3):
+        square += (setpoint[i] - measured[i]) ** 2
+    if not square <= p.tip_error * p.tip_error:
+        fail(p, s, _TIP, -1, square**0.5, p.tip_error)
+
+
+@inner
+def watch_limits(p: Any, s: Any, now_ns: int) -> None:
+    """Find commands that press a joint into the end of its range."""
+    pressed = -1
+    for i in range(s.target.shape[0]):
+        if s.target[i] <= p.lower[i] + _AT or s.target[i] >= p.upper[i] - _AT:
+            pressed = i
+    if pressed < 0 or s.state != _ENABLED or s.is_busy:
+        s.pressed_ns = now_ns
+    elif now_ns - s.pressed_ns > p.pressing_ns:
+        bound = 1e-9 * p.pressing_ns
+        fail(p, s, _LIMIT, pressed, bound, bound)
+
+
+@inner
+def tell(s: Any, row: Array) -> None:
+    """Write the numbers of :data:`~teleop_core.topics.OPERATION`."""
+    row[0], row[1], row[2], row[3] = s.state, s.is_homed, s.is_busy, s.is_stopped
+    row[4], row[5], row[6], row[7] = s.fault, s.fault_joint, s.fault_value, s.fault_bound

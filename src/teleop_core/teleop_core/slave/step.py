@@ -1,0 +1,228 @@
+"""Step of the slave: one control tick as a kernel, on records of parameters, state and signals."""
+
+import math
+from typing import Any, NamedTuple
+
+from teleop_core.geometry import Array, pose_from_transform
+from teleop_core.kernels import inner, kernel, records
+from teleop_core.operation.states import Event, State, change
+from teleop_core.operation.watch import (
+    OPERATION_PARAMETERS,
+    OPERATION_STATE,
+    begin_tick,
+    is_braked,
+    tell,
+    watch_joints,
+    watch_limits,
+    watch_tip,
+)
+from teleop_core.plants import PER_JOINT
+from teleop_core.signals import Field, copy
+from teleop_core.slave.commands import (
+    AT_LIMITS,
+    AT_ONCE,
+    WITH_ARM,
+    advance_move,
+    advance_setpoint,
+    come_to_rest,
+    follows,
+    limit_tool,
+    plan_move,
+    take_command,
+)
+from teleop_core.slave.friction import wander
+from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way
+from teleop_core.slave.joints import integrate
+from teleop_core.slave.rigid_body import write_model
+from teleop_core.slave.transmission import follow_encoders
+
+_ENABLED, _FAULT, _ARRIVED = int(State.ENABLED), int(State.FAULT), int(Event.ARRIVED)
+# A joint that is farther from its setpoint [rad or m] is no joint of a simulation in its senses.
+_ASTRAY = 10.0
+SPEED_LAG = 5e-3
+"""Time constant of the low-pass of measured speeds [s]."""
+
+
+def slave_records(n: int) -> tuple[Any, Any]:
+    """Parameter and state record of an arm with ``n`` joints."""
+    joints = (*PER_JOINT, "bristle_damping", "lower", "upper", "effort_limit", "speed_limit",
+              "compensated", "start", "braking", "acceleration", "lag", "rest_speed")  # fmt: skip
+    scalars = ("filter_gain", "filter_zero", "filter_pole", "wander_rate", "start_speed",
+               "tool_speed", "tool_acceleration")  # fmt: skip
+    counts = ("is_filtered", "steps", "timeout_ns", "interpolation")
+    rows = [(name, "f8", (n,)) for name in joints]
+    numbers = [(name, "f8") for name in scalars] + [(name, "i8") for name in counts]
+    moved = ("command", "filtered", "setpoint", "target", *WAY_FIELDS, "step", "move_from",
+             "move_to")  # fmt: skip
+    plant = ("measured", "speed", "bent", "grip", "astray", "carried")
+    state: list[Field] = [(name, "f8", (n,)) for name in (*moved, *plant)]
+    state += [(name, "i8", (n,)) for name in ("noise", "full_ticks")] + [("tool_step", "f8")]
+    stamps = (
+        "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "refused_before", "in_row",
+        "moved_ticks", "move_ticks", "ticks", "span",
+    )  # fmt: skip
+    whole = [*state, *((name, "i8") for name in stamps), *OPERATION_STATE]
+    return records([*rows, *numbers, *OPERATION_PARAMETERS])[0], records(whole)[0]
+
+
+class Arm(NamedTuple):
+    """Model, control law and motion of the arm: pointers and plain arrays, which kernels take."""
+
+    fk: Any
+    tip_fk: Any  # of the links as they were made
+    acceleration: Any
+    gravity: Any
+    control: Any
+    geometry: Array
+    tip_geometry: Array
+    coupling: Array
+    dynamics: Array
+    model: Array  # the dynamics that the control law knows
+    gains: Array
+    memory: Array  # of the control law
+    q: Array  # joint positions (n,) at the encoders, unrounded
+    dq: Array
+    effort: Array
+    setpoint: Array
+    measured: Array
+    feedforward: Array  # (n,); (2 n + n²,) for laws that take the model
+    limit: Array
+    joints: Array  # room for joints
+    tip: Array  # true joint positions (n,), behind the transmission
+    T: Array
+
+
+@inner
+def _measure(p: Any, s: Any, q: Array, dt: float) -> None:
+    """Read the encoders."""
+    for i in range(q.shape[0]):
+        measured = round(q[i] / p.encoder_step[i]) * p.encoder_step[i]
+        # Speed from encoder differences through a 5 ms low-pass: what a real drive reports.
+        s.speed[i] += ((measured - s.measured[i]) / dt - s.speed[i]) * (dt / (dt + SPEED_LAG))
+        s.measured[i] = measured
+
+
+@inner
+def _control(p: Any, s: Any, arm: Any, dt: float) -> None:
+    """Write the effort that the control law asks for."""
+    n = arm.q.shape[0]
+    copy(s.setpoint, arm.setpoint)
+    copy(s.measured, arm.measured)
+    arm.gravity(arm.measured, arm.model, arm.feedforward[:n])
+    for i in range(n):
+        arm.feedforward[i] *= p.compensated[i]
+    if arm.feedforward.shape[0] > n:
+        copy(s.speed, arm.joints)
+        write_model(arm.acceleration, arm.model, arm.measured, arm.joints, arm.feedforward[n:])
+    arm.control(
+        arm.gains, arm.memory, arm.setpoint, arm.measured, arm.feedforward, arm.limit, dt,
+        arm.effort,
+    )  # fmt: skip
+
+
+@inner
+def _drive(p: Any, arm: Any) -> None:
+    """Make of the effort asked for the one that the motors give."""
+    for i in range(arm.q.shape[0]):
+        asked, limit, step = arm.effort[i], arm.limit[i], p.effort_step[i]
+        if step > 0.0:
+            asked = round(asked / step) * step
+        arm.effort[i] = min(max(asked + p.bias[i], -limit), limit)
+        # The motor gives no drive beyond its rated speed, fading out over the next tenth.
+        over = abs(arm.dq[i]) / p.speed_limit[i] - 1.0
+        if over > 0.0 and arm.effort[i] * arm.dq[i] > 0.0:
+            arm.effort[i] *= max(0.0, 1.0 - 10.0 * over)
+
+
+@inner
+def _go_on(p: Any, s: Any, row: Any, before: Array, dt: float) -> None:
+    """Move the setpoint: to a goal, after the command, or to rest."""
+    if s.state == _ENABLED and s.is_busy:
+        advance_move(s)
+    elif follows(p, s, row.now_ns):
+        advance_on_way(p, s)
+        advance_setpoint(p, s, before, dt)
+    elif is_braked(p, s):
+        come_to_rest(p, s, WITH_ARM, dt)
+    else:
+        come_to_rest(p, s, AT_ONCE if s.state == _FAULT else AT_LIMITS, dt)
+
+
+@inner
+def _brake(p: Any, s: Any, arm: Any, dt: float) -> None:
+    """Let brakes as strong as the drives stop the arm, whatever its dynamics have become."""
+    for i in range(arm.q.shape[0]):
+        fastest, less = p.speed_limit[i] * 1.5, p.braking[i] * dt
+        speed = min(max(arm.dq[i], -fastest), fastest)
+        speed = max(0.0, speed - less) if speed > 0.0 else min(0.0, speed + less)
+        arm.dq[i] = speed if math.isfinite(speed) else 0.0
+        if not abs(arm.q[i] - s.setpoint[i]) <= _ASTRAY:
+            arm.q[i] = s.setpoint[i]
+        arm.q[i] += arm.dq[i] * dt
+        s.speed[i] = arm.dq[i] if not math.isfinite(s.speed[i]) else s.speed[i]
+
+
+@inner
+def _is_moving(p: Any, s: Any) -> int:
+    """1 while setpoint or arm move."""
+    for i in range(s.setpoint.shape[0]):
+        if s.step[i] != 0.0 or not abs(s.speed[i]) <= p.rest_speed[i]:
+            return 1
+    return 0
+
+
+@kernel
+def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
+    """One control tick: write the slave's setpoint, measured and true topics and its operation.
+
+    What is measured is sampled at the start of the tick, together with the setpoint it is held
+    against; then the arm moves on under constant effort.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        arm: :class:`Arm`; its motion is written.
+        row: Signals.
+        dt: Tick [s].
+    """
+    joints, n = arm.joints, arm.q.shape[0]
+    begin_tick(p, s, row.now_ns)
+    row.command_status = take_command(p, s, row, dt)
+    if s.must_plan:
+        if s.is_homing:
+            copy(p.start, s.move_to)
+        plan_move(p, s, arm, dt)
+    copy(s.command, joints)
+    _go_on(p, s, row, joints, dt)
+    limit_tool(p, s, arm, row.slave_setpoint_cp, dt)
+    if s.is_busy and s.moved_ticks >= s.move_ticks:
+        change(s, _ARRIVED)
+    pose_from_transform(arm.T, row.slave_setpoint_cp)
+    _measure(p, s, arm.q, dt)
+    _control(p, s, arm, dt)
+    _drive(p, arm)
+    braked = is_braked(p, s)
+    for i in range(n):
+        if braked:
+            arm.effort[i] = 0.0
+        row.slave_setpoint_js[i] = s.setpoint[i]
+        row.slave_measured_js[i] = s.measured[i]
+        row.slave_measured_js[n + i] = s.speed[i]
+        row.slave_measured_js[2 * n + i] = arm.effort[i]
+    arm.fk(arm.measured, arm.geometry, arm.T)
+    pose_from_transform(arm.T, row.slave_measured_cp)
+    follow_encoders(p, s, arm.q, arm.coupling, arm.tip)
+    arm.tip_fk(arm.tip, arm.tip_geometry, arm.T)
+    pose_from_transform(arm.T, row.slave_true_cp)
+    row.slave_setpoint_js_ns = row.slave_setpoint_cp_ns = s.command_stamp_ns
+    if not braked:
+        watch_joints(p, s, arm.effort, dt)
+        watch_tip(p, s, row.slave_setpoint_cp, row.slave_measured_cp)
+    watch_limits(p, s, row.now_ns)
+    s.is_moving = _is_moving(p, s)
+    tell(s, row.slave_operation)
+    wander(p, s)
+    if is_braked(p, s):
+        _brake(p, s, arm, dt)
+    else:
+        integrate(arm.acceleration, arm.dynamics, p, s, p.steps, arm.effort, arm.q, arm.dq, dt)
