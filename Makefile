@@ -49,6 +49,11 @@ test: lint crtk_msgs
 	$(BIN)/pytest -n 2 --dist loadfile -m "not ros"
 	$(BIN)/pytest -n 1 -m ros
 
+# Broken files, texts and messages, other ones each time; an hour. The tests have a short form of it.
+FUZZ_CASES ?= 1000000
+fuzz: setup
+	TELEOP_FUZZ_CASES=$(FUZZ_CASES) $(BIN)/pytest -q tests/fuzz
+
 # Of kernels, run as plain Python: compiled code leaves no trace.
 coverage: setup
 	$(BIN)/python tests/kernel_coverage.py

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -16,6 +17,8 @@ Group = TypeVar("Group")
 Scalar = bool | int | float | str
 Value = Scalar | tuple[Scalar, ...]
 
+LARGEST = 10**18
+"""Largest whole number of a parameter: kernels count in 64 bits."""
 MARKS = ("published", "derived", "fitted", "assumed")
 """How a number is known: a source prints it, follows from one, is fitted to data, is plausible."""
 
@@ -154,6 +157,8 @@ class Spec:
             raise UnknownNameError(self.name, value, self.choices)
         if isinstance(value, float) and not math.isfinite(value):
             raise ParameterError(self.name, value, f"finite, {self.bounds()}")
+        if isinstance(value, int) and not -LARGEST <= value <= LARGEST:
+            raise ParameterError(self.name, value, "a number of at most 18 digits")
         if isinstance(value, int | float) and not self._is_inside(value):
             raise ParameterError(self.name, value, self.bounds())
 
@@ -172,9 +177,15 @@ class Spec:
         return f"at most {self.upper:g}{unit}" if self.upper is not None else f"any value{unit}"
 
 
+@cache
+def _hints(group: type) -> dict[str, Any]:
+    """Types of a group's fields; finding them out is most of the work of building one."""
+    return get_type_hints(group)
+
+
 def specs(group: type, prefix: str = "") -> Iterator[Spec]:
     """Declarations of a group in order, nested groups with dotted names."""
-    hints = get_type_hints(group)
+    hints = _hints(group)
     for entry in dataclasses.fields(group):
         hint = hints[entry.name]
         if hint is Choice:
@@ -232,7 +243,7 @@ def build(group: type[Group], values: Mapping[str, object], prefix: str = "") ->
 
 
 def _make(group: type[Group], values: Mapping[str, object]) -> Group:
-    hints = get_type_hints(group)
+    hints = _hints(group)  # type: ignore[arg-type]
     made: dict[str, object] = {}
     for entry in dataclasses.fields(group):  # type: ignore[arg-type]
         inner = hints[entry.name]

@@ -1,6 +1,7 @@
 """Layers: what files, scenarios and settings say, as values by stage and name, not yet checked."""
 
 import difflib
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -241,11 +242,11 @@ def _as_declared(spec: Spec, value: object) -> object:
 
 
 def _as_element(spec: Spec, value: object) -> object:
-    if spec.element is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
-    if spec.element is float and isinstance(value, str):  # YAML 1.1 reads 1e-3 as text
+    if spec.element is float and isinstance(value, int | str) and not isinstance(value, bool):
         try:
-            return float(value)
+            return float(value)  # YAML 1.1 reads 1e-3 as text
+        except OverflowError:
+            return math.inf
         except ValueError:
             return value
     return str(value) if spec.element is str and isinstance(value, int | float) else value

@@ -1,0 +1,163 @@
+"""Fuzzing: one law for whatever comes from outside, tried on very many cases.
+
+A case hands something broken to the package: a file, a text, the bytes of a message. The law: it
+either works or is refused with a :class:`TeleopError` of one printable line, within bounds of time
+and memory. A target is a test that :func:`fuzz` turns into so many cases; its own claims come on
+top::
+
+    from fuzzing import TEXTS, fuzz
+
+    @fuzz("settings", text=TEXTS)
+    def test_any_setting_is_taken_or_refused(text):
+        parse_setting(text)
+
+Cases are shared out by :data:`SHARES`, to which a new target adds itself. ``TELEOP_FUZZ_CASES``
+says how many there are in all: 20,000 in every test run, the same ones each time; 1,000,000 by
+``make fuzz``, other ones each time. A case that fails is printed, and shrunk to a small one.
+"""
+
+import functools
+import os
+import resource
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from teleop_core.errors import TeleopError
+from teleop_core.texts import LONGEST_LINE, printable
+
+USUAL = 20_000
+CASES = int(os.environ.get("TELEOP_FUZZ_CASES", USUAL))
+SHARES = {
+    "CDR": 0.20,
+    "chunks": 0.20,
+    "configurations": 0.05,
+    "metadata": 0.10,
+    "recordings": 0.15,
+    "settings": 0.15,
+    "state commands": 0.10,
+    "stored configurations": 0.05,
+}
+"""Part of all cases that each target gets; less where a case takes long."""
+TIME = 60
+"""Seconds for one case before it counts as a hang: thousands of times what a case takes."""
+MEMORY = 2 << 30
+"""Bytes that one case may take beside what the process has: far above the largest chunk."""
+
+
+class HangError(BaseException):
+    """A case went on for longer than :data:`TIME`; no handler of ours may catch it."""
+
+
+def cases(target: str) -> int:
+    """Cases that a target gets; fewer for the pure-Python kernels of a coverage run."""
+    assert sum(SHARES.values()) <= 1.0 + 1e-9, "the shares are more than all"
+    return max(1, round(CASES * SHARES[target]))
+
+
+def fuzz(target: str, **strategies: st.SearchStrategy) -> Callable[[Callable], Callable]:
+    """Test that tries a target on its cases, drawn from ``strategies`` by argument."""
+
+    def decorate(test: Callable) -> Callable:
+        @functools.wraps(test)
+        def case(*arguments: object, **drawn: object) -> None:
+            with lawful():
+                test(*arguments, **drawn)
+
+        chosen = settings(
+            max_examples=cases(target), deadline=None, database=None, print_blob=True,
+            derandomize=CASES == USUAL, phases=(Phase.explicit, Phase.generate, Phase.shrink),
+            suppress_health_check=list(HealthCheck),
+        )  # fmt: skip
+        return chosen(given(**strategies)(case))
+
+    return decorate
+
+
+@contextmanager
+def lawful() -> Iterator[None]:
+    """One case: it works, or is refused in one printable line, within the bounds."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    signal.signal(signal.SIGALRM, _hangs)
+    signal.setitimer(signal.ITIMER_REAL, TIME)
+    resource.setrlimit(resource.RLIMIT_AS, (_size() + MEMORY, hard))
+    try:
+        yield
+    except TeleopError as error:
+        assert_one_line(str(error))
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+        signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def assert_one_line(text: str) -> None:
+    """Make sure that a message is one that a terminal can show."""
+    assert text
+    assert len(text) <= LONGEST_LINE, f"{len(text)} characters: {text}"
+    assert "\n" not in text
+    assert printable(text) == text
+
+
+def _hangs(*_: object) -> None:
+    raise HangError(f"a case takes longer than {TIME} s")
+
+
+def _size() -> int:
+    """Bytes of address space that the process has now."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[0]) * resource.getpagesize()
+
+
+# -- what is broken ------------------------------------------------------------------------------
+
+NASTY = (
+    "", " ", "=", "null", "~", "true", "yes", "0", "-1", "1e400", ".nan", ".inf", "-.inf", "1e-400",
+    "0x" + "f" * 300, "9" * 400, "9" * 5000, "1:30:59", "0b", "-0b_", "0x_", "!!int x", "!!float x",
+    "!!bool 2", "!!binary x", "!!timestamp 2021-13-45", "2021-13-45", "2021-02-30 25:61:61",
+    "!!set [1]", "!!omap x", "!!pairs [1]", "!!null 3", "!!str [1]", "!!python/none",
+    "!!python/object/apply:os.system [ls]", "!a!b c", "!<x> 1", "&a [*a]", "&a {x: *a}", "*a",
+    "<<: 3", "{<<: &a {b: 1}, <<: *a}", "[1, 2", "]", "{a: b", "a: b: c", "? ", "- - - -",
+    "[" * 400, "{a: " * 200, "[" * 300 + "]" * 300, "[[1], [2]]", "{[1]: 2}", "{{}: 3}",
+    "%YAML 9.9\n---\na", "--- a\n--- b", "\x1b[31mred", '"\\e[31mred"', '"\\0"', "\ufeff", "\x00",
+    "\x85", "\u202e", "a" * 5000, "[" + "1, " * 500 + "]", "'", '"', "|", ">", "`", "@", "\t- a", "..",
+    "/", "/dev/zero", "/dev/null", "/proc/self/mem", "../../../etc/passwd", "~root", "a/b/c.d.e",
+    "{a: &a [x, x, x], b: &b [*a, *a, *a], c: &c [*b, *b, *b], d: [*c, *c, *c]}",
+    "[&a [x,x,x,x,x,x,x,x], &b [*a,*a,*a,*a,*a,*a,*a,*a], &c [*b,*b,*b,*b,*b,*b,*b,*b], "
+    "&d [*c,*c,*c,*c,*c,*c,*c,*c], &e [*d,*d,*d,*d,*d,*d,*d,*d], [*e,*e,*e,*e,*e,*e,*e,*e]]",
+)  # fmt: skip
+"""Texts that have broken readers of YAML, ours or others."""
+TEXTS = st.one_of(
+    st.sampled_from(NASTY),
+    st.text(max_size=30),
+    st.integers(-(10**30), 10**30).map(str),
+    st.floats().map(repr),
+    st.lists(st.one_of(st.integers(), st.floats(), st.text(max_size=5)), max_size=8).map(repr),
+)
+"""Values as a user, or nobody in his right mind, would write them."""
+
+
+@st.composite
+def damaged(draw: st.DrawFn, whole: bytes, most: int = 4) -> bytes:
+    """Bytes of which some are flipped, cut out, put in twice or replaced, or the end is missing."""
+    data = bytearray(whole)
+    for _ in range(draw(st.integers(1, most))):
+        at = draw(st.integers(0, max(0, len(data) - 1)))
+        kind = draw(st.sampled_from(("flip", "flip", "cut", "repeat", "put", "number", "end")))
+        count = draw(st.integers(1, 40))
+        if kind == "flip" and data:
+            data[at] ^= 1 << draw(st.integers(0, 7))
+        elif kind == "cut":
+            del data[at : at + count]
+        elif kind == "repeat":
+            data[at:at] = data[at : at + count]
+        elif kind == "put":
+            data[at:at] = draw(st.binary(max_size=12))
+        elif kind == "number":  # what lengths and times must not be believed in
+            value = draw(st.sampled_from((0, 1, 2**31 - 1, 2**32 - 1, 2**62, 2**63, 2**64 - 1)))
+            data[at : at + 8] = value.to_bytes(8, "little")
+        elif kind == "end":
+            del data[at:]
+    return bytes(data)
