@@ -5,6 +5,9 @@ The metadata name the arms under ``arms``, with blanks between them and the defa
 and seed of a further arm are in ``left/robot`` and ``left/seed``. All arms share ``diagnostics``,
 in which the nodes of an arm are called ``left/slave_sim``.
 
+What a recorder records in a namespace is below that as well, which the metadata tell under
+``namespace``: arms keep their names, and ``left`` of ``/lab`` is below ``lab/left/``.
+
 Where no metadata name the arms, as in what a recorder records alone in a namespace, an arm is
 whatever measures a slave's pose: ``left/slave/measured_cp``. Then there may be no default arm with
 plain topics.
@@ -18,6 +21,7 @@ from teleop_core.errors import RecordingError, UnknownNameError
 from teleop_core.topics import DIAGNOSTICS, SLAVE_MEASURED_CP, Topic
 
 ARMS_KEY = "arms"
+NAMESPACE_KEY = "namespace"
 _OF_ONE_ARM = {"robot", "seed"}
 
 
@@ -61,8 +65,7 @@ def of_arm(bag: Bag, arm: str = "") -> Bag:
     prefix = _prefix(bag, arm, prefixes)
     if set(prefixes.values()) == {""}:
         return bag
-    others = tuple(filter(None, prefixes.values()))
-    return _ArmBag(bag, prefix, others, has_default="" in prefixes.values())
+    return _ArmBag(bag, prefix, tuple(prefixes.values()), _base(bag) if _named(bag) else "")
 
 
 def topic_prefix(bag: Bag, arm: str = "") -> str:
@@ -80,10 +83,17 @@ def _prefix(bag: Bag, arm: str, prefixes: dict[str, str]) -> str:
 def _prefixes(bag: Bag) -> dict[str, str]:
     """What stands before the names of each arm's topics; the default arm is the first."""
     arms = arm_names(bag)
-    prefixes = {arm: f"{arm}/" for arm in arms}
+    base = _base(bag) if _named(bag) else ""
+    prefixes = {arm: f"{base}{arm}/" for arm in arms}
     if _named(bag) or not arms[0]:
-        prefixes[arms[0]] = ""
+        prefixes[arms[0]] = base
     return prefixes
+
+
+def _base(bag: Bag) -> str:
+    """What stands before all topics of the arms that the metadata name."""
+    namespace = bag.metadata.get(NAMESPACE_KEY, "").strip("/")
+    return f"{namespace}/" if namespace else ""
 
 
 class _ArmBag(Bag):
@@ -92,15 +102,14 @@ class _ArmBag(Bag):
     Args:
         bag: The whole recording.
         prefix: What stands before the names of the arm; empty for the default one.
-        others: What stands before the names of all arms but the default one.
-        has_default: Whether there is a default arm, which texts without an arm are about.
+        prefixes: What stands before the names of each arm.
+        base: What stands before all of them, but not before names of texts.
     """
 
-    def __init__(
-        self, bag: Bag, prefix: str, others: tuple[str, ...], *, has_default: bool
-    ) -> None:
-        self._bag, self._prefix, self._others = bag, prefix, others
-        self._foreign = _OF_ONE_ARM if has_default else set[str]()
+    def __init__(self, bag: Bag, prefix: str, prefixes: tuple[str, ...], base: str) -> None:
+        self._bag, self._prefix, self._prefixes, self._base = bag, prefix, prefixes, base
+        # Texts without an arm are about the default arm, if there is one.
+        self._foreign = _OF_ONE_ARM if base in prefixes else set[str]()
         self.path, self.start_ns, self.end_ns = bag.path, bag.start_ns, bag.end_ns
         self.topics: dict[str, TopicInfo] = {}
         for name, info in bag.topics.items():
@@ -111,8 +120,8 @@ class _ArmBag(Bag):
 
     def _metadata(self, texts: dict[str, str]) -> dict[str, str]:
         """Texts about this arm over those about all arms."""
-        common = texts if self._prefix else {}
-        own = {self._plain(name): text for name, text in texts.items()}
+        common = texts if self._prefix != self._base else {}
+        own = {self._plain(f"{self._base}{name}"): text for name, text in texts.items()}
         return {
             **{name: text for name, text in common.items() if name not in self._foreign},
             **{name: text for name, text in own.items() if name is not None},
@@ -120,9 +129,9 @@ class _ArmBag(Bag):
 
     def _plain(self, name: str) -> str | None:
         """Name below the arm; None if it is of another arm."""
-        if self._prefix:
-            return name.removeprefix(self._prefix) if name.startswith(self._prefix) else None
-        return None if name.startswith(self._others) else name
+        below = tuple(p for p in self._prefixes if p != self._prefix and p.startswith(self._prefix))
+        is_own = name.startswith(self._prefix) and not name.startswith(below)
+        return name.removeprefix(self._prefix) if is_own else None
 
     def _recorded(self, topic: Topic | str) -> str:
         """Name of a topic in the whole recording."""

@@ -33,15 +33,16 @@ def checked_arguments(arguments: list[str]) -> list[str]:
             continue
         content = _read(Path(file))
         if isinstance(content, dict) and any(not str(key).startswith("/") for key in content):
-            out[index + 1] = _copy({_anywhere(str(key)): value for key, value in content.items()})
+            # Of two names that a node matches the later one wins: the one that says more.
+            named = {str(key): value for key, value in content.items()}
+            keys = sorted(named, key=lambda key: (key.startswith("/"), key.count("/")))
+            out[index + 1] = _copy({_anywhere(key): named[key] for key in keys})
     return out
 
 
 def _anywhere(key: str) -> str:
-    """Key that a node matches in its namespace: a bare name in any, left/name in /left."""
-    if key.startswith("/"):
-        return key
-    return f"/{key}" if "/" in key else f"/**/{key}"
+    """Key that a node matches in any namespace: name as /lab/name, left/name as /lab/left/name."""
+    return key if key.startswith("/") else f"/**/{key}"
 
 
 def _read(path: Path) -> Any:
@@ -62,7 +63,7 @@ class _Plain(yaml.SafeDumper):
 
 def _copy(content: dict[str, Any]) -> str:
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
-        yaml.dump(content, file, Dumper=_Plain, allow_unicode=True)
+        yaml.dump(content, file, Dumper=_Plain, allow_unicode=True, sort_keys=False)
     atexit.register(_remove, file.name)
     return file.name
 
@@ -81,14 +82,23 @@ def _session_values(arguments: list[str]) -> Iterator[dict[str, Any]]:
                     yield inner.get("ros__parameters") or {}
 
 
+def session_of(arguments: list[str]) -> SessionParameters:
+    """What the group ``teleop`` of the parameter files says of the graph.
+
+    Raises:
+        TeleopError: A file or a value is wrong.
+    """
+    given: dict[str, Any] = {}
+    for values in _session_values(arguments):
+        given |= {name: values[name] for name in ("arms", "stages", "delays") if name in values}
+    return build(SessionParameters, given, f"{SESSION}.")
+
+
 def graph_of(arguments: list[str]) -> Graph:
     """Graph that the group ``teleop`` of the parameter files describes.
 
     Raises:
         TeleopError: A file or the graph is wrong.
     """
-    given: dict[str, Any] = {}
-    for values in _session_values(arguments):
-        given |= {name: values[name] for name in ("arms", "stages", "delays") if name in values}
-    session = build(SessionParameters, given, f"{SESSION}.")
+    session = session_of(arguments)
     return build_graph(session.arms, session.stages, session.delays)

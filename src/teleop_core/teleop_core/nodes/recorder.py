@@ -7,16 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from teleop_core.bags.arms import NAMESPACE_KEY
 from teleop_core.bags.recording import RECORDER, RecordingParameters
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
-from teleop_core.graph import Graph
+from teleop_core.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.files import graph_of
+from teleop_core.nodes.files import graph_of, session_of
 from teleop_core.nodes.streams import Subscription
-from teleop_core.parameters import parameter
+from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.layers import parse_text
+from teleop_core.session.layers import SESSION, parse_text
 from teleop_core.session.runner import describe
 from teleop_core.stage import Stage
 from teleop_core.topics import DIAGNOSTICS, Quality, Topic
@@ -117,22 +118,40 @@ class RecorderNode(CoreNode):
         self.channels: dict[str, _Channel] = {}
         self._graph = graph
         self.patience = 10.0  # a slow disk is no reason to end a session
+        self.stages: dict[str, Any] = {}
+        """Parameters of the stages of the process, by their names in the graph."""
 
     def setup(self, parameters: RecorderParameters) -> None:
         """Make the recording's directory."""
-        configuration = _configuration(parameters)
+        configuration = self._configuration(parameters)
         graph = self._graph or (
             configuration.graph if parameters.configuration else graph_of(sys.argv)
         )
         name = parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S")
         topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
         self._writer = BagWriter(
-            Path(name), topics, {}, parameters=parameters, metadata=describe(configuration),
+            Path(name), topics, {}, parameters=parameters, metadata=self._about(configuration),
             start_ns=time.time_ns(), hold_ns=HOLD_NS,
         )  # fmt: skip
         self.stage, self._is_broken = self._writer, False
         every = parameters.every_nth(topics)
         self._recorded = [topic for topic in topics if every[topic.name]]
+
+    def _configuration(self, parameters: RecorderParameters) -> Configuration:
+        """Configuration of the session: as given, as its stages have it, or the defaults."""
+        if self._graph is not None and not parameters.configuration:
+            own = {spec.name for spec in specs(RecordingParameters)}
+            values = {k: v for k, v in values_of(parameters).items() if k in own}
+            recording = build(RecordingParameters, values)
+            groups = {SESSION: session_of(sys.argv), **self.stages, RECORDER_NAME: recording}
+            return Configuration(groups, parameters.scenario, self._graph)
+        layer = parse_text(parameters.configuration, "recorder.configuration")
+        return Configuration.from_layers([layer], parameters.scenario)
+
+    def _about(self, configuration: Configuration) -> dict[str, str]:
+        """What is kept with the recording, and below which namespace all arms are."""
+        about = describe(configuration)
+        return about | {NAMESPACE_KEY: self.arm} if self.arm else about
 
     def start(self) -> None:
         """Open the topics; latched ones send what they have."""
@@ -204,9 +223,3 @@ class RecorderNode(CoreNode):
             values[f"received.{channel.topic.name}"] = str(channel.received)
             values[f"lost.{channel.topic.name}"] = str(channel.lost)
         return values
-
-
-def _configuration(parameters: RecorderParameters) -> Configuration:
-    """Configuration of the session, of defaults where none is given."""
-    layer = parse_text(parameters.configuration, "recorder.configuration")
-    return Configuration.from_layers([layer], parameters.scenario)

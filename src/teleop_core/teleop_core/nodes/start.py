@@ -11,6 +11,7 @@ from typing import Any
 
 from teleop_core.errors import TeleopError
 from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.naming import taken_names
 from teleop_core.nodes.process import run
 from teleop_core.own_parts import load_own_parts
 from teleop_core.stage import STAGES, Stage
@@ -55,6 +56,10 @@ def _start() -> int:
     if name == SESSION:
         from teleop_core.nodes.teleop_session import TeleopSession
 
-        return run(TeleopSession)
+        sys.argv[:], names = taken_names(sys.argv)
+        if "__node" in names:
+            text = "its nodes keep the names of their stages"
+            print(f"{SESSION}: not named {names['__node']}: {text}", file=sys.stderr)
+        return run(lambda: TeleopSession(names.get("__ns", "").strip("/")))
     stage = STAGES.find(name)
     return run(lambda: make_node(stage))

@@ -29,12 +29,17 @@ class TeleopSession:
 
     The real-time options and the catch-up of that loop are those of the last stage, the slave. The
     graph is what the group ``teleop`` of the parameter files says.
+
+    Args:
+        namespace: Where all of it is, without the slash before it; arms are below.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, namespace: str = "") -> None:
         graph = graph_of(sys.argv)
-        self._recorder = RecorderNode(STAGES.find(RECORDER_NAME), graph=graph)
-        self._stages = tuple(_node(graph, member) for member in graph.members)
+        self._recorder = RecorderNode(STAGES.find(RECORDER_NAME), graph=graph, namespace=namespace)
+        self._stages = tuple(_node(graph, member, namespace) for member in graph.members)
+        members = zip(graph.members, self._stages, strict=True)
+        self._recorder.stages = {member.name: node.parameters for member, node in members}
         self._gate = threading.Lock()
         for node in self._stages:
             node.has_own_loop, node.gate = False, self._gate
@@ -109,8 +114,8 @@ class TeleopSession:
             channel.join(name in outputs)
 
 
-def _node(graph: Graph, member: Member) -> CoreNode:
-    options = {"namespace": member.arm} if member.arm else {}
+def _node(graph: Graph, member: Member, namespace: str) -> CoreNode:
     texts = link_texts(graph, member)
     given = [Parameter("links", Parameter.Type.STRING_ARRAY, texts)] if texts else []
-    return make_node(member.stage, parameter_overrides=given, **options)
+    where = "/".join(filter(None, (namespace, member.arm)))
+    return make_node(member.stage, parameter_overrides=given, namespace=where)

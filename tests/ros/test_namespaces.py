@@ -1,0 +1,114 @@
+"""Everything in a namespace: names, parameters, topics and recordings of real processes."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+import yaml
+from rcl_interfaces.srv import GetParameters
+
+from teleop_core import topics
+from teleop_core.bags.reader import Bag
+from teleop_core.evaluation import scores
+from teleop_core.nodes.children import environment
+from teleop_core.nodes.naming import taken_names
+from teleop_core.robots import load_robot
+
+pytestmark = pytest.mark.ros
+
+PATIENCE = {"patience": 0.0, "operator": {"approach_time": 1.0}}
+PUMA, RCRT1 = ({"start": load_robot(name).home.tolist()} for name in ("puma560", "rcrt1"))
+"""Slaves that follow at once."""
+MEASURED = topics.SLAVE_MEASURED_CP.name
+
+
+@pytest.fixture
+def start(peer, tmp_path):
+    """Starter of a composed session with a parameter file; it ends with the test."""
+    started = []
+
+    def started_with(groups, *arguments):
+        groups = {"recorder": {"out": str(tmp_path / "bag")}} | groups
+        file = tmp_path / "session.yaml"
+        content = {name: {"ros__parameters": values} for name, values in groups.items()}
+        file.write_text(yaml.safe_dump(content))
+        command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session", "--ros-args"]
+        env = environment() | {"ROS_DOMAIN_ID": peer.domain}
+        started.append(
+            subprocess.Popen([*command, "--params-file", str(file), *arguments], env=env)
+        )
+        return started[0]
+
+    yield started_with
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+
+
+def parameter(peer, node, name):
+    request = GetParameters.Request(names=[name])
+    return peer.call(GetParameters, f"{node}/get_parameters", request).values[0]
+
+
+def recorded(peer, process, tmp_path, *slaves):
+    """Recording of a session, ended when these slaves have worked for two seconds."""
+    for slave in slaves:
+        peer.wait_value(slave, "ticks", lambda ticks: ticks > 2000)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(60) == 0
+    return Bag(tmp_path / "bag")
+
+
+@pytest.mark.slow
+def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
+    peer, start, tmp_path
+):
+    groups = {"haptic_master": PATIENCE, "slave_sim": RCRT1 | {"command_timeout": 0.25}}
+    process = start(groups, "-r", "__ns:=/left", "-r", "__node:=arm")
+    peer.wait_state("left/slave_sim", "active")
+    assert parameter(peer, "/left/slave_sim", "command_timeout").double_value == 0.25
+    names = dict(peer.node.get_node_names_and_namespaces())
+    assert {name for name, where in names.items() if where == "/left"} == {
+        "haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "recorder",
+    }  # fmt: skip
+    bag = recorded(peer, process, tmp_path, "left/slave_sim")
+    assert all(name.startswith("left/") for name in {*bag.topics} - {topics.DIAGNOSTICS.name})
+    (score,) = scores(bag)
+    assert (score.session.arm, score.session.robot) == ("left", "rcrt1")
+    assert score.session.duration_s > 1.0
+
+
+@pytest.mark.slow
+def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(peer, start, tmp_path):
+    puma = {"robot": "puma560"}
+    groups = {
+        "teleop": {"arms": ["left", "right"]},
+        "haptic_master": PATIENCE,
+        "slave_sim": RCRT1,
+        "right/slave_sim": puma | PUMA,
+        "right/inverse_kinematics": puma,
+    }
+    process = start(groups, "-r", "__ns:=/lab")
+    peer.wait_state("lab/right/slave_sim", "active")
+    peer.wait_state("lab/slave_sim", "active")
+    assert parameter(peer, "/lab/right/slave_sim", "robot").string_value == "puma560"
+    assert parameter(peer, "/lab/slave_sim", "robot").string_value == "rcrt1"
+    bag = recorded(peer, process, tmp_path, "lab/slave_sim", "lab/right/slave_sim")
+    assert bag.topics[f"lab/{MEASURED}"].count > 1000
+    joints = bag.read(f"lab/right/{topics.SLAVE_MEASURED_JS.name}")
+    assert joints.names == load_robot("puma560").joint_names
+    left, right = scores(bag)
+    assert (left.session.arm, left.session.robot) == ("left", "rcrt1")
+    assert (right.session.arm, right.session.robot) == ("right", "puma560")
+    assert min(left.session.duration_s, right.session.duration_s) > 1.0
+
+
+def test_names_for_all_nodes_of_a_process_are_taken_out_and_others_are_kept():
+    given = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "__ns:=/lab", "--remap", "__node:=arm",
+             "-r", "slave_sim:__node:=other", "-r", "a:=b", "--", "-r", "__ns:=/y"]  # fmt: skip
+    kept = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "slave_sim:__node:=other", "-r", "a:=b",
+            "--", "-r", "__ns:=/y"]  # fmt: skip
+    assert taken_names(given) == (kept, {"__ns": "/lab", "__node": "arm"})
+    assert taken_names(kept) == (kept, {})
