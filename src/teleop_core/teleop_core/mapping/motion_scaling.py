@@ -30,6 +30,12 @@ from teleop_core.mapping.parameters import (
     axis_map,
     tool_maps,
 )
+from teleop_core.mapping.plausibility import (
+    PLAUSIBILITY_PARAMETERS,
+    PLAUSIBILITY_STATE,
+    has_lost_buttons,
+    is_plausible,
+)
 from teleop_core.mapping.walls import (
     WALL_PARAMETERS,
     WALL_STATE,
@@ -57,13 +63,14 @@ _PARAMETERS = [
     ("axis", "i8", (3,)), ("sign", "f8", (3,)),
     ("size", "f8", (3,)), *WALL_PARAMETERS, ("timeout_ns", "i8"), ("pause_ns", "i8"),
     ("rotation_gain", "f8"), ("reach_stiffness", "f8"), ("reach_depth", "f8"),
+    *PLAUSIBILITY_PARAMETERS,
 ]  # fmt: skip
 _STATE = [
     ("buttons", "f8", (3,)), ("is_fine", "i8"), ("is_engaged", "i8"), ("must_latch", "i8"),
     ("is_fixture_on", "i8"), ("last_ns", "i8"),
     ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
     ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
-    *WALL_STATE,
+    *WALL_STATE, *PLAUSIBILITY_STATE,
 ]  # fmt: skip
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
@@ -212,6 +219,23 @@ def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
     state[_LIMIT], state[_JOINT] = s.limit, s.joint
 
 
+@inner
+def _doubt(p: Any, s: Any, sent: Any, row: Any) -> None:
+    """Answer a sample that no hand can have made: hold, push with nothing, begin anew after it."""
+    s.must_latch = 1
+    remember(s, sent, row.master_measured_cp_ns)
+    forget_wall(s, row.master_measured_cp)
+    for i in range(6):
+        row.master_servo_cf[i] = 0.0
+    is_following = _follows(p, s, row)
+    for i in range(7):
+        if not (is_following and s.is_engaged):
+            s.command[i] = row.slave_setpoint_cp[i]
+        row.slave_servo_cp[i] = s.command[i]
+    s.last_ns = row.master_measured_cp_ns
+    _report(p, s, p.gain[s.is_fine], is_following, row)
+
+
 @kernel
 def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: float) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
@@ -237,6 +261,10 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     period = 1e-9 * (row.master_measured_cp_ns - s.last_ns)
     is_following = _follows(p, s, row)
     draw_back(s, sent, p.gain[s.is_fine], row)
+    if not is_plausible(p, s, pose, row.master_measured_cp_ns):
+        _doubt(p, s, sent, row)
+        return
+    clutch = 1.0 if has_lost_buttons(p, s, row) else buttons[0]
     _toggle_mode(s, buttons)
     gain = p.gain[s.is_fine]
     turn = np.empty(3)
@@ -246,7 +274,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
         s.must_latch = 1
         for i in range(7):
             s.command[i] = row.slave_setpoint_cp[i]
-    if s.must_latch or buttons[0] > 0.0 or s.buttons[0] > 0.0:
+    if s.must_latch or clutch > 0.0 or s.buttons[0] > 0.0:
         _latch(s, pose)
     else:
         _move(p, s, gain, pose, turn)
@@ -255,6 +283,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     s.is_engaged, s.must_latch = 1, 0
     for i in range(3):
         s.master[i], s.buttons[i] = pose[i], buttons[i]
+    s.buttons[0] = clutch
     s.last_ns = row.master_measured_cp_ns
     remember(s, sent, s.last_ns)
     _wall(p, s, fixture, period, pose, row.master_servo_cf)
@@ -288,7 +317,7 @@ class MotionScaling(RunningStage):
 
     def reset(self) -> None:
         """Forget the latched poses: the next sample starts from the slave's setpoint."""
-        s = self.state
+        s, self._told = self.state, 0
         assign(s, 0)
         assign(self._sent, 0)
         s["is_fine"], s["joint"] = MODES.index(self._values.mode), -1
@@ -309,6 +338,10 @@ class MotionScaling(RunningStage):
         p["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
         p["pause_ns"] = round(parameters.longest_pause * 1e9)
         p["rotation_gain"] = parameters.rotation_gain
+        hand = parameters.plausible
+        p["hand_speed"], p["hand_acceleration"] = hand.speed, hand.acceleration
+        p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
+        p["silence_ns"] = round(hand.button_silence * 1e9)
         self._take_reach_force(parameters.reach_force)
         if parameters.mode != self._values.mode:
             self.state["is_fine"] = MODES.index(parameters.mode)
@@ -333,6 +366,16 @@ class MotionScaling(RunningStage):
         self._shape = self._shape._replace(depth=depth, numbers=numbers)
         self.arguments = (self.parameters, self.state, self._sent, self._shape)
         self._bound = None
+
+    def concerns(self) -> list[str]:
+        """Samples that no hand can have made, and buttons that fell silent, in words."""
+        found, count = [], int(self.state["implausible"])
+        if count > self._told:
+            found.append(f"held {count - self._told} samples of the master that no hand can make")
+        self._told = count
+        if self.state["is_lost"]:
+            found.append("the buttons fell silent: holds as if clutched")
+        return found
 
     def described(self) -> dict[str, str]:
         """Kind and numbers of the fixture, as teleop/state reports them beside its columns."""

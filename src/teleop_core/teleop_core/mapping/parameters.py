@@ -8,6 +8,7 @@ import numpy as np
 from teleop_core.errors import ParameterError
 from teleop_core.fixtures import FIXTURES
 from teleop_core.geometry import Array, quaternion_from_rotation, rotation
+from teleop_core.mapping.plausibility import PlausibilityParameters
 from teleop_core.mapping.walls import WALLS
 from teleop_core.parameters import Choice, choice, parameter
 
@@ -95,6 +96,7 @@ class MotionScalingParameters:
     )  # fmt: skip
     fixture: FixtureParameters = field(default_factory=FixtureParameters)
     reach_force: ReachForceParameters = field(default_factory=ReachForceParameters)
+    plausible: PlausibilityParameters = field(default_factory=PlausibilityParameters)
 
     def __post_init__(self) -> None:
         if self.fine_gain > self.coarse_gain:

@@ -27,6 +27,7 @@ from teleop_core.master.device import (
 )
 from teleop_core.master.hand import HAND_PARAMETERS, HandParameters, join, move_hand, tremble
 from teleop_core.master.rendering import RENDERING_PARAMETERS, RENDERING_STATE, render
+from teleop_core.operation.states import State
 from teleop_core.operators import OPERATORS, Setting
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.shapes import PHASES
@@ -40,6 +41,8 @@ from teleop_core.topics import (
     MASTER_MEASURED_CP,
     MASTER_MEASURED_CV,
     MASTER_SERVO_CF,
+    OPERATION,
+    SLAVE_OPERATION,
     TELEOP_STATE,
 )
 
@@ -102,10 +105,11 @@ _STATE = [
     *((name, "f8", (3,)) for name in ("position", "speed", "hand", "hand_speed", "wanted",
       "phase", "wander", "reading", "rate", "turning")),
     ("attitude", "f8", (4,)), ("next", "i8"), ("next_noise", "i8"), ("has_begun", "i8"),
-    ("first_ns", "i8"), *RENDERING_STATE, *CONTACT_STATE,
+    ("first_ns", "i8"), ("is_stopped", "i8"), *RENDERING_STATE, *CONTACT_STATE,
 ]  # fmt: skip
 _WANTED = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("buttons", "f8", (3,)),
            ("tremor", "f8", (3,))]  # fmt: skip
+_STATE_OF_SLAVE, _FAULT = OPERATION.index("state"), int(State.FAULT)
 _IS_FOLLOWING = STATE["is_following"]
 _MOST = MASTER_CONTACT.columns.index("largest_force")
 
@@ -147,6 +151,9 @@ def haptic_master_step(
         row: Signals.
         dt: Tick [s].
     """
+    if s.is_stopped or row.slave_operation[_STATE_OF_SLAVE] == _FAULT:
+        for i in range(row.master_servo_cf.shape[0]):
+            row.master_servo_cf[i] = 0.0
     if _begins(p, s, row):
         s.next += 1
     now, noise, force = wanted[s.next], noises[s.next_noise], np.empty(3)
@@ -244,6 +251,10 @@ class HapticMaster(RunningStage):
         p["center"] = np.subtract(REST_POSITION, device.start)
         p["half"] = 0.5 * np.array(device.workspace)
 
+    def press(self, *, is_pressed: bool) -> None:
+        """Give no force from the next tick on while an emergency stop is pressed."""
+        self.state["is_stopped"] = is_pressed
+
     @property
     def has_begun(self) -> bool:
         """Whether the operator moves the hand yet."""
@@ -339,11 +350,11 @@ def _turn_all(rest: Array, turns: Array, attitudes: Array) -> None:
 HAPTIC_MASTER = Stage(
     "haptic_master",
     HapticMasterParameters,
-    reads=(MASTER_SERVO_CF, TELEOP_STATE),
+    reads=(MASTER_SERVO_CF, TELEOP_STATE, SLAVE_OPERATION),
     writes=(
         MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT,
     ),
-    late=(MASTER_SERVO_CF, TELEOP_STATE),
+    late=(MASTER_SERVO_CF, TELEOP_STATE, SLAVE_OPERATION),
     make=HapticMaster,
     node="teleop_core.nodes.haptic_master:HapticMasterNode",
 )  # fmt: skip
