@@ -52,14 +52,22 @@ class HangError(BaseException):
     """A case went on for longer than :data:`TIME`; no handler of ours may catch it."""
 
 
-def cases(target: str) -> int:
-    """Cases that a target gets; fewer for the pure-Python kernels of a coverage run."""
+def cases(target: str, parts: int = 1) -> int:
+    """Cases that each of so many tests of a target gets."""
     assert sum(SHARES.values()) <= 1.0 + 1e-9, "the shares are more than all"
-    return max(1, round(CASES * SHARES[target]))
+    return max(1, round(CASES * SHARES[target] / parts))
 
 
-def fuzz(target: str, **strategies: st.SearchStrategy) -> Callable[[Callable], Callable]:
-    """Test that tries a target on its cases, drawn from ``strategies`` by argument."""
+def fuzz(
+    target: str, parts: int = 1, **strategies: st.SearchStrategy
+) -> Callable[[Callable], Callable]:
+    """Test that tries a target on its cases, drawn from ``strategies`` by argument.
+
+    Args:
+        target: One of :data:`SHARES`.
+        parts: Tests among which the cases of the target are shared out.
+        **strategies: Where the arguments of the test come from.
+    """
 
     def decorate(test: Callable) -> Callable:
         @functools.wraps(test)
@@ -68,7 +76,7 @@ def fuzz(target: str, **strategies: st.SearchStrategy) -> Callable[[Callable], C
                 test(*arguments, **drawn)
 
         chosen = settings(
-            max_examples=cases(target), deadline=None, database=None, print_blob=True,
+            max_examples=cases(target, parts), deadline=None, database=None, print_blob=True,
             derandomize=CASES == USUAL, phases=(Phase.explicit, Phase.generate, Phase.shrink),
             suppress_health_check=list(HealthCheck),
         )  # fmt: skip
@@ -122,8 +130,9 @@ NASTY = (
     "<<: 3", "{<<: &a {b: 1}, <<: *a}", "[1, 2", "]", "{a: b", "a: b: c", "? ", "- - - -",
     "[" * 400, "{a: " * 200, "[" * 300 + "]" * 300, "[[1], [2]]", "{[1]: 2}", "{{}: 3}",
     "%YAML 9.9\n---\na", "--- a\n--- b", "\x1b[31mred", '"\\e[31mred"', '"\\0"', "\ufeff", "\x00",
-    "\x85", "\u202e", "a" * 5000, "[" + "1, " * 500 + "]", "'", '"', "|", ">", "`", "@", "\t- a", "..",
-    "/", "/dev/zero", "/dev/null", "/proc/self/mem", "../../../etc/passwd", "~root", "a/b/c.d.e",
+    "\x85", "\u202e", "a" * 5000, "[" + "1, " * 500 + "]", "'", '"', "|", ">", "`", "@", "\t- a",
+    "..", "/", "/dev/zero", "/dev/null", "/proc/self/mem", "../../../etc/passwd", "~root",
+    "a/b/c.d.e",
     "{a: &a [x, x, x], b: &b [*a, *a, *a], c: &c [*b, *b, *b], d: [*c, *c, *c]}",
     "[&a [x,x,x,x,x,x,x,x], &b [*a,*a,*a,*a,*a,*a,*a,*a], &c [*b,*b,*b,*b,*b,*b,*b,*b], "
     "&d [*c,*c,*c,*c,*c,*c,*c,*c], &e [*d,*d,*d,*d,*d,*d,*d,*d], [*e,*e,*e,*e,*e,*e,*e,*e]]",
