@@ -20,7 +20,7 @@ class CommandStatus(IntEnum):
     FRESH = 0  # followed
     STALE = 1  # none came for longer than the command timeout: the last one is held
     REFUSED = 2  # too far from the one in force to be the same motion: the last one is held
-    MOVING = 3  # on the way to a goal, as to where the slave starts: nothing is followed
+    MOVING = 3  # to a goal, as to where the slave starts, or at a speed: nothing is followed
     CLOSED = 4  # not enabled, or not homed: nothing is followed
 
 
@@ -102,7 +102,7 @@ def come_to_rest(p: Any, s: Any, how: int, dt: float) -> None:
         before = s.setpoint[i]
         s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
         s.step[i] = s.setpoint[i] - before
-        s.command[i] = s.filtered[i] = s.setpoint[i]
+        s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i]
     s.span, s.ticks = 0, 1
 
 
@@ -111,7 +111,7 @@ def _not_followed(s: Any, row: Any) -> int:
     """Status of an arm that follows nothing; what comes meanwhile is seen, and old later."""
     s.seen_ns = max(s.seen_ns, row.slave_servo_jp_ns)
     s.arrival_ns, s.in_row = 0, 0
-    return 3 if s.is_busy else 4
+    return 3 if s.is_busy or s.motion != 0 else 4
 
 
 @inner
@@ -137,7 +137,7 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
     if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
         s.refused += 1
         return 2
-    if s.state != _ENABLED or s.is_busy or not s.is_homed:
+    if s.state != _ENABLED or s.is_busy or s.motion != 0 or not s.is_homed:
         return _not_followed(s, row)
     if stamp > s.seen_ns:
         period_ns = min(stamp - s.seen_ns, _SLOWEST_NS) if s.seen_ns > 0 else 0

@@ -29,6 +29,7 @@ from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.robot import Robot
 from teleop_core.signals import DT, assign
 from teleop_core.slave.friction import bristle_damping
+from teleop_core.slave.motion import MotionCommands
 from teleop_core.slave.step import SPEED_LAG, Arm, slave_records, slave_step
 from teleop_core.slave.trajectory import shortest_move_time
 from teleop_core.stage import RunningStage, Stage
@@ -160,6 +161,7 @@ class SlaveSim(RunningStage):
         self.arm = Arm(
             fk=self.robot.fk_pointer,
             tip_fk=self.robot.fk_pointer if is_as_drawn else pointer(dh_kernels.fk, FK),
+            jacobian=pointer(self.robot.kernels.jacobian, FK),
             acceleration=pointer(model.acceleration, ACCELERATION),
             gravity=pointer(model.gravity, GRAVITY),
             control=self._law.control_pointer,
@@ -175,8 +177,11 @@ class SlaveSim(RunningStage):
             q=np.zeros(n), dq=np.zeros(n), effort=np.zeros(n), setpoint=np.zeros(n),
             measured=np.zeros(n), feedforward=np.zeros(self._law.feedforward(n)), limit=np.zeros(n),
             joints=np.zeros(n), tip=np.zeros(n), T=np.zeros((4, 4)),
+            speeds=np.zeros(n), is_free=np.zeros(n), twist=np.zeros(6), J=np.zeros((6, n)),
+            A=np.zeros((6, 6)), b=np.zeros(6),
         )  # fmt: skip
         self.kernel, self.arguments = slave_step, (self.parameters, self.state, self.arm)
+        self.motion = MotionCommands(self)
         self._take_start(parameters)
         self._take_script(parameters.operation)
         self.retune(parameters)

@@ -35,6 +35,8 @@ from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.rigid_body import write_model
 from teleop_core.slave.transmission import follow_encoders
+from teleop_core.slave.velocity import advance_velocity
+from teleop_core.topics import NO_COMMAND_NS
 
 _ENABLED, _FAULT, _ARRIVED = int(State.ENABLED), int(State.FAULT), int(Event.ARRIVED)
 # A joint that is farther from its setpoint [rad or m] is no joint of a simulation in its senses.
@@ -53,13 +55,14 @@ def slave_records(n: int) -> tuple[Any, Any]:
     rows = [(name, "f8", (n,)) for name in joints]
     numbers = [(name, "f8") for name in scalars] + [(name, "i8") for name in counts]
     moved = ("command", "filtered", "setpoint", "target", *WAY_FIELDS, "step", "move_from",
-             "move_to")  # fmt: skip
+             "move_to", "drive")  # fmt: skip
     plant = ("measured", "speed", "bent", "grip", "astray", "carried")
     state: list[Field] = [(name, "f8", (n,)) for name in (*moved, *plant)]
     state += [(name, "i8", (n,)) for name in ("noise", "full_ticks")] + [("tool_step", "f8")]
+    state += [("twist", "f8", (6,))]
     stamps = (
         "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "refused_before", "in_row",
-        "moved_ticks", "move_ticks", "ticks", "span",
+        "moved_ticks", "move_ticks", "ticks", "span", "motion", "driven_ns",
     )  # fmt: skip
     whole = [*state, *((name, "i8") for name in stamps), *OPERATION_STATE]
     return records([*rows, *numbers, *OPERATION_PARAMETERS])[0], records(whole)[0]
@@ -70,6 +73,7 @@ class Arm(NamedTuple):
 
     fk: Any
     tip_fk: Any  # of the links as they were made
+    jacobian: Any
     acceleration: Any
     gravity: Any
     control: Any
@@ -90,6 +94,12 @@ class Arm(NamedTuple):
     joints: Array  # room for joints
     tip: Array  # true joint positions (n,), behind the transmission
     T: Array
+    speeds: Array  # room for what follows a twist: joint speeds (n,), and so on
+    is_free: Array
+    twist: Array
+    J: Array
+    A: Array
+    b: Array
 
 
 @inner
@@ -135,10 +145,14 @@ def _drive(p: Any, arm: Any) -> None:
 
 
 @inner
-def _go_on(p: Any, s: Any, row: Any, before: Array, dt: float) -> None:
-    """Move the setpoint: to a goal, after the command, or to rest."""
-    if s.state == _ENABLED and s.is_busy:
+def _go_on(p: Any, s: Any, arm: Any, row: Any, before: Array, dt: float) -> None:
+    """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
+    if s.state == _ENABLED and s.is_busy and not s.must_plan:
         advance_move(s)
+    elif s.state == _ENABLED and s.is_busy:  # a way to a goal begins at rest
+        come_to_rest(p, s, AT_LIMITS, dt)
+    elif s.state == _ENABLED and s.motion != 0:
+        advance_velocity(p, s, arm, row.now_ns, dt)
     elif follows(p, s, row.now_ns):
         advance_on_way(p, s)
         advance_setpoint(p, s, before, dt)
@@ -160,6 +174,15 @@ def _brake(p: Any, s: Any, arm: Any, dt: float) -> None:
             arm.q[i] = s.setpoint[i]
         arm.q[i] += arm.dq[i] * dt
         s.speed[i] = arm.dq[i] if not math.isfinite(s.speed[i]) else s.speed[i]
+
+
+@inner
+def _is_still(s: Any) -> bool:
+    """Whether the setpoint stands still."""
+    moves = 0
+    for i in range(s.step.shape[0]):
+        moves += s.step[i] != 0.0
+    return moves == 0
 
 
 @inner
@@ -188,14 +211,17 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     joints, n = arm.joints, arm.q.shape[0]
     begin_tick(p, s, row.now_ns)
     row.command_status = take_command(p, s, row, dt)
-    if s.must_plan:
+    if s.state != _ENABLED:
+        s.motion = 0
+    if s.must_plan and _is_still(s):
         if s.is_homing:
             copy(p.start, s.move_to)
         plan_move(p, s, arm, dt)
+        s.command_stamp_ns, s.motion = NO_COMMAND_NS, 0
     copy(s.command, joints)
-    _go_on(p, s, row, joints, dt)
+    _go_on(p, s, arm, row, joints, dt)
     limit_tool(p, s, arm, row.slave_setpoint_cp, dt)
-    if s.is_busy and s.moved_ticks >= s.move_ticks:
+    if s.is_busy and not s.must_plan and s.moved_ticks >= s.move_ticks:
         change(s, _ARRIVED)
     pose_from_transform(arm.T, row.slave_setpoint_cp)
     _measure(p, s, arm.q, dt)

@@ -1,0 +1,232 @@
+"""Motion commands: what an arm is told to do beside following a stream of joint references.
+
+They are those of CRTK (Collaborative Robotics Toolkit): moves to a goal, speeds of joints and tip,
+steps relative to the last command, hold. Whatever they ask for goes through the limits, states and
+faults of the slave's step. One of them moves the arm at a time:
+
+- a move takes the arm from whatever moves it, and gives it to another move or to hold alone;
+- of streams the one that came first keeps it, until it falls silent for the command timeout;
+- hold ends a move, a speed, and a command that came alone.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from teleop_core.errors import ShapeError
+from teleop_core.geometry import Array
+from teleop_core.operation.states import Answer, Event, State
+from teleop_core.robots.kinematics import IkStatus
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.velocity import Motion
+from teleop_core.topics import NO_COMMAND_NS
+
+_REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
+# Goals beyond a limit by rounding, as of a setpoint that is there [rad or m].
+_SLACK = 1e-6
+Told = tuple[Answer, str]
+"""What became of a command, and the same in words."""
+
+
+class Commanded(Protocol):
+    """What is commanded: the slave, as far as it matters here."""
+
+    robot: Robot
+    parameters: Any
+    state: Any
+    signals: Any
+
+    def request(self, event: Event | str) -> Told:
+        """Take a command of the state machine."""
+
+
+class MotionCommands:
+    """Takes motion commands for a slave, between two ticks.
+
+    Every command returns an :class:`~teleop_core.operation.Answer` and the same in words: what the
+    arm cannot do, or may not do in its state, is refused and changes nothing.
+
+    Args:
+        slave: The slave; its state is written.
+    """
+
+    def __init__(self, slave: Commanded) -> None:
+        self._slave = slave
+
+    # -- what it does ----------------------------------------------------------------------------
+
+    @property
+    def goal(self) -> Array:
+        """Joints (n,) where it goes, or holds [rad or m]: of a move, or of the last reference."""
+        s = self._slave.state
+        return np.array(s["move_to"] if s["is_busy"] else s["target"], dtype=np.float64)
+
+    @property
+    def source(self) -> str:
+        """What moves the arm: ``move``, ``velocity``, ``servo``, or ``nothing``."""
+        s = self._slave.state
+        if s["is_busy"]:
+            return "home" if s["is_homing"] else "move"
+        if s["motion"] != Motion.FOLLOWING:
+            return "velocity"
+        return "servo" if s["arrival_ns"] > 0 else "nothing"
+
+    # -- moves -----------------------------------------------------------------------------------
+
+    def move(self, goal: object) -> Told:
+        """Move smoothly to joints, from rest to rest; from another motion it brakes to rest first.
+
+        Args:
+            goal: Joints (n,) [rad or m].
+
+        Raises:
+            ShapeError: Another number of joints.
+        """
+        wanted = np.asarray(goal, dtype=np.float64)
+        if refusal := self._unfit(wanted):
+            return refusal
+        s = self._slave.state
+        if s["is_homing"]:
+            return Answer.REFUSED, "move refused: it is homing; wait until it is homed"
+        answer, text = self._slave.request(Event.MOVE)
+        if answer is not Answer.DONE:
+            return answer, text
+        s["move_to"], s["motion"] = wanted, Motion.FOLLOWING
+        return answer, "move: on the way"
+
+    def move_by(self, step: object) -> Told:
+        """Move by a step of joints (n,) [rad or m] from the setpoint."""
+        return self.move(self._slave.state["setpoint"] + self._joints(step))
+
+    def move_to_pose(self, T: object) -> Told:
+        """Move smoothly to where the tip has a pose: straight in joints, not in space.
+
+        The branch inside the limits next to the setpoint is taken. This takes long for a tick: in
+        a running session :meth:`solve` first, beside the ticks, then :meth:`move`.
+
+        Args:
+            T: ``T_base_tip`` (4, 4).
+
+        Raises:
+            ShapeError: Another shape.
+        """
+        found = self.solve(T)
+        return found if isinstance(found, tuple) else self.move(found)
+
+    def solve(self, T: object) -> Array | Told:
+        """Joints (n,) at which the tip has a pose (4, 4), next to the setpoint; or a refusal."""
+        seed = np.array(self._slave.state["setpoint"], dtype=np.float64)
+        found = self._slave.robot.ik(T, seed)
+        if found.status in _REACHED:
+            return found.q
+        far, turned = 1e3 * found.residual[0], np.degrees(found.residual[1])
+        short = f"the arm comes no nearer than {far:.3g} mm and {turned:.3g}°"
+        return Answer.REFUSED, f"refused: out of reach, {short}"
+
+    # -- streams ---------------------------------------------------------------------------------
+
+    def drive_joints(self, speed: object, now_ns: int) -> Told:
+        """Drive joints at speeds until the command timeout is over; then brake to rest.
+
+        Args:
+            speed: Joint speeds (n,) [rad/s or m/s]; faster ones than the drives' are cut in
+                proportion.
+            now_ns: Time of arrival, on the clock of the ticks [ns].
+
+        Raises:
+            ShapeError: Another number of joints.
+        """
+        return self._drive(Motion.JOINTS, self._joints(speed), "drive", now_ns)
+
+    def drive_tip(self, twist: object, now_ns: int) -> Told:
+        """Drive the tip at a twist until the command timeout is over; then brake to rest.
+
+        Near singularities and where joints come to their limits, the tip lags.
+
+        Args:
+            twist: Linear and angular velocity (6,) of the tip in base axes [m/s, rad/s].
+            now_ns: Time of arrival, on the clock of the ticks [ns].
+
+        Raises:
+            ShapeError: Another shape.
+        """
+        return self._drive(Motion.TIP, _row(twist, 6), "twist", now_ns)
+
+    def servo(self, joints: object, now_ns: int) -> Told:
+        """Follow joint references (n,) [rad or m], as those of ``slave/servo_jp``.
+
+        Raises:
+            ShapeError: Another number of joints.
+        """
+        wanted = self._joints(joints)
+        if refusal := self._unfit(wanted) or self._refusal():
+            return refusal
+        row = self._slave.signals
+        row["slave_servo_jp"], row["slave_servo_jp_ns"] = wanted, now_ns
+        return Answer.DONE, "servo: taken"
+
+    def servo_by(self, step: object, now_ns: int) -> Told:
+        """Follow steps of joints (n,) [rad or m], each from the last command."""
+        return self.servo(self._slave.state["target"] + self._joints(step), now_ns)
+
+    def hold(self) -> Told:
+        """Brake to rest, and stay there until the next command; a stream in force goes on.
+
+        To keep a stream away, pause the arm.
+        """
+        s = self._slave.state
+        if s["state"] != State.ENABLED:
+            return Answer.ALREADY, "hold: nothing to do, it does not move"
+        if s["is_homing"]:
+            return Answer.REFUSED, "hold refused: it is homing; pause or disable it"
+        s["is_busy"] = s["must_plan"] = 0
+        s["motion"], s["drive"], s["driven_ns"] = Motion.JOINTS, 0.0, 0
+        return Answer.DONE, "hold: done"
+
+    def _drive(self, motion: Motion, wanted: Array, field: str, now_ns: int) -> Told:
+        if not np.isfinite(wanted).all():
+            return Answer.REFUSED, "velocity refused: it holds NaN or infinite numbers"
+        if refusal := self._refusal():
+            return refusal
+        s = self._slave.state
+        is_streamed = s["arrival_ns"] > 0 and s["in_row"] > 0
+        if is_streamed and now_ns - s["arrival_ns"] <= self._slave.parameters["timeout_ns"]:
+            return Answer.REFUSED, "velocity refused: the arm follows a stream of servo_jp"
+        if s["motion"] == Motion.FOLLOWING:
+            s["command_stamp_ns"] = NO_COMMAND_NS
+        s[field], s["motion"], s["driven_ns"] = wanted, motion, now_ns
+        return Answer.DONE, "velocity: taken"
+
+    def _refusal(self) -> Told | None:
+        """Why nothing streamed is followed now; None if it is."""
+        s = self._slave.state
+        state = State(int(s["state"]))
+        if state is not State.ENABLED:
+            return Answer.REFUSED, f"refused in {state.name}, followed in ENABLED"
+        if s["is_busy"]:
+            return Answer.REFUSED, "refused: it is on the way to a goal; wait, or hold"
+        return None if s["is_homed"] else (Answer.REFUSED, "refused: home first")
+
+    def _unfit(self, joints: Array) -> Told | None:
+        """Why nobody can go to these joints; None if they are sound."""
+        robot = self._slave.robot
+        wanted = self._joints(joints)
+        if not np.isfinite(wanted).all():
+            return Answer.REFUSED, "refused: it holds NaN or infinite numbers"
+        is_out = (wanted < robot.lower - _SLACK) | (wanted > robot.upper + _SLACK)
+        if is_out.any():
+            i = int(np.flatnonzero(is_out)[0])
+            name, limits = robot.joint_names[i], f"{robot.lower[i]:.4g} to {robot.upper[i]:.4g}"
+            text = f"refused: {name} = {wanted[i]:.4g} is beyond its limits, {limits}"
+            return Answer.REFUSED, text
+        return None
+
+    def _joints(self, values: object) -> Array:
+        return _row(values, self._slave.robot.n)
+
+
+def _row(values: object, count: int) -> Array:
+    row = np.asarray(values, dtype=np.float64)
+    if row.shape != (count,):
+        raise ShapeError("command", (count,), row.shape)
+    return row

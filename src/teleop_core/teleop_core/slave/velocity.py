@@ -1,0 +1,126 @@
+"""Velocity: the setpoint of a slave that is driven at a speed of its joints or of its tip."""
+
+import math
+from enum import IntEnum
+from typing import Any
+
+from teleop_core.geometry import Array
+from teleop_core.kernels import inner
+from teleop_core.robots.damped import eliminate, gram, weigh
+from teleop_core.signals import copy
+
+
+class Motion(IntEnum):
+    """What moves the setpoint of an enabled slave that is on no way to a goal."""
+
+    FOLLOWING = 0  # references of its joints
+    JOINTS = 1  # a speed of its joints
+    TIP = 2  # a twist of its tip
+
+
+_FOLLOWING, _TIP = int(Motion.FOLLOWING), int(Motion.TIP)
+# Radians per second at the tip that count as much as metres per second: its inverse [m].
+_LENGTH = 0.1
+# Added to the squares of the weighted singular values. Assumed: where they are 1, speeds lose a
+# ten-thousandth; next to a singularity joints go 50 times as fast as the tip asks for, at most.
+_DAMPING = 1e-4
+
+
+@inner
+def joint_speeds(arm: Any, q: Array, twist: Array, speed: Array) -> None:
+    """Write the joint speeds (n,) that follow a twist at damped best.
+
+    ``dq = Jᵀ (J Jᵀ + damping I)⁻¹ v``, with the linear rows of J and v over a length. Near a
+    singularity the tip lags instead of the joints racing; what a robot cannot do is left out.
+
+    Args:
+        arm: Its ``jacobian`` and ``geometry``; its rooms ``J``, ``A``, ``b`` and ``is_free`` are
+            written.
+        q: Joints (n,) [rad or m].
+        twist: Of the tip (6,) in base axes [m/s, rad/s].
+        speed: Joint speeds (n,) [rad/s or m/s]; written.
+
+    Source:
+        Nakamura and Hanafusa 1986, eq. 15.
+    """
+    arm.jacobian(q, arm.geometry, arm.J)
+    weigh(arm.J, _LENGTH)
+    for r in range(6):
+        arm.b[r] = twist[r] / _LENGTH if r < 3 else twist[r]
+    for i in range(q.shape[0]):
+        arm.is_free[i] = 1.0
+    gram(arm.J, arm.is_free, _DAMPING, arm.A)
+    eliminate(arm.A, arm.b)
+    for i in range(q.shape[0]):
+        speed[i] = 0.0
+        for r in range(6):
+            speed[i] += arm.J[r, i] * arm.b[r]
+
+
+@inner
+def _stoppable(room: float, most: float) -> float:
+    """Largest step from which a setpoint stops within ``room``, each step less by ``most``."""
+    return 0.5 * (math.sqrt(most * (most + 8.0 * max(room, 0.0))) - most)
+
+
+@inner
+def _share_of_limits(p: Any, s: Any, dt: float) -> float:
+    """Share of the wanted speeds that no joint is too fast for, or of the tip's, none too far."""
+    share = 1.0
+    for i in range(s.drive.shape[0]):
+        fast = abs(s.drive[i])
+        most = p.speed_limit[i]
+        if s.motion == _TIP:
+            up = s.drive[i] > 0.0
+            room = p.upper[i] - s.setpoint[i] if up else s.setpoint[i] - p.lower[i]
+            most = min(most, _stoppable(room, p.braking[i] * dt * dt) / dt)
+        if fast > most:
+            share = min(share, most / fast)
+    return share
+
+
+@inner
+def advance_velocity(p: Any, s: Any, arm: Any, now_ns: int, dt: float) -> None:
+    """Move the setpoint at the wanted speed; without a fresh command it brakes to rest, and stays.
+
+    All joints keep their speed limits, change their speed no faster than their drives can brake,
+    and stop at the end of their ranges. A tip whose joints cannot keep up goes slower on its line.
+
+    Args:
+        p: Parameters with ``timeout_ns``, ``speed_limit``, ``braking``, ``lower``, ``upper`` (n,).
+        s: State with ``motion``, ``drive`` (n,) [rad/s or m/s], ``twist`` (6,), ``driven_ns``, the
+            arrival of the command; its setpoint is written.
+        arm: As of :func:`joint_speeds`.
+        now_ns: Time of the tick [ns].
+        dt: Tick [s].
+    """
+    n = s.setpoint.shape[0]
+    is_stale = now_ns - s.driven_ns > p.timeout_ns
+    if is_stale:
+        for i in range(n):
+            s.drive[i] = 0.0
+    elif s.motion == _TIP:
+        copy(s.setpoint, arm.joints)
+        copy(s.twist, arm.twist)
+        joint_speeds(arm, arm.joints, arm.twist, arm.speeds)
+        copy(arm.speeds, s.drive)
+    share, change = _share_of_limits(p, s, dt), 1.0
+    for i in range(n):
+        most = p.braking[i] * dt * dt
+        off = abs(share * s.drive[i] * dt - s.step[i])
+        if off > most:
+            change = min(change, most / off)
+    is_still = True
+    for i in range(n):
+        most = p.braking[i] * dt * dt
+        step = s.step[i] + change * (share * s.drive[i] * dt - s.step[i])
+        step = min(step, _stoppable(p.upper[i] - s.setpoint[i], most))
+        step = max(step, -_stoppable(s.setpoint[i] - p.lower[i], most))
+        before = s.setpoint[i]
+        s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
+        s.step[i] = s.setpoint[i] - before
+        s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i]
+        is_still = is_still and s.step[i] == 0.0
+    s.span, s.ticks = 0, 1
+    if is_stale and is_still:
+        s.motion = _FOLLOWING

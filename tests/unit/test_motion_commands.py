@@ -1,0 +1,432 @@
+"""Motion commands: moves, speeds, steps and hold keep every limit, state and promise of the arm."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from teleop_core.errors import ShapeError
+from teleop_core.geometry import rotation, transform
+from teleop_core.operation.states import Answer, State
+from teleop_core.parameters import build
+from teleop_core.robots import load_robot
+from teleop_core.signals import DT, TICK_NS
+from teleop_core.slave.slave_sim import OperationParameters, SlaveSim, SlaveSimParameters
+from teleop_core.topics import NO_COMMAND_NS
+
+ARM = load_robot("rcrt1")
+# Well inside the limits and off the singularities.
+MIDDLE = np.array([0.1, 1.7, 0.36, 0.2, 0.5, 0.1])
+TIMEOUT_TICKS = 100
+SMALL = np.array([0.05, -0.04, -0.02, 0.1, 0.06, -0.1])
+# The lag is out of the way: what is shown is what was asked for.
+DIRECT = {"reference_filter.is_on": False}
+
+
+class Bench:
+    """A slave at rest in the middle of its range, and the ticks it makes."""
+
+    def __init__(self, name="rcrt1", middle=MIDDLE, **values):
+        given = (
+            {"robot": name, "start_speed": 1.0, "start": tuple(np.asarray(middle).tolist())}
+            | DIRECT
+            | values
+        )
+        self.slave = SlaveSim(build(SlaveSimParameters, given))
+        self.robot, self.motion, self.now_ns = self.slave.robot, self.slave.motion, 10**9
+        self.run(1)
+        while self.slave.operation["is_busy"]:
+            self.run(100)
+        self.run(200)
+
+    def run(self, ticks):
+        """Setpoints (ticks, n)."""
+        found = np.empty((ticks, self.slave.robot.n))
+        for i in range(ticks):
+            self.now_ns += TICK_NS
+            self.slave.signals["now_ns"] = self.now_ns
+            self.slave.step()
+            found[i] = self.slave.signals["slave_setpoint_js"]
+        return found
+
+    def follow(self, command, stamp_ns=None):
+        """One tick with a message of servo_jp."""
+        row = self.slave.signals
+        row["slave_servo_jp"] = command
+        row["slave_servo_jp_ns"] = self.now_ns + TICK_NS if stamp_ns is None else stamp_ns
+        return self.run(1)[0]
+
+    @property
+    def setpoint(self):
+        return self.slave.signals["slave_setpoint_js"].copy()
+
+    @property
+    def tip(self):
+        return self.robot.fk(self.setpoint)
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def insist_on_limits(robot, path):
+    """Speeds within the drives' and speed changes within twenty times what they can brake."""
+    speed = np.diff(path, axis=0) / DT
+    assert (np.abs(speed) <= robot.drives.speed_limit * (1 + 1e-9)).all()
+    most = 20.0 * robot.drives.effort_limit / robot.drives.inertia
+    assert (np.abs(np.diff(speed, axis=0)) / DT <= most * (1 + 1e-6)).all()
+    assert (path >= robot.lower).all()
+    assert (path <= robot.upper).all()
+
+
+def test_a_move_goes_from_rest_to_rest_at_its_goal_and_tells_so(bench):
+    answer, _ = bench.motion.move(MIDDLE + SMALL)
+    assert answer is Answer.DONE
+    np.testing.assert_array_equal(bench.motion.goal, MIDDLE + SMALL)
+    path = bench.run(1)
+    assert bench.slave.operation["is_busy"] == 1.0
+    assert bench.motion.source == "move"
+    path = np.vstack((path, bench.run(2000)))
+    np.testing.assert_array_equal(path[-1], MIDDLE + SMALL)
+    insist_on_limits(ARM, path)
+    assert bench.slave.operation["is_busy"] == 0.0
+    # Between two points joints go straight: every joint has done the same share of its way.
+    shares = (path - MIDDLE) / SMALL
+    np.testing.assert_allclose(shares, shares[:, :1] * np.ones(6), atol=1e-9)
+
+
+def test_a_move_from_full_speed_brakes_first_and_jumps_in_nothing(bench):
+    speed = 0.8 * ARM.drives.speed_limit * np.array([1, 0, 0, 0, 0, 0])
+    path = []
+    for _ in range(5):
+        bench.motion.drive_joints(speed, bench.now_ns)
+        path.append(bench.run(20))
+    assert bench.motion.move(MIDDLE)[0] is Answer.DONE
+    path.append(bench.run(4000))
+    joined = np.vstack(path)
+    insist_on_limits(ARM, joined)
+    np.testing.assert_array_equal(joined[-1], MIDDLE)
+
+
+def test_a_newer_move_takes_over_from_one_under_way(bench):
+    bench.motion.move(MIDDLE + 4.0 * SMALL)
+    path = [bench.run(150)]
+    assert bench.motion.move(MIDDLE - SMALL)[0] is Answer.DONE
+    path.append(bench.run(4000))
+    insist_on_limits(ARM, np.vstack(path))
+    np.testing.assert_array_equal(bench.setpoint, MIDDLE - SMALL)
+
+
+def test_a_move_to_a_pose_brings_the_tip_there(bench):
+    goal = bench.tip @ transform(rotation("x", 0.05), np.array([0.01, -0.005, 0.008]))
+    assert bench.motion.move_to_pose(goal)[0] is Answer.DONE
+    bench.run(3000)
+    np.testing.assert_allclose(bench.tip, goal, atol=1e-12)
+
+
+def test_a_pose_out_of_reach_is_refused_with_how_far_it_is(bench):
+    before, goal = bench.setpoint, bench.tip
+    goal[0, 3] += 3.0
+    answer, text = bench.motion.move_to_pose(goal)
+    assert answer is Answer.REFUSED
+    assert float(re.search(r"nearer than ([\d.e+]+) mm", text)[1]) > 1000.0
+    np.testing.assert_array_equal(bench.run(50)[-1], before)
+
+
+@pytest.mark.parametrize(
+    ("goal", "why"),
+    [
+        (ARM.upper + 0.1, "theta1 = 1.496 is beyond its limits, -1.396 to 1.396"),
+        (np.full(6, np.nan), "NaN"),
+        (np.full(6, np.inf), "NaN or infinite"),
+    ],
+)
+def test_goals_that_the_joints_cannot_have_are_refused(bench, goal, why):
+    answer, text = bench.motion.move(goal)
+    assert answer is Answer.REFUSED
+    assert why in text
+    assert bench.slave.operation["is_busy"] == 0.0
+
+
+def test_a_step_moves_by_that_much_from_the_setpoint(bench):
+    bench.motion.move_by(SMALL)
+    bench.run(2000)
+    np.testing.assert_allclose(bench.setpoint, MIDDLE + SMALL, atol=1e-12)
+
+
+@pytest.mark.parametrize("command", ["move", "move_by"])
+def test_another_number_of_joints_is_wrong_use(bench, command):
+    with pytest.raises(ShapeError, match=r"must have shape \(6,\), has \(5,\)"):
+        getattr(bench.motion, command)(np.zeros(5))
+
+
+@pytest.mark.parametrize("state", [State.DISABLED, State.PAUSED, State.FAULT])
+def test_nothing_is_moved_outside_enabled(bench, state):
+    bench.slave.request({"DISABLED": "disable", "PAUSED": "pause", "FAULT": "stop"}[state.name])
+    before, now_ns = bench.run(500)[-1], bench.now_ns
+    told = [
+        bench.motion.move(MIDDLE + SMALL), bench.motion.move_by(SMALL),
+        bench.motion.move_to_pose(bench.tip), bench.motion.drive_joints(SMALL, now_ns),
+        bench.motion.drive_tip(SMALL, now_ns), bench.motion.servo(MIDDLE + 1e-3, now_ns),
+        bench.motion.servo_by(1e-3 * SMALL, now_ns),
+    ]  # fmt: skip
+    assert {answer for answer, _ in told} == {Answer.REFUSED}
+    assert all(state.name in text for _, text in told)
+    np.testing.assert_array_equal(bench.run(100)[-1], before)
+
+
+def test_before_homing_is_done_no_motion_command_is_taken():
+    bench = Bench(**{"operation.starts_enabled": False})
+    bench.slave.request("enable")
+    assert bench.motion.move(MIDDLE)[0] is Answer.REFUSED
+    assert "home first" in bench.motion.drive_joints(SMALL, bench.now_ns)[1]
+    bench.slave.request("home")
+    bench.run(10)
+    assert "homing" in bench.motion.move(MIDDLE)[1]
+    assert "homing" in bench.motion.hold()[1]
+    while bench.slave.operation["is_busy"]:
+        bench.run(100)
+    assert bench.motion.move(MIDDLE + SMALL)[0] is Answer.DONE
+
+
+@pytest.mark.parametrize("event", ["pause", "disable", "stop"])
+def test_a_state_that_stops_a_move_drops_it_for_good(bench, event):
+    bench.motion.move(MIDDLE + 4.0 * SMALL)
+    bench.run(200)
+    bench.slave.request(event)
+    stopped = bench.run(1000)[-1]
+    for cure in ("reset", "enable", "resume", "enable"):
+        bench.slave.request(cure)
+    assert bench.slave.state["state"] == State.ENABLED
+    np.testing.assert_array_equal(bench.run(500)[-1], stopped)
+
+
+def test_joints_run_at_the_speed_asked_for_until_the_timeout_then_brake(bench):
+    speed = np.array([0.1, -0.05, 0.01, 0.2, 0.1, -0.1])
+    for _ in range(10):
+        bench.motion.drive_joints(speed, bench.now_ns)
+        path = bench.run(50)
+    np.testing.assert_allclose(np.diff(path[-10:], axis=0) / DT, np.tile(speed, (9, 1)), atol=1e-9)
+    assert bench.motion.source == "velocity"
+    silent = bench.run(500)
+    moved = np.abs(np.diff(silent, axis=0)).max(axis=1) > 0.0
+    braking = np.max(np.abs(speed) * ARM.drives.inertia / ARM.drives.effort_limit) / DT
+    # 50 ticks of the timeout were over when the listening began.
+    assert TIMEOUT_TICKS - 52 <= np.flatnonzero(moved)[-1] <= TIMEOUT_TICKS - 48 + braking
+    assert bench.motion.source == "nothing"
+
+
+def test_speeds_beyond_the_drives_are_cut_in_proportion(bench):
+    wild = 50.0 * ARM.drives.speed_limit * np.array([1, 0.5, 0, 0, 0, 0])
+    bench.motion.drive_joints(wild, bench.now_ns)
+    path = np.vstack((MIDDLE, bench.run(90)))
+    insist_on_limits(ARM, path)
+    speed = np.diff(path, axis=0)[-1] / DT
+    np.testing.assert_allclose(speed[:2], ARM.drives.speed_limit[:2] * [1.0, 0.5], rtol=1e-9)
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_the_tip_runs_along_its_twist_and_no_other_way(bench, axis):
+    twist = np.zeros(6)
+    twist[axis] = 0.02 if axis < 3 else 0.1
+    start = bench.tip
+    for _ in range(4):
+        bench.motion.drive_tip(twist, bench.now_ns)
+        bench.run(50)
+    before = bench.tip
+    bench.motion.drive_tip(twist, bench.now_ns)
+    bench.run(50)
+    went = (bench.tip[:3, 3] - before[:3, 3]) / (50 * DT)
+    turned = (bench.tip[:3, :3] @ before[:3, :3].T - np.eye(3)) / (50 * DT)
+    spin = 0.5 * np.array(
+        [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
+    )
+    np.testing.assert_allclose(went, twist[:3], atol=2e-5)
+    np.testing.assert_allclose(spin, twist[3:], atol=2e-4)
+    assert np.linalg.norm(start[:3, 3] - before[:3, 3]) < 0.006
+
+
+def test_a_tip_driven_to_the_end_of_a_joint_stops_on_its_line(bench):
+    direction = ARM.jacobian(MIDDLE)[:3, 2]  # d3 outward, 61 mm before its end
+    start, line = bench.tip[:3, 3], direction / np.linalg.norm(direction)
+    path = []
+    for _ in range(60):
+        bench.motion.drive_tip(np.concatenate((0.1 * line, np.zeros(3))), bench.now_ns)
+        path.append(bench.run(50))
+    joined = np.vstack(path)
+    insist_on_limits(ARM, joined)
+    assert ARM.upper[2] - joined[-1, 2] < 1e-3
+    way = bench.tip[:3, 3] - start
+    assert np.linalg.norm(way - line * (way @ line)) < 2e-3
+
+
+def test_next_to_a_singularity_joints_keep_their_limits():
+    straight = MIDDLE.copy()
+    straight[4] = 1e-4  # axes 4 and 6 of the wrist nearly in line
+    bench = Bench(middle=straight)
+    path = []
+    for _ in range(20):
+        bench.motion.drive_tip([0, 0, 0, 0.5, 0.5, 0.5], bench.now_ns)
+        path.append(bench.run(50))
+    insist_on_limits(ARM, np.vstack(path))
+
+
+def test_a_robot_that_cannot_turn_its_tip_does_of_a_twist_what_it_can():
+    robot = load_robot("planar_3r")
+    middle = 0.5 * (robot.start + robot.home)
+    bench = Bench("planar_3r", middle=middle)
+    before = bench.tip
+    for _ in range(4):
+        assert bench.motion.drive_tip([0.02, 0, 0, 0.1, 0, 0], bench.now_ns)[0] is Answer.DONE
+        path = bench.run(50)
+    assert np.isfinite(path).all()
+    assert bench.tip[0, 3] - before[0, 3] > 0.002
+
+
+def test_a_running_stream_is_not_taken_over_by_a_speed_and_a_speed_not_by_a_stream(bench):
+    for _ in range(20):
+        bench.follow(MIDDLE + 1e-4)
+    answer, text = bench.motion.drive_joints(SMALL, bench.now_ns)
+    assert answer is Answer.REFUSED
+    assert "stream of servo_jp" in text
+    bench.run(TIMEOUT_TICKS + 1)  # the stream falls silent
+    assert bench.motion.drive_joints(SMALL, bench.now_ns)[0] is Answer.DONE
+    driven = bench.run(20)[-1]
+    bench.follow(MIDDLE)
+    ahead = np.sign(SMALL) * (bench.setpoint - driven)
+    assert (ahead > 0.0).all()
+
+
+def test_a_move_takes_over_from_a_stream_which_is_followed_again_afterwards(bench):
+    for _ in range(20):
+        bench.follow(MIDDLE)
+    bench.motion.move(MIDDLE + SMALL)
+    bench.follow(MIDDLE)
+    while bench.slave.operation["is_busy"]:
+        bench.follow(MIDDLE)
+    np.testing.assert_array_equal(bench.setpoint, MIDDLE + SMALL)
+    for _ in range(200):
+        bench.follow(MIDDLE + 0.99 * SMALL)
+    np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.99 * SMALL, atol=1e-9)
+
+
+def test_after_a_move_no_command_is_in_force(bench):
+    bench.follow(MIDDLE)
+    bench.run(1)
+    assert bench.slave.signals["slave_setpoint_js_ns"] > NO_COMMAND_NS
+    bench.motion.move(MIDDLE + SMALL)
+    bench.run(2000)
+    assert bench.slave.signals["slave_setpoint_js_ns"] == NO_COMMAND_NS
+    np.testing.assert_array_equal(bench.setpoint, MIDDLE + SMALL)
+
+
+def test_steps_add_up_from_command_to_command(bench):
+    for _ in range(50):
+        bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS)
+        bench.run(5)
+    bench.run(200)
+    np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.05 * SMALL, atol=1e-12)
+
+
+def test_references_by_command_are_followed_as_those_of_the_topic():
+    one, other = Bench(), Bench()
+    for share in np.linspace(0.0, 0.2, 200):
+        one.follow(MIDDLE + share * SMALL)
+        other.motion.servo(MIDDLE + share * SMALL, other.now_ns + TICK_NS)
+        other.run(1)
+        np.testing.assert_array_equal(one.setpoint, other.setpoint)
+
+
+@pytest.mark.parametrize("kind", ["move", "speed", "lone"])
+def test_hold_brakes_what_moves_and_stays(bench, kind):
+    if kind == "move":
+        bench.motion.move(MIDDLE + 4.0 * SMALL)
+    elif kind == "speed":
+        bench.motion.drive_joints(SMALL, bench.now_ns)
+    else:
+        bench.follow(MIDDLE + 0.1 * SMALL)
+    path = [bench.run(30)]
+    assert bench.motion.hold()[0] is Answer.DONE
+    path.append(bench.run(500))
+    joined = np.vstack(path)
+    insist_on_limits(ARM, joined)
+    held = joined[-1]
+    np.testing.assert_array_equal(bench.run(500)[-1], held)
+    assert np.abs(held - MIDDLE).max() > 1e-5
+    assert np.abs(held - bench.motion.goal).max() == 0.0
+
+
+def test_after_a_pause_the_arm_stays_where_it_came_to_rest(bench):
+    for share in np.linspace(0.0, 1.0, 200):
+        bench.follow(MIDDLE + share * SMALL)
+    bench.slave.request("pause")
+    rest = bench.run(1000)[-1]
+    assert np.abs(rest - MIDDLE - SMALL).max() > 1e-6  # braking takes it past the last reference
+    bench.slave.request("resume")
+    np.testing.assert_array_equal(bench.run(200)[-1], rest)
+
+
+COMMANDS = st.lists(
+    st.tuples(
+        st.sampled_from(
+            ["move", "pose", "joints", "tip", "step", "hold", "stream", "pause", "resume",
+             "stop", "reset", "enable", "home", "disable"]
+        ),
+        st.lists(st.floats(-1.0, 1.0, width=32), min_size=6, max_size=6),
+        st.integers(1, 120),
+    ),
+    min_size=1,
+    max_size=12,
+)  # fmt: skip
+
+
+@settings(max_examples=60, deadline=None)
+@given(commands=COMMANDS)
+def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(commands):
+    bench, path = SHARED, []
+    bench.slave.reset()
+    path.append(bench.run(3))
+    for name, numbers, ticks in commands:
+        wild = np.array(numbers)
+        now_ns, motion = bench.now_ns, bench.motion
+        if name == "stream":
+            bench.follow(bench.setpoint + 0.02 * wild)
+        elif name in {"move", "pose", "joints", "tip", "step", "hold"}:
+            {
+                "move": lambda w=wild: motion.move(bench.setpoint + w),
+                "pose": lambda w=wild: motion.move_to_pose(
+                    bench.tip @ transform(rotation("z", w[3]), 0.1 * w[:3])
+                ),
+                "joints": lambda w=wild, n=now_ns: motion.drive_joints(20.0 * w, n),
+                "tip": lambda w=wild, n=now_ns: motion.drive_tip(5.0 * w, n),
+                "step": lambda w=wild, n=now_ns: motion.servo_by(0.1 * w, n),
+                "hold": motion.hold,
+            }[name]()
+        else:
+            bench.slave.request(name)
+        path.append(bench.run(ticks))
+    joined = np.vstack(path)
+    speed = np.diff(joined, axis=0) / DT
+    assert (np.abs(speed) <= ARM.drives.speed_limit * (1 + 1e-9)).all()
+    assert ((joined >= ARM.lower) & (joined <= ARM.upper)).all()
+    tips = np.array([ARM.fk(q)[:3, 3] for q in joined[::10]])
+    most = bench.slave.parameters["tool_speed"] * 10 * DT
+    assert (np.linalg.norm(np.diff(tips, axis=0), axis=1) <= most * (1 + 1e-6)).all()
+    assert math.isfinite(np.abs(joined).sum())
+
+
+SHARED = Bench(**{"operation.longest_outage": 0.0})
+
+
+def test_the_parameters_that_bound_motion_are_those_of_the_operation():
+    slow = build(OperationParameters, {"tool_speed": 0.01})
+    assert slow.tool_speed == 0.01
+    bench = Bench(**{"operation.tool_speed": 0.01})
+    bench.motion.drive_tip([0.5, 0, 0, 0, 0, 0], bench.now_ns)
+    tips = np.array([ARM.fk(q)[:3, 3] for q in bench.run(95)])
+    fastest = np.linalg.norm(np.diff(tips, axis=0), axis=1).max() / DT
+    assert 0.005 < fastest <= 0.01 * (1 + 1e-6)
