@@ -82,12 +82,6 @@ def test_joint_vectors_of_another_length_are_refused(message):
     assert read_values(Kind.STATE, message, ("a", "b")) is Refusal.WRONG_LENGTH
 
 
-def test_a_joy_with_another_number_of_buttons_is_refused():
-    message = empty_message(Kind.BUTTONS)
-    message.buttons = [1, 0]
-    assert read_values(Kind.BUTTONS, message) is Refusal.WRONG_LENGTH
-
-
 def test_velocities_and_efforts_that_are_not_sent_are_nan():
     _, values = read_values(Kind.STATE, joint_state("ab", (1.0, 2.0)), ("a", "b"))
     np.testing.assert_array_equal(values, [1.0, 2.0, *[np.nan] * 4])

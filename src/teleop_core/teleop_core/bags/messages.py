@@ -33,6 +33,8 @@ __all__ = [
 ]  # fmt: skip
 
 QUATERNION_TOLERANCE = 1e-3
+BUTTONS = (0, 1, 2)
+"""Places of clutch, fixture and mode among the buttons of a message."""
 
 
 class Refusal(Enum):
@@ -43,6 +45,10 @@ class Refusal(Enum):
     NOT_NEWER = "its stamp is not newer than the last one"
     WRONG_NAMES = "lacks a name that it must have, as of a joint of the robot"
     WRONG_LENGTH = "has too few or too many numbers"
+    FEW_BUTTONS = (
+        "has fewer buttons than joy_buttons names; where it has a clutch and a mode button only, "
+        "set joy_buttons=[0, -1, 1]"
+    )
     MALFORMED = "has bytes that are no message of its type"
 
 
@@ -68,7 +74,10 @@ def check(kind: Kind, stamp_ns: int, values: Values, last_stamp_ns: int | None) 
 
 
 def read_values(
-    kind: Kind, message: Any, joint_names: tuple[str, ...] = ()
+    kind: Kind,
+    message: Any,
+    joint_names: tuple[str, ...] = (),
+    buttons: tuple[int, ...] = BUTTONS,
 ) -> tuple[int, Values] | Refusal:
     """Stamp [ns] and values of any message of a kind, read by attribute.
 
@@ -77,20 +86,25 @@ def read_values(
         message: From rclpy, or deserialised by rosbags.
         joint_names: Wanted order of the joints; others in the message are left out. Empty takes
             them as they come.
+        buttons: Which buttons of the message are clutch, fixture and mode; -1: it has none.
 
     Returns:
         Stamp and values, shape (width,); or why the message cannot be used. Velocities or efforts
         that the message leaves empty are NaN.
     """
     stamp = message.header.stamp
-    values = _row(kind, message, joint_names)
+    is_joy = kind is Kind.BUTTONS
+    values = _pressed(message, buttons) if is_joy else _row(kind, message, joint_names)
     if isinstance(values, Refusal):
         return values
     return stamp.sec * SECOND_NS + stamp.nanosec, np.array(values, dtype=np.float64)
 
 
 def read_any(
-    kind: Kind, data: bytes, joint_names: tuple[str, ...] = ()
+    kind: Kind,
+    data: bytes,
+    joint_names: tuple[str, ...] = (),
+    buttons: tuple[int, ...] = BUTTONS,
 ) -> tuple[int, Values] | Refusal:
     """Stamp [ns] and values of the bytes of any message of a kind; or why it cannot be used.
 
@@ -98,12 +112,13 @@ def read_any(
         kind: What the values are.
         data: Bytes from anywhere.
         joint_names: As of :func:`read_values`.
+        buttons: As of :func:`read_values`.
     """
     try:
         message = deserialise(data, kind.ros_type)
     except ValueError:
         return Refusal.MALFORMED
-    return read_values(kind, message, joint_names)
+    return read_values(kind, message, joint_names, buttons)
 
 
 def read_numbers(data: bytes, columns: tuple[str, ...]) -> tuple[int, Values] | Refusal:
@@ -129,10 +144,14 @@ def _row(kind: Kind, message: Any, joint_names: tuple[str, ...]) -> list[float] 
         return _six(message.twist.linear, message.twist.angular)
     if kind is Kind.WRENCH:
         return _six(message.wrench.force, message.wrench.torque)
-    if kind is Kind.BUTTONS:
-        buttons = list(message.buttons)
-        return buttons if len(buttons) == kind.width(0) else Refusal.WRONG_LENGTH
     return _joints(kind, message, joint_names)
+
+
+def _pressed(message: Any, buttons: tuple[int, ...]) -> list[float] | Refusal:
+    given = list(message.buttons)
+    if max(buttons) >= len(given):
+        return Refusal.FEW_BUTTONS
+    return [given[index] if index >= 0 else 0.0 for index in buttons]
 
 
 def _six(first: Any, second: Any) -> list[float]:

@@ -14,6 +14,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 
+from teleop_core.bags.messages import BUTTONS
 from teleop_core.bags.reports import read_reports
 from teleop_core.errors import ParameterError, SessionError, TeleopError
 from teleop_core.nodes.declaration import declare, plain, typed
@@ -55,6 +56,11 @@ class NodeParameters:
         (), fixed=True,
         doc="what feeds a port in place of the topic of its name, port=topic or port=topic@delay, "
         "with the delay in seconds; topics of one port are added",
+    )  # fmt: skip
+    joy_buttons: tuple[int, ...] = parameter(
+        BUTTONS, lower=-1, upper=255, length=3, fixed=True,
+        doc="which buttons of an incoming Joy are clutch, fixture and mode, counted from 0; "
+        "-1: it has none",
     )  # fmt: skip
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
@@ -137,7 +143,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self.stage.load()
         self.ports = Ports(
             self, self.arm, self.description, self.stage.signals, joints_of(parameters),
-            self.options.feeds, self.open_publisher,
+            self.options.feeds, self.open_publisher, self.options.joy_buttons,
         )  # fmt: skip
         self.row = self.ports.row
         self._open_report()

@@ -8,6 +8,7 @@ import numpy as np
 from rclpy.publisher import Publisher
 
 from teleop_core.bags.layouts import layout
+from teleop_core.bags.messages import BUTTONS
 from teleop_core.geometry import Array
 from teleop_core.graph import BUILT_IN
 from teleop_core.kernels import bare
@@ -32,6 +33,7 @@ class Ports:
         joint_names: Order of the joints.
         feeds: What feeds a port.
         publisher: Opens the publisher of a topic.
+        buttons: Which buttons of a message are clutch, fixture and mode; -1: it has none.
 
     Attributes:
         inputs: Per port, by its name, what feeds it; where there are several they are added.
@@ -48,6 +50,7 @@ class Ports:
         joint_names: tuple[str, ...],
         feeds: Feeds,
         publisher: Callable[[Topic], Publisher],
+        buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
         self._arm, self._stage, self.row = arm, stage, bare(signals)
         self._must_check = stage.name not in BUILT_IN
@@ -61,7 +64,15 @@ class Ports:
             own = signals[port.field]
             targets = [own] if len(given) == 1 else [own.copy() for _ in given]
             self.inputs[port.name] = [
-                Input(node, replace(port, name=name).of_arm(arm), name, joint_names, target, delay)
+                Input(
+                    node,
+                    replace(port, name=name).of_arm(arm),
+                    name,
+                    joint_names,
+                    target,
+                    delay,
+                    buttons,
+                )
                 for (name, delay), target in zip(given, targets, strict=True)
             ]
             if len(targets) > 1:

@@ -21,6 +21,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from teleop_core.bags.messages import (
+    BUTTONS,
     Layout,
     Refusal,
     Values,
@@ -136,6 +137,7 @@ class Input:
         joint_names: Order of the joints in the signals.
         target: Where the values are written, shape (width,).
         delay: Time for which each message is held back, as on a slow link [s].
+        buttons: Which buttons of a message are clutch, fixture and mode; -1: it has none.
 
     Attributes:
         stamp_ns: Stamp of the newest sound message; None before the first.
@@ -152,6 +154,7 @@ class Input:
         joint_names: tuple[str, ...],
         target: Array,
         delay: float = 0.0,
+        buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
         self.topic, self._node, self._name = topic, node, name
         self.subscription: Subscription | None = Subscription(node, topic, name, _WAITING)
@@ -159,6 +162,8 @@ class Input:
         self._joint_names, self._target = topic.names(joint_names), target
         is_report = topic.kind is Kind.REPORT
         self._layout = None if is_report else layout(topic, joint_names)
+        self._buttons = buttons
+        self._has_own_order = topic.kind is not Kind.BUTTONS or buttons == BUTTONS
         read_reports(report(0, "", 0, "", {}))  # loads the message types, 60 ms
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, Values]] = deque()
@@ -194,7 +199,9 @@ class Input:
         """Next message of the subscription that can be read."""
         while self.subscription is not None and (taken := self.subscription.take()) is not None:
             self.received += 1
-            known = self._layout.decode_one(taken[0]) if self._layout is not None else None
+            known = None
+            if self._layout is not None and self._has_own_order:
+                known = self._layout.decode_one(taken[0])
             found = known or self._read(taken[0])
             if not isinstance(found, Refusal):
                 return found
@@ -231,7 +238,7 @@ class Input:
         """Stamp and values of a message with other bytes than ours, or of a report."""
         if self._layout is None:
             return read_numbers(data, self.topic.columns)
-        return read_any(self.topic.kind, data, self._joint_names)
+        return read_any(self.topic.kind, data, self._joint_names, self._buttons)
 
     def age(self) -> float:
         """Time since the last sound message was taken [s]; infinite before the first."""
