@@ -9,11 +9,12 @@ from enum import Enum, IntEnum
 
 OPERATION = (
     "state", "is_homed", "is_busy", "is_stopped", "fault", "fault_joint", "fault_value",
-    "fault_bound",
+    "fault_bound", "rest_time", "travel",
 )  # fmt: skip
 """Numbers of ``slave/operation``: :class:`~teleop_core.operation.State`, flags,
 :class:`~teleop_core.operation.Fault`, the joint that it is about (-1: none), what was found and
-what it must not exceed."""
+what it must not exceed; since it last stopped to move: time until it was at rest [s] and the farthest
+that the tip got meanwhile [m], both 0 until then."""
 
 
 class Quality(Enum):

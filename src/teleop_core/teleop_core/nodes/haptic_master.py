@@ -3,6 +3,7 @@
 from typing import Any
 
 from teleop_core.master.haptic_master import HAPTIC_MASTER, HapticMasterParameters
+from teleop_core.nodes.operation import StopInput
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.stage import Stage
 from teleop_core.topics import MASTER_CONTACT, MASTER_SERVO_CF, Topic
@@ -21,17 +22,26 @@ class HapticMasterNode(TickingNode):
         super().setup(parameters)
         self.stage.step()  # loads the kernels, which takes longer than many ticks
         self.stage.reset()
+        self._stop = StopInput(self)
         self._force = self.stage.signals[MASTER_SERVO_CF.field]
 
     def stop(self) -> None:
         """Forget the force: the next activation starts without one."""
         self._force[:] = 0.0
 
+    def teardown(self) -> None:
+        """Close what :meth:`setup` opened."""
+        self._stop.close()
+        super().teardown()
+
     def read_ports(self, trigger: Topic | None = None) -> None:
         """Bring the signals up to date; a source of force that fell silent adds none."""
         for entry in self.ports.inputs[MASTER_SERVO_CF.name]:
             if entry.age() > self.parameters.force_timeout:
                 entry.zero()
+        pressed = self._stop.take()
+        if pressed is not None:
+            self.stage.press(is_pressed=pressed)
         super().read_ports(trigger)
 
     def concerns(self) -> list[str]:

@@ -3,27 +3,97 @@
 import time
 from collections.abc import Iterable
 
+from teleop_core.nodes.operation import CommandServices, StopInput
 from teleop_core.nodes.ticking import TickingNode
+from teleop_core.operation import Fault, State, operation_text
+from teleop_core.signals import TICK_NS
 from teleop_core.slave.commands import CommandStatus
-from teleop_core.topics import SLAVE_SERVO_JP
+from teleop_core.slave.slave_sim import SlaveSimParameters
+from teleop_core.topics import SLAVE_OPERATION, SLAVE_SERVO_JP
+
+_SERVO = SLAVE_SERVO_JP.name
+
+
+_CLOCK_STEP_NS = 100_000_000
+"""A clock that moves by more against the monotonic one between two turns was stepped [ns]."""
 
 
 class SlaveSimNode(TickingNode):
-    """Follows the newest ``slave/servo_jp``; holds its last reference when there is none."""
+    """Follows the newest ``slave/servo_jp`` while it is enabled and homed; stops when told to.
+
+    The emergency stop is looked at before every tick. Faults that only a node can see, such as a
+    clock that was stepped, are handed to the stage, whose reaction is that of all others.
+    """
+
+    def setup(self, parameters: SlaveSimParameters) -> None:
+        """Make the slave, open its topics, and listen to the emergency stop and to commands."""
+        super().setup(parameters)
+        self._stop, self._services = StopInput(self), CommandServices(self, self.stage)
+        self._state = int(State.DISABLED)
+
+    def teardown(self) -> None:
+        """Close what :meth:`setup` opened."""
+        self._stop.close()
+        self._services.close()
+        super().teardown()
+
+    def start(self) -> None:
+        """Relate the clocks; what they do later is seen against this."""
+        super().start()
+        self._offset_ns, self._dropped = self.epoch_ns, self.counts.dropped
 
     def work(self, ticks: Iterable[int]) -> None:
         """Take the newest command and the steps of some ticks [ns, monotonic]."""
+        due = tuple(ticks)
         before_ns = int(self.row["slave_setpoint_js_ns"])
-        super().work(ticks)
+        self._look(due)
+        super().work(due)
         stamp_ns = int(self.row["slave_setpoint_js_ns"])
         if stamp_ns != before_ns:
             self.delay.put(time.time_ns() - stamp_ns)
+
+    def _look(self, due: tuple[int, ...]) -> None:
+        """Take the emergency stop, and find the faults that only a node can see."""
+        pressed = self._stop.take()
+        if pressed is not None:
+            with self.lock:
+                self.stage.press(is_pressed=pressed, now_ns=due[0] + self.epoch_ns)
+        offset_ns = time.time_ns() - time.monotonic_ns()
+        if abs(offset_ns - self._offset_ns) > _CLOCK_STEP_NS:
+            step = 1e-9 * (offset_ns - self._offset_ns)
+            self._offset_ns = offset_ns
+            self._fail(Fault.CLOCK, abs(step), 1e-9 * _CLOCK_STEP_NS)
+        longest = self.parameters.operation.longest_outage
+        missed = (len(due) + self.counts.dropped - self._dropped) * TICK_NS * 1e-9
+        self._dropped = self.counts.dropped
+        if 0.0 < longest < missed:
+            self._fail(Fault.STALL, missed, longest)
+        if any(getattr(entry, "conflict", False) for entry in self.ports.inputs[_SERVO]):
+            self._fail(Fault.PUBLISHERS)
+
+    def _fail(self, fault: Fault, value: float = 0.0, bound: float = 0.0) -> None:
+        with self.lock:
+            self.stage.fail(fault, value, bound)
+
+    def send_report(self, stamp_ns: int) -> None:
+        """Report the operation where it changes, and log what people want to know."""
+        super().send_report(stamp_ns)
+        values = self.stage.signals[SLAVE_OPERATION.field]
+        state = int(values[0])
+        if state != self._state:
+            self._state = state
+            text = operation_text(self.stage.operation, self.stage.robot.joint_names)
+            log = self.get_logger()
+            log.error(text) if state == State.FAULT else log.info(text)
 
     def concerns(self) -> list[str]:
         """A slave that holds still because nothing sound tells it where to go."""
         status = CommandStatus(int(self.row["command_status"]))
         if status is CommandStatus.MOVING:
             return ["moves to where it starts, and follows then"]
+        values = self.stage.operation
+        if status is CommandStatus.CLOSED or values["fault"] > 0.0:
+            return [operation_text(values, self.stage.robot.joint_names)]
         servo_jp = self.input(SLAVE_SERVO_JP)
         if servo_jp.stamp_ns is None:
             return ["waits for slave/servo_jp and holds"]
@@ -33,4 +103,5 @@ class SlaveSimNode(TickingNode):
 
     def values(self) -> dict[str, str]:
         """How many commands were too far away to be followed."""
-        return {"refused.slave/servo_jp.jump": str(self.stage.refused)}
+        text = operation_text(self.stage.operation, self.stage.robot.joint_names)
+        return {"refused.slave/servo_jp.jump": str(self.stage.refused), "operation": text}

@@ -12,7 +12,8 @@ from teleop_core.operation.states import STATE_FIELDS, Event, State, change
 
 OPERATION_STATE = [
     *STATE_FIELDS, ("must_brake", "i8"), ("told", "i8"), ("played", "i8"), ("first_ns", "i8"),
-    ("heard_ns", "i8"), ("pressed_ns", "i8"),
+    ("heard_ns", "i8"), ("pressed_ns", "i8"), ("left_ns", "i8"), ("is_resting", "i8"),
+    ("left_at", "f8", (3,)), ("rest_time", "f8"), ("travel", "f8"),
 ]  # fmt: skip
 """Scalars of a state record; beside them it has ``full_ticks`` (n,)."""
 OPERATION_PARAMETERS = [
@@ -131,7 +132,29 @@ def watch_limits(p: Any, s: Any, now_ns: int) -> None:
 
 
 @inner
+def measure_rest(s: Any, place: Array, now_ns: int) -> None:
+    """Measure how long and how far the tip, at ``place`` (7,), moves after it may move no more."""
+    if s.state == _ENABLED:
+        s.left_ns, s.is_resting = 0, 0
+        return
+    if s.left_ns == 0:
+        s.left_ns, s.travel, s.is_resting = now_ns, 0.0, 0
+        for i in range(3):
+            s.left_at[i] = place[i]
+    if s.is_resting:
+        return
+    square = 0.0
+    for i in range(3):
+        square += (place[i] - s.left_at[i]) ** 2
+    s.travel = max(s.travel, square**0.5)
+    if not s.is_moving:
+        s.is_resting, s.rest_time = 1, 1e-9 * (now_ns - s.left_ns)
+
+
+@inner
 def tell(s: Any, row: Array) -> None:
     """Write the numbers of :data:`~teleop_core.topics.OPERATION`."""
     row[0], row[1], row[2], row[3] = s.state, s.is_homed, s.is_busy, s.is_stopped
     row[4], row[5], row[6], row[7] = s.fault, s.fault_joint, s.fault_value, s.fault_bound
+    row[8] = s.rest_time if s.is_resting else 0.0
+    row[9] = s.travel if s.is_resting else 0.0
