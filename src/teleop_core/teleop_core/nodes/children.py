@@ -20,6 +20,7 @@ from teleop_core.nodes.parent import VARIABLE
 
 _PATIENCE = ((signal.SIGINT, 30.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
 _STILL_PATIENCE = ((signal.SIGINT, 2.0), (signal.SIGKILL, 5.0))  # of a process that stands still
+_TROUBLE = ("[ERROR]", "[FATAL]", "Traceback")
 _STILL = 3.0  # a thread of its own speaks ten times a second, whatever the process is doing
 _STILL_STARTING = 60.0  # the interpreter loads, perhaps from a cold disk
 
@@ -86,7 +87,8 @@ class Child:
 
     def __init__(self, name: str, parameters: IO[Any], env: dict[str, str]) -> None:
         arm, _, stage = name.rpartition("/")
-        self.name, self.doing, self.is_told = name, "starting", False
+        self.name, self.doing = name, "starting"
+        self.is_told = self._is_asked = False
         self._line, theirs = socket.socketpair()
         self._line.setblocking(False)
         self._heard, self._text = time.monotonic(), b""
@@ -136,21 +138,30 @@ class Child:
         return silence if silence > patience else 0.0
 
     def last_words(self) -> str:
-        """Last lines that it wrote, each indented on a line of its own."""
+        """What it wrote of its trouble, else its last lines, each indented on a line of its own."""
         size = os.fstat(self._log.fileno()).st_size
         tail = os.pread(self._log.fileno(), 20_000, max(0, size - 20_000))
-        lines = tail.decode(errors="replace").splitlines()[-8:]
+        lines = tail.decode(errors="replace").splitlines()
+        wrong = [number for number, line in enumerate(lines) if line.startswith(_TROUBLE)]
+        if wrong:
+            lines = [line for line in lines[wrong[0] :] if not line.startswith("[INFO]")]
+            lines = lines if len(lines) <= 16 else [*lines[:4], "…", *lines[-11:]]
+        else:
+            lines = lines[-5:]
         return ":" + "".join(f"\n  {line}" for line in lines) if lines else "; it wrote nothing"
 
     def ask(self) -> None:
         """Ask it to end, without waiting."""
-        if self._process.poll() is None:
+        if self._process.poll() is None and not self._is_asked:
+            self._is_asked = True  # a second time would only disturb its end
             self._process.send_signal(signal.SIGINT)
 
     def end(self) -> int:
         """End it, more and more firmly; returns its exit code."""
         for number, patience in _STILL_PATIENCE if self._silence() else _PATIENCE:
-            if self._process.poll() is None:
+            if number == signal.SIGINT:
+                self.ask()
+            elif self._process.poll() is None:
                 self._process.send_signal(number)
             try:
                 return self._process.wait(patience)

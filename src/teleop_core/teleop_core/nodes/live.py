@@ -99,11 +99,8 @@ class _Session:
 
     def tell_where(self, out: Path) -> None:
         """Say how others find the nodes, and where they are recorded."""
-        domain, reach = (
-            self._env[name] for name in ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE")
-        )
-        join = f"ROS_DOMAIN_ID={domain} ROS_AUTOMATIC_DISCOVERY_RANGE={reach}"
-        self._say(f"ROS domain {domain}; to look in: {join} ros2 topic list")
+        domain = self._env["ROS_DOMAIN_ID"]
+        self._say(f"ROS domain {domain}; others join it with ROS_DOMAIN_ID={domain}")
         self._say(f"recording to {out}")
 
     def run(self) -> None:

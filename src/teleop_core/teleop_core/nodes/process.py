@@ -3,6 +3,7 @@
 import atexit
 import gc
 import os
+import signal
 import sys
 import traceback
 from collections.abc import Callable
@@ -16,10 +17,10 @@ from rclpy.signals import SignalHandlerOptions
 
 from teleop_core.errors import TeleopError
 from teleop_core.nodes.base import SUCCESS, CoreNode
-from teleop_core.nodes.discovery import announce_often
+from teleop_core.nodes.discovery import beyond_this_machine, choose_transport
 from teleop_core.nodes.files import checked_arguments
 from teleop_core.nodes.parent import Parent
-from teleop_core.nodes.watch import Crew, Watch, signal_pipe
+from teleop_core.nodes.watch import ENDS, Crew, Watch, signal_pipe
 
 _BAD_ARGUMENTS = (
     rclpy_implementation.RCLError,
@@ -51,6 +52,8 @@ def run(make_crew: Callable[[], Crew]) -> int:
     except _BAD_ARGUMENTS as error:
         print(f"ROS arguments: {' '.join(str(error).split())}", file=sys.stderr)
         return _finish(2)
+    if reach := beyond_this_machine():
+        crew.nodes[0].get_logger().info(reach)
     # Two threads share the interpreter: the loop must not wait 5 ms for its turn.
     sys.setswitchinterval(2e-4)
     watch = Watch(crew, signals, parent)
@@ -58,6 +61,8 @@ def run(make_crew: Callable[[], Crew]) -> int:
     watch.close()
     if code:
         _leave(code)
+    for number in ENDS:  # the interpreter would die of another one on its last way
+        signal.signal(number, signal.SIG_IGN)
     for node in crew.nodes:
         node.destroy_node()
     return _finish(code)

@@ -1,0 +1,197 @@
+"""Ends: in order, whatever brings them about, and nothing is left behind."""
+
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+import yaml
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+
+from live_process import LiveProcess, are_gone, wait_until
+from teleop_core import topics
+from teleop_core.bags.reader import Bag
+from teleop_core.nodes.children import environment
+from teleop_core.robots import load_robot
+from teleop_core.stage import STAGES
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+NODES = list(STAGES)
+HANGS = '''
+import time
+from pathlib import Path
+
+import teleop_core as tc
+from teleop_core.stage import STAGES, RunningStage
+from teleop_core.topics import SLAVE_MEASURED_JS
+
+BEAT = tc.Topic("test/beat", tc.Kind.NUMBERS, SLAVE_MEASURED_JS.stamp, columns=("beat",))
+
+
+class Hanging(RunningStage):
+    """Works until a file is there, and never comes back from a step after."""
+
+    count = 0
+
+    def step(self) -> None:
+        self.count += 1
+        while self.count % 100 == 0 and Path(__file__).with_name("hang").exists():
+            time.sleep(0.01)
+
+    def load(self):
+        return lambda: None
+
+
+tc.register_stage(
+    tc.Stage("hanging", tc.NoParameters, reads=(), writes=(BEAT,),
+             make=lambda parameters, dt: Hanging(STAGES.find("hanging"), 6, dt))
+)
+'''
+
+
+def change(peer, name, transition):
+    """Whether a transition was made, asked for by service."""
+    request = ChangeState.Request(transition=Transition(id=transition))
+    return peer.call(ChangeState, f"/{name}/change_state", request).success
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starter of a live session."""
+    started = []
+
+    def start(*arguments, **options):
+        started.append(LiveProcess(tmp_path, *arguments, **options))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_node_that_was_shut_down_by_service_still_ends_well(peer, tmp_path, number):
+    node = peer.start("recorder", out=str(tmp_path / "bag"))
+    assert change(peer, "recorder", Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert (tmp_path / "bag" / "metadata.yaml").exists()
+    assert node.end(number) == 0, node.stderr.read_text()
+
+
+def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer):
+    node = peer.start("slave_sim")
+    assert not change(peer, "slave_sim", Transition.TRANSITION_ACTIVATE)
+    assert not change(peer, "slave_sim", Transition.TRANSITION_CONFIGURE)
+    before = peer.status("slave_sim").number("ticks")
+    peer.wait_value("slave_sim", "ticks", lambda ticks: ticks > before + 500)
+    assert node.end() == 0
+
+
+@pytest.fixture
+def composed(peer, tmp_path):
+    """Process of the composed session, all its nodes active."""
+    parameters = {
+        "recorder": {"out": str(tmp_path / "bag")},
+        "haptic_master": {"operator": {"approach_time": 1.0}, "patience": 0.0},
+        "slave_sim": {"start": load_robot("rcrt1").home.tolist()},
+    }
+    file = tmp_path / "session.yaml"
+    file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))
+    command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session", "--ros-args"]
+    process = subprocess.Popen(
+        [*command, "--params-file", str(file)], env=environment() | {"ROS_DOMAIN_ID": peer.domain}
+    )
+    try:
+        for name in NODES:
+            peer.wait_state(name, "active")
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+
+
+@pytest.mark.parametrize("name", ["slave_sim", "recorder"])
+def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(peer, composed, tmp_path, name):
+    assert change(peer, name, Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    peer.wait_state(name, "finalized")
+    composed.send_signal(signal.SIGTERM)
+    assert composed.wait(30) == 0
+    assert (tmp_path / "bag" / "metadata.yaml").exists()
+    assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
+
+
+@pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGQUIT, signal.SIGKILL])
+def test_no_node_outlives_the_command_and_the_recording_is_closed(start, number, composed_option):
+    session = start(*composed_option)
+    session.wait_text("  1/60 s")
+    nodes = session.signal(number)
+    assert len(nodes) == (1 if composed_option else len(NODES))
+    wait_until(lambda: are_gone(nodes), "end of all nodes", 30.0)
+    code = session.wait()
+    assert code == (-signal.SIGKILL if number == signal.SIGKILL else 0), session.text
+    assert session.recorded().topics["slave/measured_js"].count > 500
+    assert list(session.temporary.iterdir()) == []
+
+
+def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_first(start):
+    session = start(duration=1.0)
+    session.wait_text("recorder is ready")
+    lines = session.text.splitlines()
+    (environ,) = {node.environ()["ROS_DOMAIN_ID"] for node in session.nodes()}
+    assert lines[0].endswith(f"ROS_DOMAIN_ID={environ}")
+    assert lines[1] == f"recording to {session.bag}"
+    assert session.wait() == 0
+
+
+@pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
+def test_a_stage_that_never_comes_back_is_found_within_a_second(start, tmp_path, composed_option):
+    parts = tmp_path / "hangs.py"
+    parts.write_text(HANGS)
+    session = start(*composed_option, "--parts", str(parts), "--set", "teleop.stages=[hanging]")
+    session.wait_text("  1/60 s")
+    (tmp_path / "hang").touch()
+    assert session.wait(120) == 2
+    found = re.search(r"\[FATAL\] \[([\d.]+)\].* hangs: nothing came of it for 0.8 s", session.text)
+    assert found, session.text
+    assert "hangs.py" in session.text  # where it is
+    bag = session.recorded()
+    assert 0.7 < float(found[1]) - bag.read("test/beat").log_ns[-1] * 1e-9 < 2.0
+    assert bag.topics["slave/measured_js"].count > 500
+
+
+def test_a_process_that_stands_still_ends_the_session(start):
+    session = start()
+    session.wait_text("  1/60 s")
+    (node,) = session.nodes("inverse_kinematics")
+    node.suspend()
+    assert session.wait(60) == 2
+    assert "inverse_kinematics stands still" in session.text
+    assert session.recorded().topics["slave/measured_js"].count > 500
+
+
+def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(start, tmp_path):
+    busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+    try:
+        session = start(
+            "--composed", duration=1.0, env={"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        )
+        assert session.wait(400) == 0, session.text
+    finally:
+        busy.kill()
+        busy.wait()
+    assert "teleop_session: compiling kernels" in session.text
+    counts = {name: topic.count for name, topic in session.recorded().topics.items()}
+    assert counts[topics.SLAVE_MEASURED_JS.name] > 500
+
+
+@pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
+def test_sessions_start_and_end_again_and_again(start, tmp_path, composed_option):
+    for number in range(3):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        session = LiveProcess(folder, *composed_option, duration=0.1 + 0.3 * number)
+        assert session.wait(120) == 0, session.text
+        session.recorded()
