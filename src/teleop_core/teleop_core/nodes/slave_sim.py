@@ -28,13 +28,13 @@ class SlaveSimNode(TickingNode):
     def setup(self, parameters: SlaveSimParameters) -> None:
         """Make the slave, open its topics, and listen to the emergency stop and to commands."""
         super().setup(parameters)
-        self._stop, self._services = StopInput(self), CommandServices(self, self.stage)
-        self._state = int(State.DISABLED)
+        self._stop, self._commands = StopInput(self), CommandServices(self, self.stage)
+        self._told_state = int(State.DISABLED)
 
     def teardown(self) -> None:
         """Close what :meth:`setup` opened."""
         self._stop.close()
-        self._services.close()
+        self._commands.close()
         super().teardown()
 
     def start(self) -> None:
@@ -80,8 +80,8 @@ class SlaveSimNode(TickingNode):
         super().send_report(stamp_ns)
         values = self.stage.signals[SLAVE_OPERATION.field]
         state = int(values[0])
-        if state != self._state:
-            self._state = state
+        if state != self._told_state:
+            self._told_state = state
             text = operation_text(self.stage.operation, self.stage.robot.joint_names)
             log = self.get_logger()
             log.error(text) if state == State.FAULT else log.info(text)
