@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.arms import arm_names
+from teleop_core.bags.layouts import SECOND_NS
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import RecordingParameters
@@ -235,8 +236,7 @@ class Recording:
         with BagWriter(
             path, topics, names, parameters=RecordingParameters(), metadata=bag.metadata
         ) as writer:
-            for begin in range(bag.start_ns, bag.end_ns + 1, 1_000_000_000):
-                end = begin + 1_000_000_000
+            for begin, end in _seconds(bag.start_ns, [s.log_ns for s in bag.streams.values()]):
                 writer.write_block({t: _between(s, begin, end) for t, s in bag.streams.items()})
             for topic in topics[len(bag.streams) :]:
                 for _, _, log_ns, data in bag.raw([topic]):
@@ -273,6 +273,13 @@ def _columns(kind: Kind | None, series: Series) -> tuple[str, ...]:
         kind = Kind.JOINTS if width == len(series.names) else Kind.STATE
     assert kind is not None
     return kind.columns(series.names)
+
+
+def _seconds(start_ns: int, logs: list[NDArray[np.int64]]) -> list[tuple[int, int]]:
+    """Begin and end [ns] of every second since the start in which something was recorded."""
+    found = np.unique(np.concatenate([(log_ns - start_ns) // SECOND_NS for log_ns in logs]))
+    begins = [start_ns + second * SECOND_NS for second in found.tolist()]
+    return [(begin, begin + SECOND_NS) for begin in begins]
 
 
 def _between(

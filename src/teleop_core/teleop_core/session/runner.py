@@ -17,7 +17,8 @@ from teleop_core.operation import operation_level, operation_text
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION, Layer, parse_text
-from teleop_core.session.virtual import BLOCK, VirtualTime, stamps_of
+from teleop_core.session.replayed_span import in_order, replayed_span, tick_times
+from teleop_core.session.virtual import BLOCK, VirtualTime
 from teleop_core.signals import STATE_FIELDS, TICK_NS
 from teleop_core.topics import OPERATION, TELEOP_STATE, Kind, Topic, limit_text
 
@@ -90,23 +91,24 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
     needed = [t for t in played if t.kind is Kind.POSE]
     bag.require(needed)
     recorded = [topic for topic in played if topic.name in bag.topics]
-    series = bag.read_many(recorded)
-    poses = series[needed[0].name]
-    first_ns, last_ns = int(poses.stamp_ns[0]), int(poses.stamp_ns[-1])
+    series = {name: in_order(found) for name, found in bag.read_many(recorded).items()}
+    name = needed[0].name
+    first_ns, last_ns = replayed_span(bag.path, name, series[name].stamp_ns)
     lead_ns = _lead_ns(session, bag, first_ns)
     later_ns = max(0, TICK_NS + lead_ns - first_ns)  # stamps are positive
     # The last tick is the first one that is not before the last sample.
-    stamps = stamps_of(first_ns + later_ns - lead_ns, last_ns + later_ns + TICK_NS - 1)
+    begin_ns = first_ns + later_ns - lead_ns
+    ticks = -(-(last_ns + later_ns + TICK_NS - begin_ns) // TICK_NS)
 
     def blocks() -> Iterator[Any]:
-        for done in range(0, len(stamps), BLOCK):
-            samples = session.rows(len(stamps[done : done + BLOCK]))
-            samples["now_ns"] = stamps[done : done + BLOCK]
+        for done in range(0, ticks, BLOCK):
+            samples = session.rows(min(BLOCK, ticks - done))
+            samples["now_ns"] = tick_times(begin_ns + done * TICK_NS, len(samples))
             for topic in recorded:
                 _hold(series[topic.name], later_ns, samples, topic.field)
             yield session.replay(samples)
 
-    return blocks(), len(stamps)
+    return blocks(), ticks
 
 
 def _lead_ns(session: VirtualTime, bag: Bag, first_ns: int) -> int:

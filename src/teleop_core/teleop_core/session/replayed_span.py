@@ -1,0 +1,60 @@
+"""Replayed span: which samples of a recorded hand belong together, whatever single stamps say."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.bags.series import Series
+from teleop_core.errors import RecordingError
+from teleop_core.signals import TICK_NS
+
+LONGEST_GAP_NS = 60_000_000_000
+"""Longest pause of a hand within one session [ns]; a stamp beyond it is a mistake of a clock, and
+replaying the way there would take as long as the recording says that it took."""
+
+
+def in_order(series: Series) -> Series:
+    """The samples in the order of their stamps; as they are if that is their order already."""
+    if not (np.diff(series.stamp_ns) < 0).any():
+        return series
+    order = np.argsort(series.stamp_ns, kind="stable")
+    return Series(
+        series.stamp_ns[order], series.log_ns[order], series.values[order],
+        series.names, series.frame_id,
+    )  # fmt: skip
+
+
+def replayed_span(path: Path, name: str, stamp_ns: NDArray[np.int64]) -> tuple[int, int]:
+    """First and last stamp [ns] of the longest stretch of samples without a gap.
+
+    Samples before and behind it are left out with a warning.
+
+    Args:
+        path: Recording, for messages.
+        name: Topic, for messages.
+        stamp_ns: Stamps of all samples (N,), in order, [ns].
+
+    Raises:
+        RecordingError: There is no sample.
+    """
+    if not len(stamp_ns):
+        raise RecordingError(path, f"has no readable sample of {name} to replay")
+    # As real numbers: the difference of two wrong stamps can be beyond 64 bits.
+    ends = np.flatnonzero(np.diff(stamp_ns.astype(np.float64)) > LONGEST_GAP_NS) + 1
+    stretches = np.split(stamp_ns, ends)
+    longest = max(stretches, key=len)
+    if left_out := len(stamp_ns) - len(longest):
+        seconds = (int(longest[-1]) - int(longest[0])) * 1e-9
+        warnings.warn(
+            f"{path.name}: replayed are {seconds:.3g} s of {name}; its {left_out} samples more than"
+            f" {LONGEST_GAP_NS * 1e-9:g} s apart from them are left out",
+            stacklevel=2,
+        )
+    return int(longest[0]), int(longest[-1])
+
+
+def tick_times(begin_ns: int, count: int) -> NDArray[np.int64]:
+    """Times of so many ticks from the first one on (count,) [ns]."""
+    return begin_ns + TICK_NS * np.arange(count, dtype=np.int64)
