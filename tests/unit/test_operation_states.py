@@ -1,0 +1,274 @@
+"""Operating states: one table, every state with every event, and what only a reset ends."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.kernels import kernel, records
+from teleop_core.operation import Answer, Event, OperationParameters, State, command_event
+from teleop_core.operation.states import COMMANDS, STATE_FIELDS, TABLE, answer_text, change
+from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+
+D, E, P, F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT
+EXPECTED = {
+    Event.ENABLE: (E, E, E, None),
+    Event.DISABLE: (D, D, D, D),
+    Event.PAUSE: (None, P, P, None),
+    Event.RESUME: (None, E, E, None),
+    Event.HOME: (None, E, None, None),
+    Event.UNHOME: (D, E, P, F),
+    Event.RESET: (D, E, P, D),
+    Event.STOP: (F, F, F, F),
+    Event.MOVE: (None, E, None, None),
+    Event.ARRIVED: (None, E, None, None),
+    Event.FAILED: (F, F, F, F),
+    Event.LAPSED: (None, P, None, None),
+}
+"""State that follows DISABLED, ENABLED, PAUSED, FAULT; None where the event is refused."""
+
+
+@kernel
+def _change(s, event):
+    return change(s, event)
+
+
+def make(state, **fields):
+    found = records(STATE_FIELDS)[0]
+    found["state"], found["is_homed"] = state, 1
+    for name, value in fields.items():
+        found[name] = value
+    return found
+
+
+@pytest.mark.parametrize(("state", "event"), list(itertools.product(State, Event)))
+def test_every_state_takes_or_refuses_every_event_as_the_table_says(state, event):
+    s = make(state)
+    answer = Answer(_change(s, int(event)))
+    expected = EXPECTED[event][state]
+    assert (answer is Answer.REFUSED) is (expected is None)
+    assert s["state"] == (state if expected is None else expected)
+    assert TABLE[state, event] == (-1 if expected is None else expected)
+    if answer is Answer.REFUSED:
+        text = answer_text(event, answer, state)
+        assert state.name in text
+        assert "allowed in" in text
+
+
+def test_an_emergency_stop_is_ended_by_a_reset_and_an_enable_and_by_nothing_else():
+    for words in itertools.product(set(COMMANDS) - {"reset", "stop"}, repeat=3):
+        s = make(E)
+        _change(s, int(Event.STOP))
+        for word in words:
+            _change(s, int(command_event(word)))
+        assert s["state"] == F
+        assert s["is_stopped"]
+    _change(s, int(Event.RESET))
+    assert s["state"] == D
+    _change(s, int(Event.ENABLE))
+    assert s["state"] == E
+
+
+def test_a_stop_that_is_still_pressed_cannot_be_reset():
+    s = make(E, is_pressed=1)
+    _change(s, int(Event.STOP))
+    assert Answer(_change(s, int(Event.RESET))) is Answer.STOPPED
+    s["is_pressed"] = 0
+    assert Answer(_change(s, int(Event.RESET))) is Answer.DONE
+
+
+def test_an_arm_that_is_not_at_rest_is_not_enabled():
+    s = make(D, is_moving=1)
+    assert Answer(_change(s, int(Event.ENABLE))) is Answer.BRAKING
+    assert s["state"] == D
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.sampled_from(list(Event)), max_size=60))
+def test_flags_agree_with_the_state_after_any_events(events):
+    s = make(D, is_homed=0)
+    for event in events:
+        _change(s, int(event))
+        if s["state"] != E:
+            assert not s["is_busy"]
+        assert not (s["is_homed"] and s["is_homing"])
+        assert not s["is_stopped"] or s["state"] == F
+
+
+def test_unknown_commands_are_refused_by_name():
+    with pytest.raises(UnknownNameError, match="enable"):
+        command_event("go")
+
+
+@pytest.mark.parametrize("text", ["stop", "stop@", "stop@x", "go@1", "stop@-1", "stop@nan"])
+def test_scripts_of_another_form_are_refused(text):
+    with pytest.raises(ParameterError, match="command@seconds"):
+        OperationParameters(events=(text,))
+
+
+class Arm:
+    """A slave under a stream of commands that swing about home."""
+
+    def __init__(self, *, seconds=0.0, **operation):
+        self.slave = SlaveSim(SlaveSimParameters(
+            robot="rcrt1", starts_at_home=True, operation=OperationParameters(**operation)
+        ))  # fmt: skip
+        self.row, self.ns = self.slave.signals, 10**9
+        self.limit = self.slave.robot.drives.speed_limit
+        self.home = self.slave.robot.home
+        self.setpoints = [np.array(self.row["slave_setpoint_js"])]
+        self.run(seconds)
+
+    def run(self, seconds, *, commanded=True):
+        for _ in range(round(seconds * 1000)):
+            self.ns += 10**6
+            self.row["now_ns"] = self.ns
+            if commanded:
+                swing = 0.1 * np.sin(2.0 * np.pi * 1e-9 * (self.ns - 10**9))
+                self.row["slave_servo_jp"] = self.home + swing * self.limit / self.limit.max()
+                self.row["slave_servo_jp_ns"] = self.ns
+            self.slave.step()
+            self.setpoints.append(np.array(self.row["slave_setpoint_js"]))
+
+    @property
+    def steps(self):
+        return np.abs(np.diff(self.setpoints, axis=0)) / self.limit * 1e3
+
+    @property
+    def state(self):
+        return State(int(self.slave.operation["state"]))
+
+
+def test_a_slave_enables_and_homes_itself_unless_it_is_told_not_to():
+    arm = Arm(seconds=0.01)
+    assert (arm.state, arm.slave.operation["is_homed"]) == (E, 1.0)
+    arm = Arm(seconds=1.0, starts_enabled=False)
+    assert (arm.state, arm.slave.operation["is_homed"]) == (D, 0.0)
+    assert not arm.steps.any()
+    assert arm.slave.request("home")[0] is Answer.REFUSED
+    assert arm.slave.request("enable")[0] is Answer.DONE
+    arm.run(0.5)
+    assert not arm.steps.any()
+    arm.slave.request("home")
+    arm.run(1.0)
+    assert arm.slave.operation["is_homed"] == 1.0
+    assert arm.steps[-1].any()
+
+
+def test_homing_is_smooth_and_within_the_limits():
+    robot = "puma560"
+    slave = SlaveSim(
+        SlaveSimParameters(robot=robot, operation=OperationParameters(starts_enabled=False))
+    )
+    row, found, ns = slave.signals, [], 10**9
+    slave.request("enable")
+    slave.request("home")
+    for _ in range(10_000):
+        ns += 10**6
+        row["now_ns"] = ns
+        slave.step()
+        found.append(np.array(row["slave_setpoint_js"]))
+    assert slave.operation["is_homed"] == 1.0
+    start = slave.parameters["start"]
+    assert np.allclose(found[-1], start, rtol=0, atol=1e-12)
+    drives = slave.robot.drives
+    speed = np.abs(np.diff(found, axis=0)) / 1e-3
+    rise = np.abs(np.diff(found, n=2, axis=0)) / 1e-6
+    assert (speed <= drives.speed_limit * (1 + 1e-9)).all()
+    assert (rise <= 1.01 * drives.effort_limit / drives.inertia + 1e-6).all()
+
+
+@pytest.mark.parametrize("word", ["stop", "pause", "disable"])
+def test_nothing_moves_outside_enabled_however_one_got_there(word):
+    arm = Arm(seconds=1.13)
+    assert arm.steps[-1].any()
+    arm.slave.request(word)
+    arm.run(0.5)
+    before = len(arm.setpoints)
+    arm.run(1.0)
+    assert not arm.steps[before:].any()
+    assert abs(arm.slave.arm.dq).max() < 1e-3 * arm.limit.max()
+
+
+def test_from_an_emergency_stop_the_setpoint_stands_still_in_the_next_tick():
+    arm = Arm(seconds=1.13)
+    before = len(arm.setpoints)
+    arm.slave.press(is_pressed=True, now_ns=arm.ns)
+    arm.run(1.0)
+    assert not arm.steps[before - 1 :].any()
+    values = arm.slave.operation
+    assert values["is_stopped"] == 1.0
+    drives = arm.slave.robot.drives
+    braking = (0.1 * 2 * np.pi * arm.limit / arm.limit.max()) / (
+        drives.effort_limit / drives.inertia
+    )
+    assert 0.0 < values["rest_time"] <= braking.max() + 0.1  # and the loop comes to rest
+
+
+def test_brakes_stop_an_arm_no_farther_than_its_speed_needs():
+    arm = Arm(seconds=1.13, standstill="brake")
+    q, dq = arm.slave.arm.q.copy(), arm.slave.arm.dq.copy()
+    arm.slave.request("stop")
+    arm.run(0.5)
+    drives = arm.slave.robot.drives
+    needed = 0.5 * dq**2 / (drives.effort_limit / drives.inertia) + np.abs(dq) * 1e-3
+    assert (np.abs(arm.slave.arm.q - q) <= needed + 1e-6).all()
+    assert not arm.row["slave_measured_js"][12:].any()
+
+
+def test_after_a_stop_the_arm_follows_again_without_a_jump():
+    arm = Arm(seconds=1.13)
+    arm.slave.request("stop")
+    arm.run(0.5)
+    for word in ("reset", "enable"):
+        assert arm.slave.request(word)[0] is Answer.DONE
+    arm.run(0.5)
+    assert arm.state is E
+    assert arm.steps[-100:].any()
+    assert arm.steps.max() <= 1.0 + 1e-9
+
+
+def test_a_broken_stream_brakes_at_the_limits_of_the_drives():
+    arm = Arm(seconds=1.13)
+    before = len(arm.setpoints)
+    arm.run(0.3, commanded=False)
+    drives = arm.slave.robot.drives
+    speed = np.abs(np.diff(arm.setpoints, axis=0))[before + 98] / 1e-3
+    ticks = np.ceil(speed / (drives.effort_limit / drives.inertia) * 1e3).max()
+    assert not arm.steps[before + 100 + int(ticks) :].any()
+    assert arm.state is E
+
+
+def test_after_a_long_outage_motion_is_resumed_on_purpose_only():
+    arm = Arm(seconds=1.13, longest_outage=0.5)
+    arm.run(0.7, commanded=False)
+    assert arm.state is P
+    before = len(arm.setpoints)
+    arm.run(1.0)
+    assert not arm.steps[before:].any()
+    assert arm.slave.request("resume")[0] is Answer.DONE
+    arm.run(0.5)
+    assert arm.steps[-100:].any()
+
+
+def test_a_silent_heartbeat_is_a_stop():
+    arm = Arm(seconds=0.05, heartbeat=0.1)
+    arm.slave.press(is_pressed=False, now_ns=arm.ns)
+    arm.run(0.09)
+    assert arm.state is E
+    arm.run(0.03)
+    assert arm.state is F
+    assert arm.slave.request("reset")[0] is Answer.STOPPED
+    arm.slave.press(is_pressed=False, now_ns=arm.ns)
+    assert arm.slave.request("reset")[0] is Answer.DONE
+
+
+def test_a_script_commands_at_its_times():
+    arm = Arm(seconds=0.5, events=("pause@0.2", "resume@0.4", "stop@0.45"))
+    still = ~arm.steps.any(axis=1)
+    assert still[240:398].all()
+    assert not still[100:195].any()
+    assert arm.state is F
