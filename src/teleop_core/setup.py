@@ -26,7 +26,14 @@ setup(
     description="Master-slave teleoperation stack for ROS 2 Jazzy",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_core", "teleop_core.*"]),
-    package_data={"teleop_core": ["py.typed", "evaluation/report/*", "fitting/*.csv"]},
+    package_data={
+        "teleop_core": [
+            "py.typed",
+            "evaluation/report/*",
+            "fitting/*.csv",
+            "nodes/profiles/*.xml",
+        ]
+    },  # fmt: skip
     python_requires=">=3.11",
     install_requires=[
         "numpy",

@@ -15,7 +15,7 @@ from contextlib import suppress
 from typing import IO, Any, cast
 
 from teleop_core.errors import SessionError
-from teleop_core.nodes.discovery import announce_often
+from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.parent import VARIABLE
 
 _PATIENCE = ((signal.SIGINT, 30.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
@@ -31,8 +31,7 @@ def environment() -> dict[str, str]:
     What concerns this process as well is set here too.
     """
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    announce_often()
+    choose_transport()
     return dict(os.environ) | {"ROS_DOMAIN_ID": os.environ.get("ROS_DOMAIN_ID") or free_domain()}
 
 

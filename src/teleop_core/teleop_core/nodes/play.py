@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import ParameterError, RecordingError
-from teleop_core.nodes.discovery import announce_often
+from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.topics import BY_NAME, Quality
 
@@ -77,8 +77,7 @@ def _paced(bag: Bag, names: list[str], rate: float) -> Iterator[tuple[str, int, 
 @contextmanager
 def _publishers(bag: Bag, names: list[str]) -> Iterator[dict[str, Any]]:
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    announce_often()
+    choose_transport()
     types = {name: _type_in(bag, name) for name in names}
     context = Context()
     context.init(args=[])

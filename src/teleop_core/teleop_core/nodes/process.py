@@ -17,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from teleop_core.errors import TeleopError
 from teleop_core.nodes.base import SUCCESS, CoreNode
-from teleop_core.nodes.discovery import announce_often
+from teleop_core.nodes.discovery import beyond_this_machine, choose_transport
 from teleop_core.nodes.files import checked_arguments
 from teleop_core.nodes.parent import Parent
 from teleop_core.nodes.watch import ENDS, Crew, Watch, signal_pipe
@@ -43,7 +43,7 @@ def run(make_crew: Callable[[], Crew]) -> int:
     signals, parent = signal_pipe(), Parent.of_environment()
     try:
         sys.argv[:] = checked_arguments(sys.argv)
-        announce_often()
+        choose_transport()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         crew = make_crew()
     except TeleopError as error:
@@ -52,6 +52,8 @@ def run(make_crew: Callable[[], Crew]) -> int:
     except _BAD_ARGUMENTS as error:
         print(f"ROS arguments: {' '.join(str(error).split())}", file=sys.stderr)
         return _finish(2)
+    if reach := beyond_this_machine():
+        crew.nodes[0].get_logger().info(reach)
     # Two threads share the interpreter: the loop must not wait 5 ms for its turn.
     sys.setswitchinterval(2e-4)
     watch = Watch(crew, signals, parent)
