@@ -33,7 +33,7 @@ setup(
             "fitting/*.csv",
             "nodes/profiles/*.xml",
         ]
-    },  # fmt: skip
+    },
     python_requires=">=3.11",
     install_requires=[
         "numpy",
