@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup crtk_msgs demo test coverage lint format bench bench-setup clean
+.PHONY: setup crtk_msgs demo test coverage lint format bench bench-setup endurance clean
 
 setup: $(VENV)/.installed
 
@@ -66,6 +66,11 @@ bench: bench-setup
 	$(BIN)/python benchmarks/session.py
 	$(BIN)/python benchmarks/kinematics.py
 	$(BIN)/python benchmarks/live.py --seconds $(SECONDS_LIVE)
+
+# Starts and ends of live sessions under load, COUNT of each kind; about a quarter of an hour.
+COUNT ?= 100
+endurance: setup
+	$(BIN)/python benchmarks/endurance.py --count $(COUNT)
 
 clean:
 	rm -rf $(OUT) ros_ws/build ros_ws/install ros_ws/log
