@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teleop_core.evaluation.motion import (
     GAP,
@@ -53,7 +54,7 @@ class MotionSamples:
         at, all_rows = np.append(self._last[0], times), np.vstack((self._last[1], rows))
         self._last = (at[-1:].copy(), all_rows[-1:].copy())
         stop = int(np.floor((at[-1] - self._begin) * RATE + 1e-6)) + 1
-        wanted = self._begin + np.arange(self._next, max(stop, self._next)) / RATE
+        wanted = self._begin + _numbers(at - self._begin, self._next, stop) / RATE
         self._next = max(stop, self._next)
         after = np.minimum(np.searchsorted(at, wanted), len(at) - 1)
         before = np.maximum(after - 1, 0)
@@ -78,6 +79,25 @@ class MotionSamples:
             return np.empty(0), np.empty((0, 7))
         times, rows = zip(*self._parts, strict=True)
         return np.concatenate(times), np.concatenate(rows)
+
+
+def _numbers(at: Array, first: int, stop: int) -> NDArray[np.int64]:
+    """Numbers from ``first`` on and below ``stop`` of samples that stand in no gap.
+
+    A time that lies years behind the others costs nothing: there is nothing in between.
+
+    Args:
+        at: Times since the sample number 0 (N,) [s].
+        first: Smallest number.
+        stop: Behind the largest number.
+    """
+    ends = np.flatnonzero(np.diff(at) > GAP)
+    low = np.floor(at[np.append(0, ends + 1)] * RATE).astype(np.int64)
+    high = np.floor(at[np.append(ends, len(at) - 1)] * RATE + 1e-6).astype(np.int64) + 1
+    low, high = np.maximum(low, first), np.minimum(high, stop)
+    counts = np.maximum(high - low, 0)
+    offsets = np.cumsum(counts) - counts
+    return np.unique(np.repeat(low - offsets, counts) + np.arange(counts.sum()))
 
 
 def _between(at: Array, rows: Array, before: Array, after: Array, wanted: Array) -> Array:

@@ -141,8 +141,3 @@ class VirtualTime:
                     when = part["now_ns"][int(np.flatnonzero(~is_sound)[0])] * 1e-9
                     text = f"one that writes finite numbers; {topic.name} at {when:g} s is not"
                     raise PartError("stage", member.name, text)
-
-
-def stamps_of(first_ns: int, last_ns: int, tick_ns: int = TICK_NS) -> "np.ndarray[Any, Any]":
-    """Times of ticks from the first to the last [ns], both included where they fit."""
-    return np.arange(first_ns, last_ns + 1, tick_ns, dtype=np.int64)
