@@ -240,6 +240,10 @@ class Peer:
         data = layout(topic, JOINTS).encode_one(stamp_ns, np.asarray(values, np.float64))
         self.publisher(topic, readers).publish(data)
 
+    def spin(self) -> None:
+        """Serve what has come for the test's own node."""
+        self._executor.spin_once(0.01)
+
     # -- services --------------------------------------------------------------------------------
 
     def call(self, service: Any, name: str, request: Any) -> Any:

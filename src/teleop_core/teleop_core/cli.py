@@ -130,6 +130,10 @@ def _add_play(commands: Any) -> None:
     play.add_argument("bag", type=Path, help="recording to publish")
     play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
     play.add_argument("--rate", type=float, default=1.0, help="times real time (default: 1)")
+    play.add_argument(
+        "--clock", type=float, nargs="?", const=100.0, default=0.0, metavar="HZ",
+        help="publish the recording's time on /clock as well (default: 100 times a second)",
+    )  # fmt: skip
 
 
 def _add_evaluate(commands: Any) -> None:
@@ -208,7 +212,8 @@ def _play(arguments: argparse.Namespace) -> int:
 
     from teleop_core.bags.reader import Bag
 
-    _ros("play").play(Bag(arguments.bag), arguments.topics, arguments.rate, Console())
+    bag, rate = Bag(arguments.bag), arguments.rate
+    _ros("play").play(bag, arguments.topics, rate, Console(), clock=arguments.clock)
     return 0
 
 

@@ -1,5 +1,6 @@
 """Motion scaling: from the master's pose to the slave's, with modes, clutch and fixture."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -349,6 +350,13 @@ class MotionScaling(RunningStage):
         if any(getattr(parameters, name) != getattr(self._values, name) for name in turned):
             self.state["must_latch"] = 1  # align anew: the tool does not turn
         self._values = parameters
+
+    def present(self) -> MotionScalingParameters:
+        """Parameters as they are now: the mode button changes the mode."""
+        mode = MODES[int(self.state["is_fine"])]
+        if mode != self._values.mode:
+            self._values = replace(self._values, mode=mode)
+        return self._values
 
     def _take_reach_force(self, force: ReachForceParameters) -> None:
         stiffness = force.stiffness if force.is_on else 0.0

@@ -85,6 +85,19 @@ class NodeParameters:
         return found or [(port, 0.0)]
 
 
+_SHOWN_AFTER = 0.1
+"""Parameters that a stage changes by itself are shown so much later at most [s]."""
+
+
+def _sim_time(node: str) -> ParameterError:
+    """Refusal of a clock that others set: a step is a millisecond, of drives too."""
+    requirement = (
+        "false: nodes step in real time; teleop sim and replay go as fast as the machine can, "
+        "teleop play --clock publishes /clock"
+    )
+    return ParameterError(f"{node}.use_sim_time", True, requirement)
+
+
 class CoreNode(LifecycleNode):  # type: ignore[misc]
     """Lifecycle node around one stage: fills its signals, steps it, publishes its signals.
 
@@ -102,12 +115,16 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def __init__(self, stage: Stage, group: type | None = None, **options: Any) -> None:
         super().__init__(stage.name, **options)
+        if self.get_parameter("use_sim_time").value:
+            raise _sim_time(self.member_name)
         self.description, self._groups = stage, (NodeParameters, group or stage.parameters)
         self._specs = {spec.name: spec for entry in self._groups for spec in specs(entry)}
         self.options, self.parameters = self._built(self._overrides())
         declare(self, self._specs.values(), values_of(self.options) | values_of(self.parameters))
         self.add_pre_set_parameters_callback(self._type_empty_lists)
         self.add_on_set_parameters_callback(self._accept)
+        self._shows_present = False
+        self.create_timer(_SHOWN_AFTER, self._show_present)
         self.stage: Any = None
         self.row: Any = None
         """The stage's signals, to be read and written by names of fields only."""
@@ -415,6 +432,11 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def _accept(self, changes: list[Parameter]) -> SetParametersResult:
         """Take all changes or none: the group is built anew, and the stage must take it."""
+        if self._shows_present:
+            return SetParametersResult(successful=True)
+        if any(change.name == "use_sim_time" and change.value for change in changes):
+            return SetParametersResult(successful=False, reason=str(_sim_time(self.member_name)))
+        self._take_present()
         own = [change for change in changes if change.name in self._specs]
         values = values_of(self.options) | values_of(self.parameters)
         values |= {c.name: plain(self._specs[c.name], c.value) for c in own}
@@ -425,6 +447,26 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
             return SetParametersResult(successful=False, reason=str(error))
         self.parameters = parameters
         return SetParametersResult(successful=True)
+
+    def _take_present(self) -> None:
+        """Take parameters that the stage has changed by itself, as the mode button does."""
+        if hasattr(self.stage, "present") and self.lock.acquire(timeout=_LOCK_PATIENCE):
+            self.parameters = self.stage.present()
+            self.lock.release()
+
+    def _show_present(self) -> None:
+        """Show parameters that the stage has changed by itself, without setting them again."""
+        if not hasattr(self.stage, "present"):
+            return
+        before = values_of(self.parameters)
+        self._take_present()
+        changed = {k: v for k, v in values_of(self.parameters).items() if v != before[k]}
+        if changed:
+            self._shows_present = True
+            try:
+                self.set_parameters([Parameter(k, value=v) for k, v in changed.items()])
+            finally:
+                self._shows_present = False
 
     def _retune(self, parameters: Any) -> None:
         if self.stage is None or not hasattr(self.stage, "retune"):

@@ -11,8 +11,11 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.serialization import serialize_message
+from rclpy.time import Time
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rosgraph_msgs.msg import Clock
 
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import ParameterError, RecordingError
@@ -20,12 +23,18 @@ from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.topics import BY_NAME, Quality
 
+CLOCK = "clock"
 DISCOVERY_TIME = 1.0
 """Time for subscribers to be found before the first message [s]."""
 
 
 def play(
-    bag: Bag, topics: Iterable[str] | None, rate: float, console: Console, loop: bool = False
+    bag: Bag,
+    topics: Iterable[str] | None,
+    rate: float,
+    console: Console,
+    loop: bool = False,
+    clock: float = 0.0,
 ) -> int:
     """Publish a recording with its own bytes and spacing, until its end or Ctrl-C.
 
@@ -36,26 +45,36 @@ def play(
         console: Where the progress is shown, if it is a terminal.
         loop: Whether to begin again at the end. Nodes take the older stamps then as those of a
             new sender, which they accept after two seconds of silence.
+        clock: How often the recording's time is published on ``/clock``, [1/s] of that time; 0 for
+            never. A recorded ``/clock`` is left out then.
 
     Returns:
         Number of messages published.
 
     Raises:
-        ParameterError: The rate is not a positive number.
+        ParameterError: The rate is not a positive number, or the clock's not from 0 to 1000 Hz.
         RecordingError: A topic is missing, or its message type is not installed.
     """
     if not (math.isfinite(rate) and rate > 0.0):
         raise ParameterError("--rate", rate, "a number above 0")
+    if not 0.0 <= clock <= 1000.0:
+        raise ParameterError("--clock", clock, "from 0 to 1000 Hz")
     names = list(bag.topics) if topics is None else [name.removeprefix("/") for name in topics]
     bag.require(names if topics is not None else ())
+    clock_ns = round(1e9 / clock) if clock else 0
+    if clock_ns:
+        names = [name for name in names if name != CLOCK]
     sent = 0
-    with _publishers(bag, names) as publishers, _progress(bag, console) as show:
+    with (
+        _publishers(bag, names, has_clock=clock > 0.0) as publishers,
+        _progress(bag, console) as show,
+    ):
         time.sleep(DISCOVERY_TIME)
         try:
             while True:
-                for name, log_ns, data in _paced(bag, names, rate):
+                for name, log_ns, data in _paced(bag, names, rate, clock_ns):
                     publishers[name].publish(data)
-                    sent += 1
+                    sent += name != CLOCK or not clock_ns
                     show(log_ns)
                 if not loop:
                     break
@@ -64,18 +83,28 @@ def play(
     return sent
 
 
-def _paced(bag: Bag, names: list[str], rate: float) -> Iterator[tuple[str, int, bytes]]:
-    """Messages in the order of their log times, each when its time has come."""
-    begin = time.monotonic()
-    for name, _, log_ns, data in bag.raw(names):
+def _paced(
+    bag: Bag, names: list[str], rate: float, clock_ns: int
+) -> Iterator[tuple[str, int, bytes]]:
+    """Messages in the order of their log times, each when its time has come, and the time."""
+    begin, told_ns = time.monotonic(), bag.start_ns
+
+    def wait(log_ns: int) -> None:
         ahead = begin + (log_ns - bag.start_ns) * 1e-9 / rate - time.monotonic()
         if ahead > 1e-4:
             time.sleep(ahead)
+
+    for name, _, log_ns, data in bag.raw(names):
+        while clock_ns and told_ns <= log_ns:
+            wait(told_ns)
+            yield CLOCK, told_ns, serialize_message(Clock(clock=Time(nanoseconds=told_ns).to_msg()))
+            told_ns += clock_ns
+        wait(log_ns)
         yield name, log_ns, data
 
 
 @contextmanager
-def _publishers(bag: Bag, names: list[str]) -> Iterator[dict[str, Any]]:
+def _publishers(bag: Bag, names: list[str], *, has_clock: bool) -> Iterator[dict[str, Any]]:
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     choose_transport()
     types = {name: _type_in(bag, name) for name in names}
@@ -87,6 +116,8 @@ def _publishers(bag: Bag, names: list[str]) -> Iterator[dict[str, Any]]:
         for name, kind in types.items():
             topic = BY_NAME.get(name)
             publishers[name] = node.create_publisher(kind, name, profile(topic) if topic else 10)
+        if has_clock:
+            publishers[CLOCK] = node.create_publisher(Clock, f"/{CLOCK}", 1)
         yield publishers
         for name, publisher in publishers.items():
             if name not in BY_NAME or BY_NAME[name].quality is not Quality.STREAM:
