@@ -28,7 +28,7 @@ from teleop_core.topics import Kind
 
 __all__ = [
     "SECOND_NS", "Layout", "Refusal", "Report", "Stamps", "Values", "check", "discover", "layout",
-    "layout_of", "read_any", "read_numbers", "read_reports", "read_values", "report",
+    "layout_of", "read_any", "read_joints", "read_numbers", "read_reports", "read_values", "report",
     "write_values",
 ]  # fmt: skip
 
@@ -159,19 +159,37 @@ def _six(first: Any, second: Any) -> list[float]:
 
 
 def _joints(kind: Kind, message: Any, joint_names: tuple[str, ...]) -> list[float] | Refusal:
-    names = list(message.name)
+    row: list[float] = []
+    parts = ("position", "velocity", "effort") if kind is Kind.STATE else ("position",)
+    for part in parts:
+        found = read_joints(message, part, joint_names)
+        if found is Refusal.WRONG_LENGTH and part != "position" and not len(getattr(message, part)):
+            found = np.full(len(joint_names) or len(message.name), math.nan)
+        if isinstance(found, Refusal):
+            return found
+        row += found.tolist()
+    return row
+
+
+def read_joints(message: Any, part: str, joint_names: tuple[str, ...]) -> Values | Refusal:
+    """Numbers (n,) of the joints in a JointState, in the order of their names.
+
+    Args:
+        message: From rclpy, or deserialised by rosbags. Without names its numbers are in the order
+            of ``joint_names`` already, as those of CRTK's clients are.
+        part: ``position``, ``velocity`` or ``effort``.
+        joint_names: Wanted order; others in the message are left out. Empty takes them as they are.
+
+    Returns:
+        The numbers; or why the message cannot be used.
+    """
+    names, numbers = list(message.name) or list(joint_names), getattr(message, part)
     if any(name not in names for name in joint_names):
         return Refusal.WRONG_NAMES
+    if len(numbers) != len(names):
+        return Refusal.WRONG_LENGTH
     order = [names.index(name) for name in joint_names] or range(len(names))
-    parts = [message.position]
-    if kind is Kind.STATE:
-        parts += [message.velocity, message.effort]
-    row: list[float] = []
-    for index, part in enumerate(parts):
-        if len(part) != len(names) and (index == 0 or len(part) > 0):
-            return Refusal.WRONG_LENGTH
-        row += [part[i] for i in order] if len(part) else [math.nan] * len(order)
-    return row
+    return np.array([numbers[i] for i in order], dtype=np.float64)
 
 
 def write_values(

@@ -3,6 +3,7 @@
 from typing import Any
 
 from teleop_core.master.haptic_master import HAPTIC_MASTER, HapticMasterParameters
+from teleop_core.nodes.crtk_master import CrtkMaster
 from teleop_core.nodes.operation import StopInput
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.stage import Stage
@@ -22,7 +23,7 @@ class HapticMasterNode(TickingNode):
         super().setup(parameters)
         self.stage.step()  # loads the kernels, which takes longer than many ticks
         self.stage.reset()
-        self._stop = StopInput(self)
+        self._stop, self._crtk = StopInput(self), CrtkMaster(self)
         self._force = self.stage.signals[MASTER_SERVO_CF.field]
 
     def stop(self) -> None:
@@ -32,6 +33,7 @@ class HapticMasterNode(TickingNode):
     def teardown(self) -> None:
         """Close what :meth:`setup` opened."""
         self._stop.close()
+        self._crtk.close()
         super().teardown()
 
     def read_ports(self, trigger: Topic | None = None) -> None:
@@ -42,7 +44,10 @@ class HapticMasterNode(TickingNode):
         pressed = self._stop.take()
         if pressed is not None:
             self.stage.press(is_pressed=pressed)
+            self._crtk.press(is_pressed=pressed)
         super().read_ports(trigger)
+        if not self._crtk.is_enabled:
+            self._force[:] = 0.0
 
     def concerns(self) -> list[str]:
         """An operator who waits for the slave; motors that are too warm for the peak force."""

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterable
 
+from teleop_core.nodes.crtk_slave import CrtkSlave
 from teleop_core.nodes.operation import CommandServices, StopInput
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.operation import Fault, State, operation_text
@@ -29,12 +30,14 @@ class SlaveSimNode(TickingNode):
         """Make the slave, open its topics, and listen to the emergency stop and to commands."""
         super().setup(parameters)
         self._stop, self._commands = StopInput(self), CommandServices(self, self.stage)
+        self._crtk = CrtkSlave(self, self.stage)
         self._told_state = int(State.DISABLED)
 
     def teardown(self) -> None:
         """Close what :meth:`setup` opened."""
         self._stop.close()
         self._commands.close()
+        self._crtk.close()
         super().teardown()
 
     def start(self) -> None:
@@ -77,7 +80,10 @@ class SlaveSimNode(TickingNode):
 
     def send_report(self, stamp_ns: int) -> None:
         """Report the operation where it changes, and log what people want to know."""
+        before = self._reported
         super().send_report(stamp_ns)
+        if self._reported is not before:
+            self._crtk.note(stamp_ns)
         values = self.stage.signals[SLAVE_OPERATION.field]
         state = int(values[0])
         if state != self._told_state:
@@ -90,7 +96,8 @@ class SlaveSimNode(TickingNode):
         """A slave that holds still because nothing sound tells it where to go."""
         status = CommandStatus(int(self.row["command_status"]))
         if status is CommandStatus.MOVING:
-            return ["moves to where it starts, and follows then"]
+            is_homing = self.stage.motion.source == "home"
+            return ["moves to where it starts, and follows then"] if is_homing else []
         values = self.stage.operation
         if status is CommandStatus.CLOSED or values["fault"] > 0.0:
             return [operation_text(values, self.stage.robot.joint_names)]
@@ -102,6 +109,7 @@ class SlaveSimNode(TickingNode):
         return ["slave/servo_jp jumped: holds"] if status is CommandStatus.REFUSED else []
 
     def values(self) -> dict[str, str]:
-        """How many commands were too far away to be followed."""
+        """State, what moves the arm, how many commands were refused."""
         text = operation_text(self.stage.operation, self.stage.robot.joint_names)
-        return {"refused.slave/servo_jp.jump": str(self.stage.refused), "operation": text}
+        jumped = {"refused.slave/servo_jp.jump": str(self.stage.refused)}
+        return {**jumped, "operation": text, **self._crtk.values()}

@@ -1,0 +1,150 @@
+"""CRTK: operating state and state commands of an arm, as the Collaborative Robotics Toolkit has it.
+
+``operating_state`` (crtk_msgs/OperatingState) is sent where it changes and five times a second;
+``state_command`` (crtk_msgs/StringStamped) takes the commands of
+:mod:`teleop_core.operation.states`. Both need the package crtk_msgs; where it is not installed,
+an arm has its services and reports alone.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from teleop_core.bags.messages import SECOND_NS
+from teleop_core.errors import TeleopError
+from teleop_core.nodes.streams import message_type
+from teleop_core.operation.states import COMMANDS, Answer
+
+OPERATING_STATE = "crtk_msgs/msg/OperatingState"
+STATE_COMMAND = "crtk_msgs/msg/StringStamped"
+_PERIOD = 0.2  # of operating_state where nothing changes [s]
+_QUIET = 1.0  # between two lines of the log about one topic [s]
+Condition = tuple[str, bool, bool]
+"""Name of the state, whether the arm is homed, whether it is busy."""
+
+
+def is_installed() -> bool:
+    """Whether messages of CRTK can be sent here."""
+    try:
+        message_type(OPERATING_STATE)
+    except ImportError:
+        return False
+    return True
+
+
+def single() -> QoSProfile:
+    """Quality of commands that are sent once: none is lost, of senders who care."""
+    return QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+
+
+def streamed() -> QoSProfile:
+    """Quality of commands that come in streams, from senders of every kind: the newest counts."""
+    return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def latched() -> QoSProfile:
+    """Quality of a state: who comes late gets the last one, if he asks for it."""
+    return QoSProfile(
+        depth=10, reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )  # fmt: skip
+
+
+class OperatingState:
+    """Topics of the operating state of one arm, served by the executor.
+
+    The loop of the node says :meth:`note`; it never publishes here itself, so that no reader can
+    hold it up.
+
+    Args:
+        node: Node that owns them; its ``lock`` is held while a command is taken.
+        arm: Namespace of the topics, ``slave`` or ``master``.
+        request: Takes a command by name; the answer comes with a text.
+        condition: The condition now.
+    """
+
+    def __init__(
+        self,
+        node: Any,
+        arm: str,
+        request: Callable[[str], tuple[Answer, str]],
+        condition: Callable[[], Condition],
+    ) -> None:
+        self._node, self._request, self._condition = node, request, condition
+        self._kind = message_type(OPERATING_STATE)
+        self._changes: deque[tuple[int, Condition]] = deque(maxlen=100)
+        self._publisher = node.create_lifecycle_publisher(
+            self._kind, f"{arm}/operating_state", latched()
+        )
+        self._commands = node.create_subscription(
+            message_type(STATE_COMMAND), f"{arm}/state_command", self._take, single()
+        )
+        self._guard = node.create_guard_condition(self._send_changes)
+        self._timer = node.create_timer(_PERIOD, self._send)
+
+    def note(self, stamp_ns: int) -> None:
+        """Have the present condition sent soon, under its stamp [ns]; from any thread."""
+        self._changes.append((stamp_ns, self._condition()))
+        self._guard.trigger()
+
+    def close(self) -> None:
+        """Withdraw them."""
+        self._node.destroy_timer(self._timer)
+        self._node.destroy_guard_condition(self._guard)
+        self._node.destroy_subscription(self._commands)
+        self._node.destroy_lifecycle_publisher(self._publisher)
+
+    def _take(self, message: Any) -> None:
+        name, log = message.string.strip(), self._node.get_logger()
+        if name not in COMMANDS:
+            known = ", ".join(COMMANDS)
+            log.warning(f"no state command {name!r:.40}; known: {known}")
+            return
+        try:
+            with self._node.lock:
+                answer, text = self._request(name)
+        except TeleopError as error:
+            log.warning(str(error))
+            return
+        log.info(text) if answer in {Answer.DONE, Answer.ALREADY} else log.warning(text)
+
+    def _send_changes(self) -> None:
+        while self._changes:
+            self._publish(*self._changes.popleft())
+
+    def _send(self) -> None:
+        self._send_changes()
+        self._publish(time.time_ns(), self._condition())
+
+    def _publish(self, stamp_ns: int, condition: Condition) -> None:
+        message = self._kind(state=condition[0], is_homed=condition[1], is_busy=condition[2])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, SECOND_NS)
+        self._publisher.publish(message)
+
+
+class Refusals:
+    """Counts commands that were refused, by topic, and says why once a second at most.
+
+    Args:
+        node: Node whose log tells it.
+    """
+
+    def __init__(self, node: Any) -> None:
+        self._node = node
+        self._counts: dict[str, int] = {}
+        self._told: dict[str, float] = {}
+
+    def add(self, topic: str, text: str) -> None:
+        """Take note of a refused command."""
+        self._counts[topic] = self._counts.get(topic, 0) + 1
+        now = time.monotonic()
+        if now - self._told.get(topic, -_QUIET) >= _QUIET:
+            self._told[topic] = now
+            self._node.get_logger().warning(f"{topic}: {text}")
+
+    def values(self) -> dict[str, str]:
+        """Counts for the node's report."""
+        return {f"refused.{name}": str(count) for name, count in self._counts.items()}

@@ -1,0 +1,249 @@
+"""CRTK slave: motion commands and further measurements of a slave, beside its streams.
+
+What moves the arm, and what it may do, decides :class:`~teleop_core.slave.motion.MotionCommands`;
+here messages become its calls. All of it runs in the executor: commands that come once, or at some
+hundred times a second. A thousand a second go to ``slave/servo_jp`` and ``slave/servo_cp``.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from teleop_core.bags.messages import Refusal, layout, read_joints
+from teleop_core.errors import TeleopError
+from teleop_core.geometry import Array, pose_from_transform, transform_from_pose
+from teleop_core.nodes.crtk import (
+    Condition,
+    OperatingState,
+    Refusals,
+    is_installed,
+    single,
+    streamed,
+)
+from teleop_core.nodes.streams import message_type, profile
+from teleop_core.operation.states import Answer, State
+from teleop_core.slave.motion import Told
+from teleop_core.topics import SLAVE_MEASURED_CP, Kind, Topic
+
+_FRAME = SLAVE_MEASURED_CP.frame_id
+MEASURED_CV = Topic("slave/measured_cv", Kind.TWIST, frame_id=_FRAME)
+GOAL_JS = Topic("slave/goal_js", Kind.JOINTS, frame_id=_FRAME)
+GOAL_CP = Topic("slave/goal_cp", Kind.POSE, frame_id=_FRAME)
+JACOBIAN = "slave/jacobian"
+_JOINTS, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
+_TWIST, _EMPTY = "geometry_msgs/msg/TwistStamped", "std_msgs/msg/Empty"
+_MATRIX = "std_msgs/msg/Float64MultiArray"
+_PERIOD = 0.01  # of what is measured here, as long as somebody reads it [s]
+_LOOK = 0.5  # time from one look for readers to the next [s]
+
+
+class CrtkSlave:
+    """Topics of CRTK that a slave has beside its streams.
+
+    Args:
+        node: Node that owns them; its ``lock`` is held while the stage is read or told something.
+        stage: The slave.
+    """
+
+    def __init__(self, node: Any, stage: Any) -> None:
+        self._node, self._stage, self._motion = node, stage, stage.motion
+        self._names = stage.robot.joint_names
+        self._refusals, self._source = Refusals(node), ""
+        self._operation = stage.signals["slave_operation"]
+        self._state: OperatingState | None = None
+        if is_installed():
+            self._state = OperatingState(node, "slave", stage.request, self._condition)
+        else:
+            node.get_logger().info("crtk_msgs is not installed: no slave/operating_state")
+        self._subscriptions = [self._listen(*entry) for entry in self._commands()]
+        self._measured = Measured(node, stage)
+
+    def note(self, stamp_ns: int) -> None:
+        """Have a changed operation told, under its stamp [ns]; from the loop of the node."""
+        if self._state is not None:
+            self._state.note(stamp_ns)
+
+    def values(self) -> dict[str, str]:
+        """What moves the arm, and how many commands were refused."""
+        return {"motion": self._motion.source, **self._refusals.values()}
+
+    def close(self) -> None:
+        """Withdraw them."""
+        if self._state is not None:
+            self._state.close()
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        self._measured.close()
+
+    def _condition(self) -> Condition:
+        state, is_homed, is_busy = self._operation[:3]
+        return State(int(state)).name, bool(is_homed), bool(is_busy)
+
+    # -- commands --------------------------------------------------------------------------------
+
+    def _commands(self) -> list[tuple[str, str, bool, Callable[[Any], Told]]]:
+        """Name, message type, whether it comes in a stream, and what takes it."""
+        motion, now = self._motion, time.time_ns
+        return [
+            ("move_jp", _JOINTS, False, lambda m: self._locked(motion.move, self._of(m))),
+            ("move_jr", _JOINTS, False, lambda m: self._locked(motion.move_by, self._of(m))),
+            ("move_cp", _POSE, False, self._move_cp),
+            ("hold", _EMPTY, False, lambda _: self._locked(motion.hold)),
+            ("interpolate_jp", _JOINTS, True,
+             lambda m: self._locked(motion.servo, self._of(m), now())),
+            ("interpolate_cp", _POSE, True, self._interpolate_cp),
+            ("servo_jr", _JOINTS, True,
+             lambda m: self._locked(motion.servo_by, self._of(m), now())),
+            ("servo_jv", _JOINTS, True,
+             lambda m: self._locked(motion.drive_joints, self._of(m, "velocity"), now())),
+            ("servo_cv", _TWIST, True,
+             lambda m: self._locked(motion.drive_tip, _twist(m), now())),
+        ]  # fmt: skip
+
+    def _listen(
+        self, name: str, kind: str, is_streamed: bool, command: Callable[[Any], Told]
+    ) -> Any:
+        quality = streamed() if is_streamed else single()
+
+        def take(message: Any) -> None:
+            self._take(name, command, message)
+
+        return self._node.create_subscription(message_type(kind), f"slave/{name}", take, quality)
+
+    def _take(self, name: str, command: Callable[[Any], Told], message: Any) -> None:
+        if not self._node.is_at_work:
+            self._refusals.add(f"slave/{name}", "refused: the node is not active")
+            return
+        try:
+            answer, text = command(message)
+        except TeleopError as error:
+            answer, text = Answer.REFUSED, f"refused: {error}"
+        if answer not in {Answer.DONE, Answer.ALREADY}:
+            self._refusals.add(f"slave/{name}", text)
+        elif name != self._source:
+            self._source = name
+            self._node.get_logger().info(f"slave/{name} commands the arm")
+
+    def _locked(self, command: Callable[..., Told], *arguments: Any) -> Told:
+        with self._node.lock:
+            return command(*arguments)
+
+    def _of(self, message: Any, part: str = "position") -> Array:
+        """Joint numbers of a message, in the robot's order; without names they come in it.
+
+        Raises:
+            CommandError: It has not one for each joint.
+        """
+        found = read_joints(message, part, self._names)
+        if isinstance(found, Refusal):
+            raise CommandError(f"it {found.value}; needed: {part} of {', '.join(self._names)}")
+        return found
+
+    def _move_cp(self, message: Any) -> Told:
+        found = self._motion.solve(_transform(message))
+        return found if isinstance(found, tuple) else self._locked(self._motion.move, found)
+
+    def _interpolate_cp(self, message: Any) -> Told:
+        found = self._motion.solve(_transform(message))
+        if isinstance(found, tuple):
+            return found
+        return self._locked(self._motion.servo, found, time.time_ns())
+
+
+class CommandError(TeleopError):
+    """A message that is no command for this arm."""
+
+
+def _transform(message: Any) -> Array:
+    p, q = message.pose.position, message.pose.orientation
+    pose = np.array([p.x, p.y, p.z, q.w, q.x, q.y, q.z])
+    length = np.linalg.norm(pose[3:])
+    if not abs(length - 1.0) <= _UNIT:  # NaN is not 1 either
+        raise CommandError(f"its quaternion has length {length:.4g}, must be 1")
+    pose[3:] /= length
+    T = np.empty((4, 4))
+    transform_from_pose(pose, T)
+    return T
+
+
+_UNIT = 1e-3
+
+
+def _twist(message: Any) -> list[float]:
+    v, w = message.twist.linear, message.twist.angular
+    return [v.x, v.y, v.z, w.x, w.y, w.z]
+
+
+class Measured:
+    """What is measured beside the streams: sent a hundred times a second while somebody reads it.
+
+    Args:
+        node: Node that owns the topics.
+        stage: The slave.
+    """
+
+    def __init__(self, node: Any, stage: Any) -> None:
+        self._node, self._stage = node, stage
+        names = stage.robot.joint_names
+        self._publishers = {
+            topic: node.create_lifecycle_publisher(
+                message_type(topic.kind.ros_type), topic.name, profile(topic)
+            )
+            for topic in (MEASURED_CV, GOAL_JS, GOAL_CP)
+        }
+        self._layouts = {t: layout(t.of_arm(node.arm), names) for t in self._publishers}
+        self._jacobian = node.create_lifecycle_publisher(
+            message_type(_MATRIX), JACOBIAN, profile(MEASURED_CV)
+        )
+        self._timer = node.create_timer(_PERIOD, self._send)
+        self._timer.cancel()
+        self._look = node.create_timer(_LOOK, self._look_for_readers)
+
+    def close(self) -> None:
+        """Withdraw them."""
+        for timer in (self._timer, self._look):
+            self._node.destroy_timer(timer)
+        for publisher in (*self._publishers.values(), self._jacobian):
+            self._node.destroy_lifecycle_publisher(publisher)
+
+    def _look_for_readers(self) -> None:
+        is_read = any(p.get_subscription_count() for p in self._all())
+        if is_read and self._timer.is_canceled() and self._node.is_at_work:
+            self._timer.reset()
+        elif not is_read:
+            self._timer.cancel()
+
+    def _all(self) -> tuple[Any, ...]:
+        return (*self._publishers.values(), self._jacobian)
+
+    def _send(self) -> None:
+        if not self._node.is_at_work:
+            return
+        robot, n = self._stage.robot, self._stage.robot.n
+        with self._node.lock:
+            row = self._stage.signals
+            now_ns, measured = int(row["now_ns"]), row["slave_measured_js"].copy()
+            goal = self._stage.motion.goal
+        J = np.empty((6, n))
+        robot.kernels.jacobian(measured[:n].copy(), robot.geometry_row, J)
+        T, pose = np.empty((4, 4)), np.empty(7)
+        robot.kernels.fk(goal, robot.geometry_row, T)
+        pose_from_transform(T, pose)
+        values = {MEASURED_CV: J @ measured[n : 2 * n], GOAL_JS: goal, GOAL_CP: pose}
+        for topic, publisher in self._publishers.items():
+            publisher.publish(self._layouts[topic].encode_one(now_ns, values[topic]))
+        self._jacobian.publish(_matrix(J))
+
+
+def _matrix(rows: Array) -> Any:
+    """Matrix as a message: rows, then columns."""
+    dimension = message_type("std_msgs/msg/MultiArrayDimension")
+    message = message_type(_MATRIX)(data=rows.ravel().tolist())
+    height, width = rows.shape
+    message.layout.dim = [
+        dimension(label="rows", size=height, stride=height * width),
+        dimension(label="columns", size=width, stride=width),
+    ]
+    return message
