@@ -168,6 +168,11 @@ class Child:
                 continue
         return self._process.wait()
 
+    def close(self) -> None:
+        """Let go of what it said and wrote, after its end."""
+        self._line.close()
+        self._log.close()
+
 
 def _in_words(code: int) -> str:
     return f"exit code {code}" if code >= 0 else f"signal {signal.Signals(-code).name}"
@@ -183,4 +188,5 @@ def end_all(children: Iterable[Child]) -> list[str]:
         code = child.end()
         if code and not child.is_told:
             failures.append(f"{child.name} ended with {_in_words(code)}{child.last_words()}")
+        child.close()
     return failures

@@ -49,6 +49,10 @@ class Parent:
         except OSError:
             return True
 
+    def close(self) -> None:
+        """Let go of the line."""
+        self._line.close()
+
     def tell(self, word: str) -> None:
         """Say what this process is doing; lost if the parent stands still itself."""
         try:

@@ -59,6 +59,8 @@ def run(make_crew: Callable[[], Crew]) -> int:
     watch = Watch(crew, signals, parent)
     code = _serve(crew, watch)
     watch.close()
+    if parent is not None:
+        parent.close()
     if code:
         _leave(code)
     for number in ENDS:  # the interpreter would die of another one on its last way
