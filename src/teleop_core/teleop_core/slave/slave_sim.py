@@ -30,6 +30,7 @@ from teleop_core.robots.robot import Robot
 from teleop_core.signals import DT, assign
 from teleop_core.slave.friction import bristle_damping
 from teleop_core.slave.motion import MotionCommands
+from teleop_core.slave.stability import check_stable
 from teleop_core.slave.step import SPEED_LAG, Arm, slave_records, slave_step
 from teleop_core.slave.trajectory import shortest_move_time
 from teleop_core.stage import RunningStage, Stage
@@ -184,8 +185,10 @@ class SlaveSim(RunningStage):
         self.motion = MotionCommands(self)
         self._take_start(parameters)
         self._take_script(parameters.operation)
+        self._stable: bytes | None = None
         self.retune(parameters)
         self.reset()
+        self._insist_on_stability(parameters)
 
     def reset(self) -> None:
         """Back to home, at rest, with no command in force."""
@@ -214,7 +217,8 @@ class SlaveSim(RunningStage):
         """Take new parameters from the next tick on; the control law keeps the arm in balance.
 
         Raises:
-            ParameterError: A list has another length than the robot has joints; nothing changed.
+            ParameterError: A list has another length than the robot has joints, nothing changed; or
+                a small error would grow, and then the former ones are to be set again.
         """
         robot, p, drives = self.robot, self.parameters, self.robot.drives
         assert drives is not None
@@ -242,6 +246,18 @@ class SlaveSim(RunningStage):
         p["interpolation"] = INTERPOLATIONS.index(parameters.interpolation)
         p["start_speed"] = parameters.start_speed
         self._take_operation(parameters.operation)
+        if self._stable is not None:
+            self._insist_on_stability(parameters)
+
+    def _insist_on_stability(self, parameters: SlaveSimParameters) -> None:
+        """Try the loop, unless it is the one that was tried last; see :func:`check_stable`."""
+        p, law = self.parameters, parameters.controller.kind.kind
+        loop = b"".join(
+            part.tobytes() for part in (self.arm.gains, p["viscous"], p["compensated"], p["steps"])
+        )
+        if loop != self._stable:
+            check_stable(law, p, self.state, self.arm, self.signals, self.dt)
+            self._stable = loop
 
     def _take_start(self, parameters: SlaveSimParameters) -> None:
         """Plan the move from home to where the slave starts.
