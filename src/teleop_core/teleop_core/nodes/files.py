@@ -62,8 +62,13 @@ class _Plain(yaml.SafeDumper):
 
 
 def _copy(content: dict[str, Any]) -> str:
+    return temporary_file(yaml.dump(content, Dumper=_Plain, allow_unicode=True, sort_keys=False))
+
+
+def temporary_file(text: str) -> str:
+    """Name of a new parameter file, which is removed when this process ends."""
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
-        yaml.dump(content, file, Dumper=_Plain, allow_unicode=True, sort_keys=False)
+        file.write(text)
     atexit.register(_remove, file.name)
     return file.name
 

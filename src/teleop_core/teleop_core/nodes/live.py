@@ -247,11 +247,19 @@ class _Progress:
         return time.monotonic() - self._last
 
 
-def parameter_file(configuration: Configuration, out: str) -> str:
+def parameter_file(
+    configuration: Configuration, out: str, namespace: str = "", *, starts_recorder: bool = True
+) -> str:
     """Parameters of all nodes as a ROS 2 parameter file; ``out`` is that of the recorder.
 
     Every node is named with its namespace. What feeds its ports, where that is not the topic of
     the port's name, stands in its ``links``.
+
+    Args:
+        configuration: The session.
+        out: Directory of the recording; empty: bags/ and the time.
+        namespace: Where all nodes are, without slashes before and after it.
+        starts_recorder: Whether the recorder configures and activates itself.
     """
     text, graph = configuration.text(), configuration.graph
     content: dict[str, Any] = yaml.safe_load(text)
@@ -265,5 +273,8 @@ def parameter_file(configuration: Configuration, out: str) -> str:
     recorder = content[RECORDER_NAME]["ros__parameters"]
     recorder["out"], recorder["configuration"] = out, text
     recorder["scenario"] = configuration.scenario
-    named = {f"/{name}": node for name, node in content.items()}
+    if not starts_recorder:
+        recorder["autostart"] = False
+    place = f"/{namespace}" if namespace else ""
+    named = {f"{place}/{name}": node for name, node in content.items()}
     return yaml.safe_dump({SESSION: session, **named}, allow_unicode=True)

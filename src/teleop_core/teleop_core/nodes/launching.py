@@ -1,0 +1,133 @@
+"""Launching: what the launch files start, as plain values, and its description for ``launch``.
+
+``launch`` is not on PyPI: it is imported where a description is made, on a full ROS 2.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from teleop_core.errors import ParameterError
+from teleop_core.graph import RECORDER_NAME
+from teleop_core.nodes.files import temporary_file
+from teleop_core.nodes.live import parameter_file
+from teleop_core.nodes.start import SESSION as SESSION_NODE
+from teleop_core.session.configuration import configure
+
+if TYPE_CHECKING:
+    from launch import LaunchDescription
+
+LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
+COMMON = {
+    "scenario": ("coarse_box", "one of `teleop scenarios`"),
+    "params_file": ("", "ROS 2 parameter file over the scenario"),
+    "namespace": ("", "where all nodes and topics are, below that of an including launch file"),
+    "composed": ("false", "whether one process holds all nodes, which is fastest"),
+    "record": ("true", "whether the recorder records from the start"),
+    "out": ("", "directory of the recording; empty: bags/ and the time"),
+    "log_level": ("info", "one of " + ", ".join(LOG_LEVELS)),
+}
+"""Arguments of all launch files: name to default and meaning."""
+ONE_ARM = {"robot": ("", "robot of the arm, one of `teleop parts`; empty: the scenario's")}
+TWO_ARMS = {
+    "left_robot": ("", "robot of the default arm, whose topics have no arm's name"),
+    "right_robot": ("", "robot of the further arm, whose topics are below right/"),
+}
+
+
+@dataclass(frozen=True)
+class Process:
+    """One process to start.
+
+    Attributes:
+        executable: Of this package.
+        arguments: Before ROS arguments.
+        name: Name of its node; empty if it holds several.
+        namespace: Where it is, with the slash before it.
+        parameters: Parameter file, kept until the launching process ends.
+        log_level: Lowest level of its log.
+    """
+
+    executable: str
+    arguments: tuple[str, ...]
+    name: str
+    namespace: str
+    parameters: str
+    log_level: str
+
+
+def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
+    """Processes of a session, the recorder first and masters last: nothing that is sent is missed.
+
+    Args:
+        given: Arguments by name, as :data:`COMMON` and one of the others have them.
+        namespace: Of an including launch file.
+
+    Raises:
+        TeleopError: An argument is wrong.
+    """
+    where = "/".join(part.strip("/") for part in (namespace, given["namespace"]) if part.strip("/"))
+    files = [Path(given["params_file"])] if given["params_file"] else []
+    configuration = configure(given["scenario"], files, _settings(given))
+    level = given["log_level"].lower()
+    if level not in LOG_LEVELS:
+        raise ParameterError("log_level", given["log_level"], f"one of {', '.join(LOG_LEVELS)}")
+    is_recorded = _truth("record", given["record"])
+    text = parameter_file(configuration, given["out"], where, starts_recorder=is_recorded)
+    file = temporary_file(text)
+    if _truth("composed", given["composed"]):
+        return [Process(SESSION_NODE, (), "", f"/{where}", file, level)]
+    names = [member.name for member in reversed(configuration.graph.members)]
+    found = []
+    for full in [RECORDER_NAME, *names] if is_recorded else names:
+        arm, _, stage = full.rpartition("/")
+        below = "/".join(filter(None, (where, arm)))
+        found.append(Process("stage", (stage,), stage, f"/{below}", file, level))
+    return found
+
+
+def _settings(given: Mapping[str, str]) -> list[str]:
+    arms = {"robot": "robot", "left_robot": "left/robot", "right_robot": "right/robot"}
+    found = ["teleop.arms=[left, right]"] if "left_robot" in given else []
+    return found + [f"{key}={given[name]}" for name, key in arms.items() if given.get(name)]
+
+
+def _truth(name: str, text: str) -> bool:
+    word = text.lower()
+    if word not in {"true", "false", "1", "0", "yes", "no"}:
+        raise ParameterError(name, text, "true or false")
+    return word in {"true", "1", "yes"}
+
+
+def describe(own: Mapping[str, tuple[str, str]]) -> "LaunchDescription":
+    """Description of a launch file.
+
+    Args:
+        own: Its arguments beside :data:`COMMON`: name to default and meaning.
+    """
+    from launch.actions import DeclareLaunchArgument, OpaqueFunction
+    from launch_ros.actions import Node
+
+    from launch import LaunchDescription
+
+    arguments = {**COMMON, **own}
+
+    def nodes(context: Any) -> list[Node]:
+        given = {name: context.launch_configurations[name] for name in arguments}
+        outer = context.launch_configurations.get("ros_namespace", "")
+        return [_action(Node, process) for process in processes(given, outer)]
+
+    declared = [
+        DeclareLaunchArgument(name, default_value=default, description=text)
+        for name, (default, text) in arguments.items()
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=nodes)])
+
+
+def _action(node: Any, process: Process) -> Any:
+    return node(
+        package="teleop_core", executable=process.executable, arguments=[*process.arguments],
+        name=process.name or None, namespace=process.namespace, parameters=[process.parameters],
+        ros_arguments=["--log-level", process.log_level], output="screen",
+    )  # fmt: skip

@@ -1,0 +1,100 @@
+"""What the launch files start: processes, namespaces, parameter files and arguments."""
+
+import runpy
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+import yaml
+
+from teleop_core.errors import ParameterError
+from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, processes
+
+LAUNCH = Path(__file__).resolve().parents[2] / "src" / "teleop_core" / "launch"
+STAGES = {"haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim"}
+
+
+def given(own=ONE_ARM, **values):
+    return {name: default for name, (default, _) in (COMMON | own).items()} | values
+
+
+def parameters(process):
+    content = yaml.safe_load(Path(process.parameters).read_text())
+    return {name: node["ros__parameters"] for name, node in content.items()}
+
+
+def test_a_session_is_one_process_per_node_with_the_recorder_first():
+    found = processes(given())
+    assert found[0].name == "recorder"
+    assert {process.name for process in found} == STAGES | {"recorder"}
+    assert {process.namespace for process in found} == {"/"}
+
+
+@pytest.mark.parametrize(
+    ("outer", "own", "where"),
+    [("", "", ""), ("", "lab", "/lab"), ("/left", "", "/left"), ("/left", "/lab/", "/left/lab")],
+)
+def test_every_node_finds_its_parameters_where_it_is(outer, own, where):
+    for process in processes(given(namespace=own), outer):
+        full = f"{process.namespace.rstrip('/')}/{process.name}"
+        assert full == f"{where}/{process.name}"
+        assert full in parameters(process)
+
+
+def test_one_process_holds_all_nodes_if_composed():
+    (process,) = processes(given(composed="true", namespace="lab"))
+    assert (process.executable, process.name) == ("teleop_session", "")
+    assert process.namespace == "/lab"
+    assert {f"/lab/{name}" for name in STAGES | {"recorder"}} <= set(parameters(process))
+
+
+def test_nothing_records_where_it_is_not_wanted():
+    assert "recorder" not in {process.name for process in processes(given(record="false"))}
+    (process,) = processes(given(record="false", composed="1"))
+    assert parameters(process)["/recorder"]["autostart"] is False
+
+
+def test_a_robot_is_that_of_all_stages_of_its_arm():
+    one = parameters(processes(given(robot="puma560"))[0])
+    assert {one[f"/{name}"]["robot"] for name in ("slave_sim", "inverse_kinematics")} == {"puma560"}
+    both = processes(given(TWO_ARMS, right_robot="puma560"))
+    two = parameters(both[0])
+    assert two["/slave_sim"]["robot"] == "rcrt1"
+    assert two["/right/slave_sim"]["robot"] == "puma560"
+    assert sum(process.namespace == "/right" for process in both) == len(STAGES)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("log_level", "loud"), ("record", "perhaps"), ("composed", "")]
+)
+def test_an_argument_of_no_meaning_is_refused(name, value):
+    with pytest.raises(ParameterError, match=name):
+        processes(given(**{name: value}))
+
+
+@pytest.mark.parametrize(
+    ("file", "own", "count"), [("teleop", ONE_ARM, 5), ("two_arms", TWO_ARMS, 9)]
+)
+def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(monkeypatch, file, own, count):
+    # Stand-ins for launch and launch_ros, which PyPI does not have, as far as they are used.
+    declared, started = {}, []
+    launch, actions, ros = ModuleType("launch"), ModuleType("launch.actions"), ModuleType("ros")
+    launch.LaunchDescription = list
+    actions.DeclareLaunchArgument = lambda name, default_value, description: declared.update(
+        {name: default_value}
+    )
+    actions.OpaqueFunction = lambda function: function
+    ros.Node = lambda **arguments: started.append(arguments)
+    modules = {"launch": launch, "launch.actions": actions, "launch_ros": ModuleType("launch_ros"),
+               "launch_ros.actions": ros}  # fmt: skip
+    for name, module in modules.items():
+        monkeypatch.setitem(sys.modules, name, module)
+    made = runpy.run_path(str(LAUNCH / f"{file}.launch.py"))["generate_launch_description"]()
+    assert set(declared) == set(COMMON) | set(own)
+    values = declared | {"ros_namespace": "/lab", "log_level": "warn"}
+    made[-1](SimpleNamespace(launch_configurations=values))
+    assert len(started) == count
+    assert all(node["package"] == "teleop_core" for node in started)
+    assert all(node["ros_arguments"] == ["--log-level", "warn"] for node in started)
+    assert {node["namespace"] for node in started} <= {"/lab", "/lab/right"}
