@@ -21,6 +21,9 @@ from teleop_core.topics import Kind, Topic
 
 __all__ = ["Bag", "Series", "TopicInfo", "recover"]
 
+_LATEST_NS = 2**62
+"""Log times from here on [ns], the year 2116, are none; differences of others fit into 64 bits."""
+
 
 @dataclass(frozen=True)
 class TopicInfo:
@@ -74,6 +77,9 @@ class Bag:
             raise RecordingError(self.path, "holds no messages; record it again")
         self.start_ns = min(place.start_ns for place in places)
         self.end_ns = max(place.end_ns for place in places)
+        if self.start_ns < 0 or self.end_ns >= _LATEST_NS:
+            reason = "is damaged: it says that messages came in another century"
+            raise RecordingError(self.path, reason)
 
     def require(self, topics: Iterable[Topic | str]) -> None:
         """Insist on topics with at least one message.

@@ -1,5 +1,6 @@
 """Joining: the streams of a recording side by side over the time, a stretch of it at once."""
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from teleop_core.errors import UnknownNameError
 from teleop_core.exchange.times import SECOND_NS, Stamps
 from teleop_core.geometry import Array
 from teleop_core.recording import Recording, Stream
+from teleop_core.session.replayed_span import LONGEST_GAP_NS
 from teleop_core.topics import BY_NAME, Kind
 
 _SLACK_NS = SECOND_NS
@@ -93,15 +95,19 @@ class Streams:
         return newest(times, stream.log_ns, stream.values)
 
     def sampled(self, rate: float) -> Iterator[Joined]:
-        """Rows at a rate [Hz] from the start on: in each the newest message of every topic."""
-        step = SECOND_NS / rate
+        """Rows at a rate [Hz] from the start on: in each the newest message of every topic.
+
+        Where nothing came for more than :data:`LONGEST_GAP_NS` there are no rows.
+        """
+        step, before = SECOND_NS / rate, np.array([self.start_ns])
         last: dict[str, Series] = {}
         number = 0
         for piece in self._pieces():
-            end = max(int(series.log_ns[-1]) for series in piece.values())
-            count = int((end - self.start_ns) // step) + 1
-            times = self.start_ns + np.rint(np.arange(number, count) * step).astype(np.int64)
-            number = max(number, count)
+            logs = np.unique(np.concatenate([series.log_ns for series in piece.values()]))
+            numbers = _numbers(np.append(before, logs) - self.start_ns, step, number)
+            times = self.start_ns + np.rint(numbers * step).astype(np.int64)
+            number = max(number, int((int(logs[-1]) - self.start_ns) // step) + 1)
+            before = logs[-1:]
             values = {}
             for name in self.columns:
                 if name in self._reports:
@@ -158,6 +164,29 @@ class Streams:
                 return False
             last = max([last, *(int(log.min()) for log in logs)])
         return True
+
+
+def _numbers(since_ns: Stamps, step: float, first: int) -> Stamps:
+    """Numbers of the rows from ``first`` on up to the last message, less those in a gap.
+
+    Args:
+        since_ns: Times of all messages since row 0 (N,), rising [ns].
+        step: Time between two rows [ns].
+        first: Smallest number.
+    """
+    ends = np.flatnonzero(np.diff(since_ns.astype(np.float64)) > LONGEST_GAP_NS)
+    if not len(ends):
+        return np.arange(first, int(since_ns[-1] // step) + 1)
+    warnings.warn(
+        f"no rows where no message came for more than {LONGEST_GAP_NS / SECOND_NS:g} s",
+        stacklevel=4,
+    )
+    low = np.ceil(since_ns[np.append(0, ends + 1)] / step).astype(np.int64)
+    high = np.floor(since_ns[np.append(ends, len(since_ns) - 1)] / step).astype(np.int64) + 1
+    low = np.maximum(low, first)
+    counts = np.maximum(high - low, 0)
+    offsets = np.cumsum(counts) - counts
+    return np.repeat(low - offsets, counts) + np.arange(counts.sum())
 
 
 def numeric(recording: Recording) -> list[str]:
