@@ -9,13 +9,14 @@ import warnings
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.commands import calibrate, exchange, experiment, fit, reach
+from teleop_core.commands import calibrate, drill, exchange, experiment, fit, operate, reach
 from teleop_core.commands.arguments import (
     command,
     configured,
     done,
     geometry_argument,
     out_argument,
+    ros_module,
     session_arguments,
     setting_arguments,
 )
@@ -100,6 +101,8 @@ def _parser() -> argparse.ArgumentParser:
     calibrate.add(commands)
     experiment.add(commands)
     fit.add(commands)
+    drill.add(commands)
+    operate.add(commands)
     return parser
 
 
@@ -202,7 +205,7 @@ def _live(arguments: argparse.Namespace) -> int:
 
     configuration = configured(arguments)
     composed = arguments.composed
-    _ros("live").live(configuration, arguments.out, Console(), is_composed=composed)
+    ros_module("live").live(configuration, arguments.out, Console(), is_composed=composed)
     print(done(arguments.out, "recorded"))
     return 0
 
@@ -213,22 +216,8 @@ def _play(arguments: argparse.Namespace) -> int:
     from teleop_core.bags.reader import Bag
 
     bag, rate = Bag(arguments.bag), arguments.rate
-    _ros("play").play(bag, arguments.topics, rate, Console(), clock=arguments.clock)
+    ros_module("play").play(bag, arguments.topics, rate, Console(), clock=arguments.clock)
     return 0
-
-
-def _ros(module: str) -> Any:
-    """Module of the nodes, which are the only part that needs ROS."""
-    from importlib import import_module
-
-    try:
-        return import_module(f"teleop_core.nodes.{module}")
-    except ModuleNotFoundError as error:
-        if (error.name or "").startswith("teleop_core"):
-            raise
-        raise TeleopError(
-            f"needs ROS 2 ({error.name} is missing): pip install 'teleop_core[ros]' or source ROS"
-        ) from error
 
 
 def _evaluate(arguments: argparse.Namespace) -> int:

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from teleop_core.errors import TeleopError
+
 if TYPE_CHECKING:
     from teleop_core.session.configuration import Configuration
 
@@ -77,3 +79,21 @@ def configured(arguments: argparse.Namespace) -> "Configuration":
 def done(out: Path, what: str) -> str:
     """Last line of a command that recorded."""
     return f"{out}: {what}; next: teleop evaluate {out}"
+
+
+def ros_module(module: str) -> Any:
+    """Module of the nodes, which are the only part that needs ROS.
+
+    Raises:
+        TeleopError: ROS is missing.
+    """
+    from importlib import import_module
+
+    try:
+        return import_module(f"teleop_core.nodes.{module}")
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("teleop_core"):
+            raise
+        raise TeleopError(
+            f"needs ROS 2 ({error.name} is missing): pip install 'teleop_core[ros]' or source ROS"
+        ) from error

@@ -1,0 +1,107 @@
+"""Parts of a drill inside the processes under test: a stage that breaks, a clock that is stepped.
+
+The file is given to the processes as one with own parts, so that nothing of it is in nodes that no
+drill has started. What it does is said by the numbers of a file that both sides see.
+"""
+
+import mmap
+import os
+import struct
+import time
+from pathlib import Path
+from typing import Any
+
+from teleop_core.errors import PartError
+from teleop_core.parameters import NoParameters
+from teleop_core.stage import STAGES, RunningStage, Stage, register_stage
+from teleop_core.topics import SLAVE_SERVO_CP, Kind, Topic, passed_on
+
+VARIABLE = "TELEOP_DRILL"
+"""Environment variable with the name of the file that says what is to break."""
+STAGE_NAME = "drill_stage"
+_FORM = struct.Struct("<qq")
+WORKS, HANGS, RAISES = 0, 1, 2
+"""What the stage does."""
+
+
+class Control:
+    """What is to break, as both sides see it.
+
+    Args:
+        file: File of 16 bytes: what the stage does, and by how much the clock is off [ns].
+    """
+
+    def __init__(self, file: Path) -> None:
+        with file.open("r+b") as opened:
+            self._map = mmap.mmap(opened.fileno(), _FORM.size)
+
+    @staticmethod
+    def make(file: Path) -> "Control":
+        """A new file, under which all works."""
+        file.write_bytes(bytes(_FORM.size))
+        return Control(file)
+
+    @property
+    def word(self) -> int:
+        """What the stage does."""
+        return int(_FORM.unpack(self._map)[0])
+
+    @property
+    def offset_ns(self) -> int:
+        """By how much the clock is off [ns]."""
+        return int(_FORM.unpack(self._map)[1])
+
+    def write(self, word: int = WORKS, offset_ns: int = 0) -> None:
+        """Say what the stage does and by how much the clock is off [ns]."""
+        self._map[:] = _FORM.pack(word, offset_ns)
+
+
+DRILLED_CP = Topic("slave/drilled_cp", Kind.POSE, passed_on(SLAVE_SERVO_CP.name), "slave_base")
+
+
+class _Passing(RunningStage):
+    """Passes every command on, as long as it works."""
+
+    control: Control | None = None
+
+    def step(self) -> None:
+        """Pass a command on; or hang, or raise."""
+        while self.control is not None and self.control.word == HANGS:
+            time.sleep(0.01)
+        if self.control is not None and self.control.word == RAISES:
+            raise RuntimeError("broken by the drill")
+        self.signals[DRILLED_CP.field] = self.signals[SLAVE_SERVO_CP.field]
+
+    def load(self) -> Any:
+        """Nothing is compiled."""
+        return lambda: None
+
+
+def _make(_: Any, dt: float) -> _Passing:
+    return _Passing(STAGES.find(STAGE_NAME), 0, dt)
+
+
+def _step_clock(control: Control) -> None:
+    """Let the process read a clock that may be off; what measures durations stays as it is."""
+    right = time.time_ns
+    time.time_ns = lambda: right() + control.offset_ns
+
+
+def _install() -> None:
+    stage = Stage(
+        STAGE_NAME, NoParameters, reads=(SLAVE_SERVO_CP,), writes=(DRILLED_CP,),
+        trigger=SLAVE_SERVO_CP, replaces=SLAVE_SERVO_CP, make=_make,
+    )  # fmt: skip
+    if STAGE_NAME not in STAGES:
+        register_stage(stage)
+    file = os.environ.get(VARIABLE)
+    if file is None:
+        return
+    if not Path(file).is_file():
+        raise PartError("file of a drill", file, "one that the drill has made")
+    _Passing.control = Control(Path(file))
+    _step_clock(_Passing.control)
+
+
+if __name__.startswith("teleop_own_parts"):
+    _install()

@@ -1,0 +1,98 @@
+"""Outcome: what was measured of one fault, and whether it is what was expected."""
+
+import math
+from dataclasses import dataclass, field
+
+from teleop_core.drill.exercise import Cure, Exercise, Motion
+from teleop_core.operation import Fault, State
+
+LARGEST_RATIO = 1.0 + 1e-9
+"""Largest step of a setpoint over what its drive can do, up to rounding."""
+
+
+@dataclass(kw_only=True)
+class Outcome:
+    """One fault and what followed.
+
+    Attributes:
+        exercise: What was done.
+        detected: Time until somebody said so [s]; NaN if nobody did.
+        told_by: Who said so first, and what.
+        state: Operating state that followed; None if the slave was gone.
+        fault: What it told.
+        travel: Farthest that the tip got after the fault [m]; NaN if unknown.
+        bound: What it was allowed [m].
+        ratio: Largest step of a joint setpoint over what its drive can do.
+        recording: What became of the recording; empty until it has been looked at.
+        is_recorded: Whether that is as it should be.
+        recovered: Time from the end of the fault until the arm followed again [s]; NaN if never.
+        cure: What that took.
+        note: What else is to be said.
+        load: Load of the machine over its cores, as the fault began.
+    """
+
+    exercise: Exercise
+    detected: float = math.nan
+    told_by: str = ""
+    state: State | None = None
+    fault: Fault = Fault.NONE
+    travel: float = math.nan
+    bound: float = math.nan
+    ratio: float = 0.0
+    recording: str = ""
+    is_recorded: bool = True
+    recovered: float = math.nan
+    cure: Cure = Cure.NOTHING
+    note: str = ""
+    load: float = 0.0
+    extra: dict[str, float] = field(default_factory=dict)
+
+    def failures(self) -> list[str]:
+        """What is not as expected, in words."""
+        asked, found = self.exercise, []
+        if self.state not in asked.states:
+            wanted = " or ".join(_state(state) for state in asked.states)
+            found.append(f"{_state(self.state)}, not {wanted}")
+        if asked.faults and self.fault not in asked.faults:
+            wanted = " or ".join(fault.word for fault in asked.faults)
+            found.append(f"told {self.fault.word}, not {wanted}")
+        if self.travel > self.bound:
+            found.append(f"the tip moved {1e3 * (self.travel - self.bound):.1f} mm too far")
+        if self.ratio > LARGEST_RATIO:
+            found.append(f"a joint step of {self.ratio:.3f} times the drive's limit")
+        if not self.is_recorded:
+            found.append(f"recording: {self.recording}")
+        if math.isnan(self.recovered):
+            found.append("it did not recover")
+        elif self.cure not in asked.cures:
+            wanted = " or ".join(cure.value for cure in asked.cures)
+            found.append(f"recovered by {self.cure.value}, not {wanted}")
+        return found
+
+    @property
+    def state_text(self) -> str:
+        """State and fault: ``"PAUSED: silence"``."""
+        text = _state(self.state)
+        return text if self.fault is Fault.NONE else f"{text}: {self.fault.word}"
+
+    def to_json(self) -> dict[str, object]:
+        """All of it, in SI units, for a file."""
+        asked = self.exercise
+        return {
+            "fault": asked.name, "text": asked.text, "is_passed": not self.failures(),
+            "failures": self.failures(), "detected_s": _number(self.detected),
+            "told_by": self.told_by, "state": _state(self.state), "told": self.fault.word,
+            "travel_m": _number(self.travel), "travel_bound_m": _number(self.bound),
+            "step_ratio": _number(self.ratio), "recording": self.recording,
+            "recovered_s": _number(self.recovered), "cure": self.cure.value,
+            "goes_on": asked.motion is Motion.GOES_ON, "note": self.note, "load": self.load,
+            **{name: _number(value) for name, value in self.extra.items()},
+        }  # fmt: skip
+
+
+def _state(state: State | None) -> str:
+    return "gone" if state is None else state.name
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else round(value, 9)

@@ -1,0 +1,244 @@
+"""Rig of a drill: all that can be done to a running session, on its topics and to its processes."""
+
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.srv import SetParameters
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from teleop_core.bags.messages import layout
+from teleop_core.drill import inside
+from teleop_core.drill.exercise import Master
+from teleop_core.drill.hand import Distortion
+from teleop_core.geometry import Array
+from teleop_core.nodes.drill_session import DrillSession
+from teleop_core.nodes.drill_tap import Tap
+from teleop_core.nodes.observer import WARNING, Observer
+from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.streams import message_type, profile
+from teleop_core.operation import State
+from teleop_core.operation.states import COMMANDS
+from teleop_core.robots.robot import Robot
+from teleop_core.session.configuration import Configuration
+from teleop_core.topics import SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
+
+_ANSWER = 3.0  # patience with a service [s]
+_FOUND = 3.0  # patience with discovery [s]
+_FRESH = 0.1  # a setpoint that is older is none of a running slave [s]
+
+
+class LiveRig:
+    """A session of processes with the drill's own nodes beside them.
+
+    Args:
+        configuration: What runs.
+        robot: The slave.
+        folder: Where recordings and the drill's own file go.
+        env: Environment of the processes, with their ROS domain.
+        is_composed: Whether all nodes share one process.
+        master: Who moves the hand.
+    """
+
+    def __init__(
+        self, configuration: Configuration, robot: Robot, folder: Path, env: dict[str, str], *,
+        is_composed: bool, master: Master,
+    ) -> None:  # fmt: skip
+        self.is_composed, self._robot = is_composed, robot
+        domain = int(env["ROS_DOMAIN_ID"])
+        self._control = inside.Control.make(folder / "control")
+        env = env | {inside.VARIABLE: str(folder / "control")}
+        self.observer = Observer(domain)
+        self.session = DrillSession(
+            configuration, folder, env, self.observer, is_composed=is_composed, master=master
+        )
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain)
+        self._node, self._own = (self._make_node("drill"), self._make_node("drill_hand"))
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._stop = self._node.create_publisher(Bool, STOP_TOPIC, 10)
+        self._services = {
+            name: self._node.create_client(Trigger, f"/slave/{name}") for name in COMMANDS
+        }
+        self._settings = self._node.create_client(SetParameters, "/slave_sim/set_parameters")
+        self._intruders: dict[str, Any] = {}
+        self.begin_ns, self.warned = 0, dict[str, int]()
+        self.tap = Tap(self._own, robot.joint_names, has_hand=master is Master.DRILL)
+
+    def _make_node(self, name: str) -> Node:
+        return Node(name, context=self._context, use_global_arguments=False, enable_rosout=False)
+
+    def close(self) -> None:
+        """End the processes and leave."""
+        try:
+            self.session.close()
+        finally:
+            self.tap.close()
+            self.observer.__exit__()
+            self._executor.shutdown()
+            self._node.destroy_node()
+            self._own.destroy_node()
+            self._context.try_shutdown()
+
+    # -- what is seen ----------------------------------------------------------------------------
+
+    def mark(self) -> None:
+        """The fault begins now."""
+        self.begin_ns, self.warned = time.time_ns(), {}
+
+    def now_ns(self) -> int:
+        """Time [ns]."""
+        return time.time_ns()
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass [s]; warnings of nodes are noted with their time."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0.0:
+            self.observer.listen(min(left, 0.02))
+            for name, status in tuple(self.observer.statuses.items()):
+                if status.level >= WARNING and name not in self.warned:
+                    age_ns = round(1e9 * (time.monotonic() - status.arrival))
+                    self.warned[name] = time.time_ns() - age_ns
+
+    def setpoint(self) -> Array:
+        """Newest joint setpoint (n,) of the slave [rad or m]."""
+        rows = self.tap.recent(SLAVE_SETPOINT_JS, 1)
+        return np.array(rows[-1] if len(rows) else self._robot.home)
+
+    def operation(self) -> dict[str, float]:
+        """Newest report of the slave's operation; empty before the first."""
+        reports = self.tap.reports(SLAVE_OPERATION)
+        return reports[-1][1] if reports else {}
+
+    def is_following(self) -> bool:
+        """Whether the slave is at work, enabled and homed, and its setpoint moves."""
+        operation = self.operation()
+        if not operation or operation["state"] != State.ENABLED or operation["is_busy"]:
+            return False
+        if self.tap.age(SLAVE_SETPOINT_JS) > _FRESH or not self.session.is_running("slave_sim"):
+            return False
+        rows = self.tap.recent(SLAVE_SETPOINT_JS, 50)
+        moves = np.any(np.diff(rows, axis=0) != 0.0, axis=1)
+        return bool(len(moves) >= 40 and np.mean(moves) > 0.5)
+
+    # -- processes -------------------------------------------------------------------------------
+
+    def kill(self, node: str) -> None:
+        """Kill a node's process."""
+        self.session.send(node, signal.SIGKILL)
+        self.session.await_end(node, 2.0)
+
+    def freeze(self, node: str, seconds: float) -> None:
+        """Stop a node's process for a time [s], then let it go on."""
+        self.session.send(node, signal.SIGSTOP)
+        try:
+            self.wait(seconds)
+        finally:
+            self.session.send(node, signal.SIGCONT)
+
+    def limit_files(self, node: str, room: int | None) -> None:
+        """Let files of a node's process grow by so many bytes only; None: as they like."""
+        self.session.limit_files(node, room)
+
+    def hog(self, seconds: float) -> None:
+        """Keep all cores busy for a time [s]."""
+        self.session.hog()
+        try:
+            self.wait(seconds)
+        finally:
+            self.session.relieve()
+
+    def start_bystander(self) -> None:
+        """Start a ROS process of others that listens to all streams."""
+        self.session.start_bystander()
+
+    def kill_bystander(self) -> None:
+        """Kill it."""
+        self.session.kill_bystander()
+
+    def control(self, word: int, offset_ns: int = 0) -> None:
+        """Say what the drill's own stage does, and by how much all clocks are off [ns]."""
+        self._control.write(word, offset_ns)
+
+    # -- topics ----------------------------------------------------------------------------------
+
+    def distort(self, distortion: Distortion) -> None:
+        """Let something become of the hand's samples on the way."""
+        self.tap.distortion = distortion
+
+    def mute_buttons(self, *, is_mute: bool) -> None:
+        """Send no buttons, or send them again."""
+        self.tap.is_mute = is_mute
+
+    def publish(self, topic: Topic, stamp_ns: int, values: Array) -> None:
+        """Send one message as another publisher of the topic would."""
+        form = layout(topic, self._robot.joint_names)
+        self._intruder(topic).publish(form.encode_one(stamp_ns, values))
+
+    def publish_bytes(self, topic: Topic, data: bytes) -> None:
+        """Send bytes that are no message as another publisher of the topic would."""
+        self._intruder(topic).publish(data)
+
+    def leave(self, topic: Topic) -> None:
+        """Close that other publisher."""
+        publisher = self._intruders.pop(topic.name, None)
+        if publisher is not None:
+            self._own.destroy_publisher(publisher)
+
+    def _intruder(self, topic: Topic) -> Any:
+        """Other publisher of a topic, once somebody hears it; the fault begins with it."""
+        if topic.name not in self._intruders:
+            kind = message_type(topic.kind.ros_type)
+            made = self._own.create_publisher(kind, f"/{topic.name}", profile(topic))
+            self._intruders[topic.name] = made
+            is_first = len(self._intruders) == 1
+            deadline = time.monotonic() + _FOUND
+            while made.get_subscription_count() == 0 and time.monotonic() < deadline:
+                time.sleep(2e-3)
+            if is_first:
+                self.mark()
+        return self._intruders[topic.name]
+
+    def press(self, *, is_pressed: bool) -> None:
+        """Send a message of the stop button."""
+        deadline = time.monotonic() + _FOUND
+        while self._stop.get_subscription_count() == 0 and time.monotonic() < deadline:
+            time.sleep(2e-3)
+        if is_pressed:
+            self.mark()
+        self._stop.publish(Bool(data=is_pressed))
+
+    # -- services --------------------------------------------------------------------------------
+
+    def command(self, name: str) -> bool:
+        """Ask the slave for something by service; whether it was done."""
+        found = self._call(self._services[name], Trigger.Request())
+        return bool(found is not None and found.success)
+
+    def set(self, node: str, name: str, value: object) -> bool:
+        """Set a parameter of a running node; whether it was taken."""
+        assert node == "slave_sim", node
+        entry = (
+            Parameter(name, Parameter.Type.DOUBLE_ARRAY, [])
+            if value == []
+            else Parameter(name, value=value)
+        )
+        request = SetParameters.Request(parameters=[entry.to_parameter_msg()])
+        found = self._call(self._settings, request)
+        return bool(found is not None and all(one.successful for one in found.results))
+
+    def _call(self, client: Any, request: Any) -> Any:
+        """Answer of a service; None if there is none in time."""
+        if not client.wait_for_service(_FOUND):
+            return None
+        future = client.call_async(request)
+        self._executor.spin_until_future_complete(future, _ANSWER)
+        return future.result() if future.done() else None
