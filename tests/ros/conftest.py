@@ -25,7 +25,8 @@ from middleware_faults import MiddlewareLossError, check_end
 from teleop_core.bags.messages import discover, layout
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.observer import Observer
-from teleop_core.nodes.streams import Subscription, message_type, profile
+from teleop_core.nodes.quality import profile
+from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot
 from teleop_core.topics import Topic
 

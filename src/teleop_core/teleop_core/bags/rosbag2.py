@@ -18,7 +18,7 @@ from teleop_core.topics import Quality, Topic
 VERSION = 9
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _QUALITIES = {
-    Quality.STREAM: ("best_effort", "volatile", 1),
+    Quality.STREAM: ("reliable", "volatile", 1),
     Quality.LATCHED: ("reliable", "transient_local", 1),
     Quality.REPORT: ("reliable", "volatile", 10),
 }

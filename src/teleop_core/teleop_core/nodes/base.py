@@ -21,9 +21,10 @@ from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.loop import PATIENCE, Loop
 from teleop_core.nodes.ports import NO_PORTS, Ports
+from teleop_core.nodes.quality import PREFIX, QualityOverrides, profile
 from teleop_core.nodes.rate import Recent, Schedule, TickCounts
 from teleop_core.nodes.real_time import apply_options
-from teleop_core.nodes.streams import Input, Unattended, message_type, profile
+from teleop_core.nodes.streams import Input, Unattended, message_type
 from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.layers import RealTimeParameters
 from teleop_core.session.runner import report_of
@@ -119,6 +120,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
             raise _sim_time(self.member_name)
         self.description, self._groups = stage, (NodeParameters, group or stage.parameters)
         self._specs = {spec.name: spec for entry in self._groups for spec in specs(entry)}
+        given = {name: entry.value for name, entry in self._parameter_overrides.items()}
+        self.overrides = QualityOverrides(given)
         self.options, self.parameters = self._built(self._overrides())
         declare(self, self._specs.values(), values_of(self.options) | values_of(self.parameters))
         self.add_pre_set_parameters_callback(self._type_empty_lists)
@@ -230,7 +233,9 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
     def open_publisher(self, topic: Topic) -> Any:
         """Publisher that is silent unless the node is active, and closed at cleanup."""
         kind = message_type(topic.kind.ros_type)
-        publisher = self.create_lifecycle_publisher(kind, topic.name, profile(topic))
+        name = self.resolve_topic_name(topic.name)
+        offered = self.overrides.apply(name, "publisher", profile(topic))
+        publisher = self.create_lifecycle_publisher(kind, topic.name, offered)
         self._own_publishers.append(publisher)
         return publisher
 
@@ -415,7 +420,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         return {
             name: plain(self._specs.get(name), entry.value)
             for name, entry in given
-            if not self.has_parameter(name) and not name.startswith("qos_overrides.")
+            if not self.has_parameter(name) and not name.startswith(PREFIX)
         }
 
     def _built(self, values: dict[str, Any]) -> tuple[NodeParameters, Any]:
@@ -508,7 +513,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         concerns = self._reporter.input_concerns(inputs)
         concerns += self.ports.concerns()
         if is_active:
-            concerns += self.concerns()
+            concerns += self.overrides.concerns() + self.concerns()
             concerns += getattr(self.stage, "concerns", list)()
         elif self._word == "failed":
             concerns.append("failed; see its log")

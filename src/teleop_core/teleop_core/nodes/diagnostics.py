@@ -7,8 +7,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.duration import Duration
 from rclpy.node import Node
 
+from teleop_core.nodes.quality import NO_OVERRIDES, profile
 from teleop_core.nodes.rate import Recent, TickCounts
-from teleop_core.nodes.streams import Input, profile
+from teleop_core.nodes.streams import Input
 from teleop_core.topics import DIAGNOSTICS
 
 
@@ -21,8 +22,9 @@ class Reporter:
 
     def __init__(self, node: Node) -> None:
         self._node = node
+        name, overrides = f"/{DIAGNOSTICS.name}", getattr(node, "overrides", NO_OVERRIDES)
         self._publisher = node.create_publisher(
-            DiagnosticArray, f"/{DIAGNOSTICS.name}", profile(DIAGNOSTICS)
+            DiagnosticArray, name, overrides.apply(name, "publisher", profile(DIAGNOSTICS))
         )
         self._last_time, self._last_ticks = time.monotonic(), 0
         self._last_refused: dict[str, int] = {}

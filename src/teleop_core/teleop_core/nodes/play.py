@@ -20,7 +20,8 @@ from rosgraph_msgs.msg import Clock
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import ParameterError, RecordingError
 from teleop_core.nodes.discovery import choose_transport
-from teleop_core.nodes.streams import message_type, profile
+from teleop_core.nodes.quality import profile
+from teleop_core.nodes.streams import message_type
 from teleop_core.topics import BY_NAME, Quality
 
 CLOCK = "clock"

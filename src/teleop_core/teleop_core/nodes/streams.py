@@ -18,7 +18,6 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from teleop_core.bags.messages import (
     BUTTONS,
@@ -33,13 +32,14 @@ from teleop_core.bags.messages import (
     report,
 )
 from teleop_core.geometry import Array
-from teleop_core.topics import NO_COMMAND_NS, Kind, Quality, Topic
+from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
+from teleop_core.nodes.quality import profile as profile  # noqa: PLC0414  for importers of both
+from teleop_core.topics import NO_COMMAND_NS, Kind, Topic
 
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""
 _WAITING = 20
 """Messages that wait for a late reader: a stage that answers each of them loses none by 20 ms."""
-_DEPTHS = {Quality.STREAM: 1, Quality.LATCHED: 1, Quality.REPORT: 10}
 
 
 def message_type(ros_type: str) -> Any:
@@ -51,17 +51,6 @@ def message_type(ros_type: str) -> Any:
     """
     package, _, name = ros_type.split("/")
     return getattr(import_module(f"{package}.msg"), name)
-
-
-def profile(topic: Topic, depth: int | None = None) -> QoSProfile:
-    """How a topic is transported; ``depth`` in place of the topic's own for deep queues."""
-    is_stream, is_latched = topic.quality is Quality.STREAM, topic.quality is Quality.LATCHED
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth or _DEPTHS[topic.quality],
-        reliability=ReliabilityPolicy.BEST_EFFORT if is_stream else ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE,
-    )
 
 
 class Unattended(CallbackGroup):
@@ -92,8 +81,11 @@ class Subscription:
     def __init__(self, node: Node, topic: Topic, name: str, depth: int | None = None) -> None:
         self.topic, self._node = topic, node
         self.type = message_type(topic.kind.ros_type)
+        overrides: QualityOverrides = getattr(node, "overrides", NO_OVERRIDES)
+        wanted = profile(topic, depth, "subscription")
+        wanted = overrides.apply(node.resolve_topic_name(name), "subscription", wanted)
         self._own = node.create_subscription(
-            self.type, name, _ignore, profile(topic, depth), raw=True,
+            self.type, name, _ignore, wanted, raw=True,
             callback_group=Unattended(),
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )  # fmt: skip

@@ -1,0 +1,111 @@
+"""Quality: how topics are transported, by default and as ``qos_overrides`` parameters say.
+
+ROS's own way: ``qos_overrides./slave/measured_js.publisher.reliability: best_effort`` in a
+parameter file or behind ``--ros-args -p`` changes one policy of the publisher or subscription that
+a node has for a topic, by its full name.
+"""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from teleop_core.errors import ParameterError
+from teleop_core.topics import Quality, Topic
+
+PREFIX = "qos_overrides."
+Side = Literal["publisher", "subscription"]
+_SIDES: tuple[Side, ...] = ("publisher", "subscription")
+_DEPTHS = {Quality.STREAM: 1, Quality.LATCHED: 1, Quality.REPORT: 10}
+_CHOICES: dict[str, dict[str, object]] = {
+    "reliability": {
+        "reliable": ReliabilityPolicy.RELIABLE, "best_effort": ReliabilityPolicy.BEST_EFFORT,
+    },
+    "durability": {
+        "volatile": DurabilityPolicy.VOLATILE, "transient_local": DurabilityPolicy.TRANSIENT_LOCAL,
+    },
+    "history": {"keep_last": HistoryPolicy.KEEP_LAST, "keep_all": HistoryPolicy.KEEP_ALL},
+}  # fmt: skip
+_DEPTH_MAX = 100_000
+
+
+def profile(topic: Topic, depth: int | None = None, side: Side = "publisher") -> QoSProfile:
+    """How a topic is transported, before overrides.
+
+    A stream is offered reliable, so that subscribers of both kinds get it, and asked for best
+    effort by our own readers, which want the newest sample alone and hear senders of both kinds.
+
+    Args:
+        topic: The topic.
+        depth: In place of the topic's own, for deep queues.
+        side: Which end of it.
+    """
+    is_stream, is_latched = topic.quality is Quality.STREAM, topic.quality is Quality.LATCHED
+    is_best_effort = is_stream and side == "subscription"
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth or _DEPTHS[topic.quality],
+        reliability=ReliabilityPolicy.BEST_EFFORT if is_best_effort else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+class QualityOverrides:
+    """The ``qos_overrides`` of one node.
+
+    Args:
+        given: All parameters that the node was given.
+
+    Raises:
+        ParameterError: One has another form, or another value, than there can be.
+    """
+
+    def __init__(self, given: Mapping[str, object]) -> None:
+        self._values = {
+            name: _checked(name, value) for name, value in given.items() if name.startswith(PREFIX)
+        }
+        self._used: set[str] = set()
+
+    def apply(self, name: str, side: Side, base: QoSProfile) -> QoSProfile:
+        """Profile of one end of a topic with its full name, changed in place and returned."""
+        for key, (policy, value) in self._values.items():
+            if key.startswith(f"{PREFIX}{name}.{side}."):
+                setattr(base, policy, value)
+                self._used.add(key)
+        return base
+
+    def unused(self) -> list[str]:
+        """Overrides of topics that were not opened, sorted."""
+        return sorted(set(self._values) - self._used)
+
+    def concerns(self) -> list[str]:
+        """What was given and has no effect, in words."""
+        unused = self.unused()
+        return [f"no effect of {', '.join(unused)}: no such topic is open here"] if unused else []
+
+
+NO_OVERRIDES = QualityOverrides({})
+"""Those of a node that was given none."""
+
+
+def _checked(name: str, value: object) -> tuple[str, object]:
+    """Policy and value of one override."""
+    topic, _, policy = name.removeprefix(PREFIX).rpartition(".")
+    topic, _, side = topic.rpartition(".")
+    if not topic.startswith("/") or side not in _SIDES:
+        form = f"{PREFIX}/TOPIC.{'|'.join(_SIDES)}.{'|'.join((*_CHOICES, 'depth'))}"
+        raise ParameterError(name, value, f"named {form}, with the topic's full name")
+    if policy == "depth":
+        return policy, _depth(name, value)
+    if policy not in _CHOICES:
+        raise ParameterError(name, value, f"one of {', '.join((*_CHOICES, 'depth'))}, by its name")
+    choices = _CHOICES[policy]
+    if not isinstance(value, str) or value not in choices:
+        raise ParameterError(name, value, f"one of {', '.join(choices)}")
+    return policy, choices[value]
+
+
+def _depth(name: str, value: object) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= _DEPTH_MAX:
+        raise ParameterError(name, value, f"a whole number from 1 to {_DEPTH_MAX}")
+    return value
