@@ -13,8 +13,8 @@ OPERATION = (
 )  # fmt: skip
 """Numbers of ``slave/operation``: :class:`~teleop_core.operation.State`, flags,
 :class:`~teleop_core.operation.Fault`, the joint that it is about (-1: none), what was found and
-what it must not exceed; since it last stopped to move: time until it was at rest [s] and the farthest
-that the tip got meanwhile [m], both 0 until then."""
+what it must not exceed; since it last had to stop: the time until it was at rest [s] and how far
+the tip got meanwhile [m], both 0 until then."""
 
 
 class Quality(Enum):

@@ -16,6 +16,7 @@ from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.leftovers import remove_leftovers
 from teleop_core.nodes.observer import WARNING, Observer, Status
+from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION
@@ -68,6 +69,7 @@ def live(
         tempfile.TemporaryFile("w+") as parameters,
         interrupt.caught(),
         Observer(int(env["ROS_DOMAIN_ID"])) as observer,
+        announced(int(env["ROS_DOMAIN_ID"])),
     ):
         parameters.write(parameter_file(configuration, str(out)))
         parameters.flush()

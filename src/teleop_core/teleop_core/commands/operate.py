@@ -1,0 +1,112 @@
+"""``teleop stop`` and ``teleop operate``: stop arms, command their states, see how they are."""
+
+import argparse
+import os
+from typing import TYPE_CHECKING, Any
+
+from teleop_core.commands.arguments import command, ros_module
+from teleop_core.errors import SessionError
+from teleop_core.operation.states import COMMANDS
+
+if TYPE_CHECKING:
+    from teleop_core.nodes.operator import ArmState, Operator
+
+_STOP = """\
+stops all arms of all `teleop live` sessions of this machine, or of one ROS domain:
+  teleop stop
+  teleop stop --domain 42
+the stop is latched. To go on: release it, reset and enable each arm:
+  teleop operate release reset enable
+"""
+_OPERATE = """\
+without commands it says how the arms are; commands are sent one after the other:
+  teleop operate
+  teleop operate enable home                 an arm that waits for people
+  teleop operate release reset enable        after an emergency stop
+  teleop operate pause --arm left            one arm of several
+commands: release, """ + ", ".join(COMMANDS)
+
+
+def add(commands: Any) -> None:
+    """Add the parsers of both commands."""
+    stop = command(commands, "stop", _stop, "emergency stop of the arms that run here")
+    stop.epilog, stop.formatter_class = _STOP, argparse.RawDescriptionHelpFormatter
+    operate = command(commands, "operate", _operate, "enable, home, pause or reset arms; or see")
+    operate.epilog, operate.formatter_class = _OPERATE, argparse.RawDescriptionHelpFormatter
+    operate.add_argument("words", nargs="*", metavar="COMMAND", help="see below")
+    operate.add_argument("--arm", help="namespace of one arm (default: all)")
+    for parser in (stop, operate):
+        parser.add_argument(
+            "--domain", type=int, metavar="N",
+            help="ROS domain (default: ROS_DOMAIN_ID, or those of all sessions of this machine)",
+        )  # fmt: skip
+
+
+def _domains(arguments: argparse.Namespace) -> tuple[int, ...]:
+    """Domains that are meant.
+
+    Raises:
+        SessionError: None is named, and no session runs here.
+    """
+    if arguments.domain is not None:
+        return (arguments.domain,)
+    if "ROS_DOMAIN_ID" in os.environ:
+        return (int(os.environ["ROS_DOMAIN_ID"]),)
+    from teleop_core.nodes.sessions import domains
+
+    found = domains()
+    if not found:
+        raise SessionError("no `teleop live` runs on this machine; name a ROS domain: --domain N")
+    return found
+
+
+def _operators(arguments: argparse.Namespace) -> "list[Operator]":
+    from teleop_core.nodes.children import environment
+
+    module = ros_module("operator")
+    environment()
+    return [module.Operator(domain) for domain in _domains(arguments)]
+
+
+def _stop(arguments: argparse.Namespace) -> int:
+    failed = False
+    for one in _operators(arguments):
+        with one as operator:
+            try:
+                arms = operator.stop()
+            except SessionError as error:
+                print(error)
+                failed = True
+                continue
+            for name, arm in arms.items():
+                print(f"{name or 'arm'}: {_stopped(arm)}")
+    return 1 if failed else 0
+
+
+def _stopped(arm: "ArmState") -> str:
+    """How an arm stopped, with its times."""
+    values = arm.values
+    return (
+        f"stopped, confirmed after {1e3 * arm.stopped_after:.0f} ms; at rest "
+        f"{1e3 * values['rest_time']:.0f} ms after the message, {1e3 * values['travel']:.2f} mm on"
+    )
+
+
+def _operate(arguments: argparse.Namespace) -> int:
+    code = 0
+    for one in _operators(arguments):
+        with one as operator:
+            names = [arguments.arm] if arguments.arm is not None else list(operator.look())
+            for word in arguments.words:
+                if word == "release":
+                    operator.release()
+                    print("release: the emergency stop is not pressed")
+                    continue
+                for name in names:
+                    is_done, text = operator.command(word, name)
+                    print(f"{name or 'arm'}: {text}")
+                    code = code or (0 if is_done else 1)
+            if not arguments.words:
+                for name, arm in operator.arms.items():
+                    print(f"{name or 'arm'} on ROS domain {operator.domain}: {arm.text}")
+    return code
