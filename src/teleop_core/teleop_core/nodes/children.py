@@ -133,7 +133,7 @@ class Child:
         if words:
             self._heard, self.doing = time.monotonic(), words[-1].decode()
         silence = time.monotonic() - self._heard
-        patience = _STILL if self.doing in {"at work", "ending"} else _STILL_STARTING
+        patience = _STILL if self.doing in {"at work", "ending", "leaving"} else _STILL_STARTING
         return silence if silence > patience else 0.0
 
     def last_words(self) -> str:

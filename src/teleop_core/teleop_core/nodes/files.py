@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import yaml
 
@@ -62,7 +62,15 @@ class _Plain(yaml.SafeDumper):
 
 
 def _copy(content: dict[str, Any]) -> str:
-    return temporary_file(yaml.dump(content, Dumper=_Plain, allow_unicode=True, sort_keys=False))
+    """Place of a copy for this process, in a file without a name: nothing can stay of it."""
+    file = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
+    yaml.dump(content, file, Dumper=_Plain, allow_unicode=True, sort_keys=False)
+    file.flush()
+    _copies.append(file)  # it is there as long as it is open
+    return f"/dev/fd/{file.fileno()}"
+
+
+_copies: list[IO[str]] = []
 
 
 def temporary_file(text: str) -> str:

@@ -3,7 +3,6 @@
 import atexit
 import gc
 import os
-import signal
 import sys
 import traceback
 from collections.abc import Callable
@@ -20,7 +19,7 @@ from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.discovery import beyond_this_machine, choose_transport
 from teleop_core.nodes.files import checked_arguments
 from teleop_core.nodes.parent import Parent
-from teleop_core.nodes.watch import ENDS, Crew, Watch, signal_pipe
+from teleop_core.nodes.watch import Crew, Watch, signal_pipe
 
 _BAD_ARGUMENTS = (
     rclpy_implementation.RCLError,
@@ -58,16 +57,13 @@ def run(make_crew: Callable[[], Crew]) -> int:
     sys.setswitchinterval(2e-4)
     watch = Watch(crew, signals, parent)
     code = _serve(crew, watch)
-    watch.close()
-    if parent is not None:
-        parent.close()
-    if code:
-        _leave(code)
-    for number in ENDS:  # the interpreter would die of another one on its last way
-        signal.signal(number, signal.SIG_IGN)
-    for node in crew.nodes:
-        node.destroy_node()
-    return _finish(code)
+    if not code:
+        watch.word = "leaving"  # all that matters is done
+        for node in crew.nodes:
+            node.destroy_node()
+        _finish(code)
+    _leave(code)
+    return code
 
 
 def _serve(crew: Crew, watch: Watch) -> int:
@@ -135,12 +131,13 @@ def _finish(code: int) -> int:
 
 
 def _leave(code: int) -> None:
-    """End the process without closing its topics one by one.
+    """End the process, whatever its other threads are doing, and without what Python tidies up.
 
-    Fast DDS 2.14 crashes now and then (StatefulWriter::matched_reader_add) when a writer goes
-    while others are being discovered, as in a node that fails right after its start; its exit
-    code would be lost. A thread that hangs would be waited for.
+    After a failure topics are not even closed one by one: Fast DDS 2.14 crashes now and then
+    (StatefulWriter::matched_reader_add) when a writer goes while others are being discovered, as
+    in a node that fails right after its start; its exit code would be lost.
     """
+    sys.stdout.flush()
     sys.stderr.flush()
     atexit._run_exitfuncs()
     os._exit(code)

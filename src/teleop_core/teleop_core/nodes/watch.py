@@ -23,6 +23,7 @@ ENDS = tuple(
 """Signals that ask for an orderly end: Ctrl-C, a supervisor, a closed terminal, Ctrl-\\."""
 _PERIOD = 0.1
 _END_PATIENCE = 4.0  # until the main thread turns to the end
+_LEAVE_PATIENCE = 5.0  # until the middleware has let go
 _FLUSH_PATIENCE = 20.0  # until it has brought it about; a slow disk may need some
 
 
@@ -60,7 +61,7 @@ def signal_pipe() -> int:
 
 
 class Watch:
-    """Watching thread of a process; works from its making until :meth:`close`.
+    """Watching thread of a process; works from its making to the end of the process.
 
     Args:
         crew: What is watched.
@@ -68,7 +69,7 @@ class Watch:
         parent: Line to the parent, if there is one.
 
     Attributes:
-        word: What the process is doing: starting, at work, ending.
+        word: What the process is doing: starting, at work, ending, leaving.
     """
 
     def __init__(self, crew: Crew, signals: int, parent: Parent | None) -> None:
@@ -77,20 +78,15 @@ class Watch:
         self._first = crew.nodes[0]
         self._still: dict[Loop, tuple[int, int]] = {}
         self._asked: float | None = None
-        self._is_over = False
+        self._leaving = 0
         self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
         self._thread.start()
-
-    def close(self) -> None:
-        """Stop to watch: the end has been brought about."""
-        self._is_over = True
-        self._thread.join()
 
     def _run(self) -> None:
         files: list[int | Parent] = [self._signals]
         if self._parent is not None:
             files.append(self._parent)
-        while not self._is_over:
+        while True:
             ready = select.select(files, (), (), _PERIOD)[0]
             if self._signals in ready:
                 os.read(self._signals, 64)
@@ -106,14 +102,24 @@ class Watch:
         """What is done ten times a second."""
         if self._parent is not None:
             self._parent.tell(self._doing())
+        if self._asked is None and self._first.ended.done():  # a loop of its own failed
+            self._asked = time.monotonic()
         if is_compiling():
             self._still.clear()
         elif self._asked is None:
             self._find_hung()
-        if self._asked is not None:
+        if self.word == "leaving":
+            self._await_leave()
+        elif self._asked is not None:
             patience = _FLUSH_PATIENCE if self.word == "ending" else _END_PATIENCE
             if time.monotonic() - self._asked > patience:
                 self._leave()
+
+    def _await_leave(self) -> None:
+        """End the process well if the middleware holds it up: all that matters is done."""
+        self._leaving += 1
+        if self._leaving * _PERIOD > _LEAVE_PATIENCE:
+            os._exit(0)
 
     def _doing(self) -> str:
         count = compiled_count()
