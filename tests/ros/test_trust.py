@@ -1,8 +1,11 @@
 """Trust: whatever anybody publishes, nodes go on and say what they refuse."""
 
+import numpy as np
 import pytest
 
 from teleop_core import topics
+from teleop_core.bags.messages import layout
+from teleop_core.nodes.streams import message_type
 from teleop_core.stage import STAGES
 
 pytestmark = pytest.mark.ros
@@ -39,3 +42,41 @@ def test_who_watches_a_session_passes_reports_over_that_are_none(peer):
     peer.wait(counted, "malformed reports")
     peer.observer.statuses.clear()
     peer.wait(lambda: peer.status("motion_scaling"), "a further report")
+
+
+def test_a_second_master_is_refused_and_the_first_one_goes_on(peer):
+    peer.start("motion_scaling")
+    first = peer.publisher(topics.MASTER_MEASURED_CP)
+    kind = message_type(topics.MASTER_MEASURED_CP.kind.ros_type)
+    second = peer.node.create_publisher(kind, topics.MASTER_MEASURED_CP.name, 10)
+    form = layout(topics.MASTER_MEASURED_CP, ())
+    stamp, pose = 0, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    for _ in range(300):  # so that their numbers are apart
+        stamp += 1
+        first.publish(form.encode_one(stamp, pose))
+
+    def refused():
+        nonlocal stamp
+        stamp += 2
+        first.publish(form.encode_one(stamp, pose))
+        second.publish(form.encode_one(stamp + 1, pose))
+        values = peer.status("motion_scaling").values
+        return int(values.get("refused.master/measured_cp.second_publisher", "0")) > 100
+
+    peer.wait(refused, "refusals of the second one")
+    status = peer.status("motion_scaling")
+    assert "2 publishers on master/measured_cp" in status.message
+    assert "is from a second publisher" in status.message
+    assert status.number("received.master/measured_cp") > 200
+    assert status.number("rate_hz.master/measured_cp") > 0.0
+
+
+def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer):
+    peer.start("motion_scaling")
+    pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+
+    def told():
+        peer.send(topics.MASTER_MEASURED_CP, 0, pose)
+        return "its stamps are 0: stamp each" in peer.status("motion_scaling").message
+
+    peer.wait(told, "the advice")

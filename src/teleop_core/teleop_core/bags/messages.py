@@ -50,6 +50,8 @@ class Refusal(Enum):
         "set joy_buttons=[0, -1, 1]"
     )
     MALFORMED = "has bytes that are no message of its type"
+    SECOND_PUBLISHER = "is from a second publisher, while the first one sends"
+    FLOOD = "came faster than flood_rate allows"
 
 
 def check(kind: Kind, stamp_ns: int, values: Values, last_stamp_ns: int | None) -> Refusal | None:

@@ -24,6 +24,7 @@ from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import PREFIX, QualityOverrides, profile
 from teleop_core.nodes.rate import Recent, Schedule, TickCounts
 from teleop_core.nodes.real_time import apply_options
+from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Input, Unattended, message_type
 from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.layers import RealTimeParameters
@@ -63,7 +64,24 @@ class NodeParameters:
         doc="which buttons of an incoming Joy are clutch, fixture and mode, counted from 0; "
         "-1: it has none",
     )  # fmt: skip
+    second_publisher: str = parameter(
+        "refuse", choices=("refuse", "fault"), fixed=True,
+        doc="when a second publisher sends on a topic that is read: its messages are refused and "
+        "counted, or that is a fault too",
+    )  # fmt: skip
+    owner_silence: float = parameter(
+        0.5, unit="s", lower=0.0, upper=60.0, fixed=True, source="assumed",
+        doc="who owns a topic must be silent for longer before another publisher may take it",
+    )  # fmt: skip
+    flood_rate: int = parameter(
+        5000, unit="1/s", lower=1, upper=1_000_000, fixed=True, source="assumed",
+        doc="messages of one topic beyond so many a second are refused",
+    )  # fmt: skip
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
+
+    def sender(self) -> Sender:
+        """Check of the sender of one topic that is read."""
+        return Sender(self.flood_rate, self.owner_silence)
 
     def feeds(self, port: str) -> list[tuple[str, float]]:
         """Topics that feed a port, each with its delay [s].
@@ -519,8 +537,13 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
             concerns.append("failed; see its log")
         rate = self._reporter.rate(self.counts.ticks)
         values = tick_values(self._word, rate, self.counts, TICK_NS * 1e-6)
-        values |= input_values(inputs)
+        values |= input_values(inputs) | self._reporter.rates(inputs)
         values |= {f"sent.{t.name}": str(o.sent) for t, o in self.ports.outputs.items()}
+        if step := self._reporter.clock_step():
+            concerns.append(f"the clock was stepped by {step:+.3f} s: ages begin anew")
+            for entry in inputs:
+                entry.sender.clear_ages()
+            self.delay.clear()
         values |= recent_values("lateness", self.schedule.lateness)
         values |= recent_values("delay", self.delay) | (self.values() if is_active else {})
         self._reporter.send(concerns, self._word, values)

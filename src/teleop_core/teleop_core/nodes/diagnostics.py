@@ -1,16 +1,22 @@
 """Diagnostics: what a node says about itself once a second."""
 
 import time
+from collections import Counter
 from collections.abc import Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.duration import Duration
 from rclpy.node import Node
 
+from teleop_core.bags.messages import Refusal
 from teleop_core.nodes.quality import NO_OVERRIDES, profile
 from teleop_core.nodes.rate import Recent, TickCounts
+from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Input
 from teleop_core.topics import DIAGNOSTICS
+
+_STEP_NS = 50_000_000
+"""A clock that moves by more against the monotonic one within a second was stepped [ns]."""
 
 
 class Reporter:
@@ -26,8 +32,16 @@ class Reporter:
         self._publisher = node.create_publisher(
             DiagnosticArray, name, overrides.apply(name, "publisher", profile(DIAGNOSTICS))
         )
-        self._last_time, self._last_ticks = time.monotonic(), 0
-        self._last_refused: dict[str, int] = {}
+        self._last_time, self._last_ticks, self._elapsed = time.monotonic(), 0, 1.0
+        self._last_refused: dict[Input, Counter[Refusal]] = {}
+        self._last_received: dict[Input, int] = {}
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
+
+    def clock_step(self) -> float:
+        """By how much the system's clock was stepped since the last call [s]; 0 if it was not."""
+        offset_ns = time.time_ns() - time.monotonic_ns()
+        step_ns, self._offset_ns = offset_ns - self._offset_ns, offset_ns
+        return step_ns * 1e-9 if abs(step_ns) > _STEP_NS else 0.0
 
     def flush(self) -> None:
         """Wait a moment until the last report has arrived."""
@@ -36,7 +50,8 @@ class Reporter:
     def rate(self, ticks: int) -> float:
         """Ticks per second since the last call."""
         now = time.monotonic()
-        rate = (ticks - self._last_ticks) / max(now - self._last_time, 1e-3)
+        self._elapsed = max(now - self._last_time, 1e-3)
+        rate = (ticks - self._last_ticks) / self._elapsed
         self._last_time, self._last_ticks = now, max(ticks, 0)
         return max(rate, 0.0)
 
@@ -44,16 +59,27 @@ class Reporter:
         """What is wrong with what came in since the last call, in words."""
         concerns = []
         for entry in inputs:
-            publishers = entry.publishers()
+            name, publishers = entry.topic.name, entry.publishers()
             if publishers > 1:
-                concerns.append(f"{publishers} publishers on {entry.topic.name}, must be one")
-            total = entry.refused.total()
-            new = total - self._last_refused.get(entry.topic.name, 0)
-            self._last_refused[entry.topic.name] = total
-            if new > 0:
-                reasons = " or ".join(reason.value for reason in entry.refused)
-                concerns.append(f"refused {new} of {entry.topic.name}: each {reasons}")
+                concerns.append(f"{publishers} publishers on {name}, must be one")
+            new = entry.refused - self._last_refused.get(entry, Counter())
+            self._last_refused[entry] = entry.refused.copy()
+            if new:
+                reasons = " or ".join(reason.value for reason in new)
+                concerns.append(f"refused {new.total()} of {name}: each {reasons}")
+            concerns += entry.sender.concerns(name)
+            if publishers == 1 and new[Refusal.SECOND_PUBLISHER]:
+                entry.sender.release()
         return concerns
+
+    def rates(self, inputs: list[Input]) -> dict[str, str]:
+        """Messages a second at each input, of the time that :meth:`rate` was last of."""
+        values = {}
+        for entry in inputs:
+            new = entry.received - self._last_received.get(entry, 0)
+            self._last_received[entry] = entry.received
+            values[f"rate_hz.{entry.topic.name}"] = f"{new / self._elapsed:.1f}"
+        return values
 
     def send(self, concerns: list[str], text: str, values: Mapping[str, str]) -> None:
         """Publish one status: a warning if there are concerns."""
@@ -88,7 +114,20 @@ def input_values(inputs: list[Input]) -> dict[str, str]:
         for reason, count in entry.refused.items():
             key = f"refused.{entry.topic.name}.{reason.name.lower()}"
             values[key] = str(count)
+        values |= sender_values(entry.topic.name, entry.sender)
     return values
+
+
+def sender_values(name: str, sender: Sender) -> dict[str, str]:
+    """Names and texts of what the numbers and stamps of a topic's messages tell."""
+    _, high, most = sender.ages.summary()
+    return {
+        f"gaps.{name}": str(sender.gaps),
+        f"repeats.{name}": str(sender.repeats),
+        f"reordered.{name}": str(sender.reordered),
+        f"age_ms.{name}.p99": f"{high * 1e-6:.3f}",
+        f"age_ms.{name}.max": f"{most * 1e-6:.3f}",
+    }
 
 
 def recent_values(name: str, numbers_ns: Recent) -> dict[str, str]:

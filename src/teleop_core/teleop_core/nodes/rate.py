@@ -43,6 +43,10 @@ class Recent:
         self._numbers[self._count % len(self._numbers)] = number
         self._count += 1
 
+    def clear(self) -> None:
+        """Forget all."""
+        self._count = 0
+
     def summary(self) -> tuple[float, float, float]:
         """Median, 99th percentile and maximum; zeros without numbers."""
         kept = self._numbers[: self._count]

@@ -34,6 +34,7 @@ from teleop_core.bags.messages import (
 from teleop_core.geometry import Array
 from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
 from teleop_core.nodes.quality import profile as profile  # noqa: PLC0414  for importers of both
+from teleop_core.nodes.sender import Sender
 from teleop_core.topics import NO_COMMAND_NS, Kind, Topic
 
 SILENCE_NS = 2_000_000_000
@@ -136,6 +137,7 @@ class Input:
         arrival_ns: Monotonic time at which it was taken [ns].
         received: Number of messages taken, sound or not.
         refused: Number of unsound messages, by reason.
+        sender: What is known of who sends them.
     """
 
     def __init__(
@@ -160,8 +162,16 @@ class Input:
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, Values]] = deque()
         self.received, self.refused = 0, Counter[Refusal]()
+        options = getattr(node, "options", None)
+        self.sender = options.sender() if options is not None else Sender()
+        self._is_fault = options is not None and options.second_publisher == "fault"
         self.stamp_ns: int | None = None
         self.arrival_ns = 0
+
+    @property
+    def conflict(self) -> bool:
+        """Whether a second publisher was heard where that is a fault, until :meth:`forget`."""
+        return self._is_fault and self.sender.conflict
 
     @property
     def delay(self) -> float:
@@ -191,6 +201,10 @@ class Input:
         """Next message of the subscription that can be read."""
         while self.subscription is not None and (taken := self.subscription.take()) is not None:
             self.received += 1
+            number = taken[1]["publication_sequence_number"]
+            if reason := self.sender.admit(number, time.monotonic_ns()):
+                self.refused[reason] += 1
+                continue
             known = None
             if self._layout is not None and self._has_own_order:
                 known = self._layout.decode_one(taken[0])
@@ -221,7 +235,13 @@ class Input:
         reason = check(self.topic.kind, stamp_ns, values, last_ns)
         if reason is not None:
             self.refused[reason] += 1
+            if reason is Refusal.NOT_NEWER and last_ns is not None:
+                self.sender.note_old(stamp_ns, last_ns)
             return False
+        if may_repeat:
+            self.sender.fault = None
+        else:
+            self.sender.note_stamp(stamp_ns, time.time_ns())
         self._target[:] = values
         self.stamp_ns, self.arrival_ns = stamp_ns, now_ns
         return True
@@ -243,6 +263,7 @@ class Input:
         while self.subscription is not None and self.subscription.take() is not None:
             pass
         self._held.clear()
+        self.sender.forget()
         self._is_new = False
         self.stamp_ns = None
         self.arrival_ns = 0

@@ -1,0 +1,116 @@
+"""Sender: one owner per topic, told by the numbers of messages; floods; stamps that say nothing."""
+
+from teleop_core.bags.messages import Refusal
+from teleop_core.nodes.sender import Sender
+
+MS, SECOND = 1_000_000, 1_000_000_000
+BEGIN = 77 * SECOND
+
+
+def feed(sender, numbers, begin=BEGIN, step=MS):
+    """What is answered to messages one step apart."""
+    return [sender.admit(number, begin + i * step) for i, number in enumerate(numbers)]
+
+
+def test_a_sender_of_consecutive_numbers_is_the_owner_and_loses_nothing():
+    sender = Sender()
+    assert feed(sender, range(40, 240)) == [None] * 200
+    assert (sender.gaps, sender.owners, sender.conflict) == (0, 1, False)
+
+
+def test_numbers_that_are_missing_are_counted():
+    sender = Sender()
+    assert feed(sender, [1, 2, 5, 6, 16]) == [None] * 5
+    assert sender.gaps == 2 + 9
+
+
+def test_a_second_publisher_is_refused_and_the_first_one_goes_on():
+    sender = Sender()
+    numbers = [n for pair in zip(range(5000, 5100), range(1, 101), strict=True) for n in pair]
+    answers = feed(sender, numbers)
+    assert answers[::2] == [None] * 100
+    assert answers[1::2] == [Refusal.SECOND_PUBLISHER] * 100
+    assert (sender.owners, sender.gaps, sender.conflict) == (1, 0, True)
+
+
+def test_a_second_publisher_that_counts_far_ahead_is_refused_too():
+    sender = Sender()
+    numbers = [n for pair in zip(range(1, 101), range(90_000, 90_100), strict=True) for n in pair]
+    answers = feed(sender, numbers)
+    assert set(answers[::2]) == {None}
+    assert set(answers[1::2]) == {Refusal.SECOND_PUBLISHER}
+
+
+def test_a_topic_goes_to_another_once_its_owner_is_silent():
+    sender = Sender(silence=0.5)
+    feed(sender, range(1000, 1010))
+    later = BEGIN + 9 * MS
+    assert sender.admit(1, later + 500 * MS) is Refusal.SECOND_PUBLISHER
+    assert sender.admit(2, later + 501 * MS) is None
+    assert feed(sender, [3, 4, 5], later + 502 * MS) == [None] * 3
+    assert (sender.owners, sender.conflict) == (2, False)
+
+
+def test_a_topic_goes_to_another_at_once_if_the_publisher_of_its_owner_is_gone():
+    sender = Sender()
+    feed(sender, [1000, 1001])
+    sender.release()
+    assert feed(sender, [1, 2], BEGIN + 3 * MS) == [None, None]
+    assert not sender.conflict
+
+
+def test_a_conflict_stays_until_it_is_forgotten():
+    sender = Sender()
+    feed(sender, [1000, 1, 1001])
+    assert sender.conflict
+    feed(sender, range(1002, 1010), BEGIN + SECOND)
+    assert sender.conflict
+    sender.forget()
+    assert not sender.conflict
+    assert feed(sender, [7, 8], BEGIN + 2 * SECOND) == [None, None]
+
+
+def test_a_flood_is_refused_beyond_its_rate_second_by_second():
+    sender = Sender(limit=100)
+    answers = feed(sender, range(1, 1001))
+    assert answers[:100] == [None] * 100
+    assert answers[100:] == [Refusal.FLOOD] * 900
+    again = feed(sender, range(1001, 1011), BEGIN + SECOND)
+    assert again == [None] * 10
+
+
+def test_a_middleware_without_numbers_tells_no_publishers_apart():
+    sender = Sender()
+    assert feed(sender, [0] * 50) == [None] * 50
+    assert (sender.gaps, sender.conflict) == (0, False)
+
+
+def test_stamps_of_a_clock_that_is_ahead_are_told_as_such():
+    sender = Sender()
+    sender.note_stamp(BEGIN + 1300 * MS, BEGIN)
+    (told,) = sender.concerns("master/measured_cp")
+    assert "master/measured_cp: stamps are 1.3 s ahead of this clock" in told
+    sender.note_stamp(BEGIN, BEGIN + 2 * MS)
+    assert sender.concerns("master/measured_cp") == []
+
+
+def test_stamps_that_are_zero_or_stand_still_or_go_back_are_told_with_what_to_do():
+    sender = Sender()
+    told = {}
+    for name, stamp, last in (("zero", 0, 0), ("frozen", 5, 5), ("back", 4, 5)):
+        sender.note_old(stamp, last)
+        (told[name],) = sender.concerns("x")
+    assert told["zero"] == "x: its stamps are 0: stamp each message with the time of its sample"
+    assert "do not move" in told["frozen"]
+    assert "go back" in told["back"]
+    assert (sender.repeats, sender.reordered) == (2, 1)
+
+
+def test_ages_begin_anew_after_a_step_of_the_clock():
+    sender = Sender()
+    sender.note_stamp(BEGIN, BEGIN - 3 * SECOND)
+    sender.clear_ages()
+    assert sender.ages.summary() == (0.0, 0.0, 0.0)
+    assert sender.concerns("x") == []
+    sender.note_stamp(BEGIN, BEGIN + 2 * MS)
+    assert sender.ages.summary()[2] == 2 * MS
