@@ -22,6 +22,7 @@ from teleop_core.commands.arguments import (
 )
 from teleop_core.commands.progress import shown_progress
 from teleop_core.errors import TeleopError
+from teleop_core.texts import one_line
 
 FAILED = 2
 INTERRUPTED = 130
@@ -62,14 +63,15 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stderr.close()
         return 0
     except OSError as error:  # a file that cannot be read or written speaks for itself
-        print(f"teleop {parsed.command}: {error.filename}: {error.strerror}", file=sys.stderr)
+        about = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+        print(f"teleop {parsed.command}: {one_line(about)}", file=sys.stderr)
         return FAILED
     return code
 
 
 def _note(message: Warning | str, *_: object) -> None:
     """Show a warning as one line."""
-    print(f"note: {message}", file=sys.stderr)
+    print(f"note: {one_line(str(message))}", file=sys.stderr)
 
 
 def _take_parts(files: list[Path]) -> None:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from teleop_core.bags import ros_types
 from teleop_core.bags.layouts import SECOND_NS
+from teleop_core.texts import printable
 from teleop_core.topics import Kind
 
 
@@ -37,7 +38,7 @@ def report(stamp_ns: int, name: str, level: int, message: str, values: Mapping[s
 
 
 def read_reports(data: bytes) -> list[Report]:
-    """All statuses of one report message.
+    """All statuses of one report message, their texts made printable.
 
     Raises:
         ValueError: The bytes are no report.
@@ -46,6 +47,9 @@ def read_reports(data: bytes) -> list[Report]:
     stamp = array.header.stamp
     stamp_ns = stamp.sec * SECOND_NS + stamp.nanosec
     return [
-        Report(stamp_ns, s.name, s.level, s.message, {pair.key: pair.value for pair in s.values})
+        Report(
+            stamp_ns, printable(s.name), s.level, printable(s.message),
+            {printable(pair.key): printable(pair.value) for pair in s.values},
+        )
         for s in array.status
-    ]
+    ]  # fmt: skip

@@ -7,6 +7,7 @@ from typing import Any
 
 from teleop_core.commands.arguments import command, out_argument
 from teleop_core.exchange.options import BUTTONS, LENGTHS, TIMES_NS
+from teleop_core.texts import printable
 
 _IMPORT = """\
 Make a recording of a hand's motion from a file of others: CSV, TSV or blanks (also .gz), Parquet,
@@ -182,7 +183,7 @@ def _export(arguments: argparse.Namespace) -> int:
         arguments.bags, arguments.out, arguments.format, topics=arguments.topics,
         rate=arguments.rate, units=arguments.units, action=arguments.action, task=arguments.task,
     )  # fmt: skip
-    print(report)
+    print(printable(str(report)))
     return 0
 
 
@@ -193,7 +194,7 @@ def _import(arguments: argparse.Namespace) -> int:
     names = ImportOptions.__dataclass_fields__
     changes = {name: given[name] for name in names if given.get(name) is not None}
     report = import_recording(arguments.file, arguments.out, **changes)
-    print(report)
+    print(printable(str(report)))
     print(f"{arguments.out}: {report.duration:.1f} s imported; next: "
           f"teleop replay {arguments.out} --out {arguments.out}_replayed")  # fmt: skip
     return 0

@@ -11,6 +11,7 @@ from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURC
 from teleop_core.evaluation.rows import MISSING, Row
 from teleop_core.evaluation.score import Score, Session
 from teleop_core.evaluation.summary import side_by_side
+from teleop_core.texts import printable
 
 MET, NOT_MET = "✓", "✗"
 COLUMN_WIDTH = 18
@@ -39,7 +40,7 @@ def score_table(scores: Sequence[Score]) -> Table:
     )
     table.add_column("", no_wrap=True)
     for score in scores:
-        table.add_column(escape(heading(score.session)), justify="left", no_wrap=True)
+        table.add_column(escape(printable(heading(score.session))), justify="left", no_wrap=True)
     for group, lines in groupby(side_by_side(scores), key=lambda line: line.group):
         table.add_section()
         table.add_row(f"[bold]{escape(group)}[/bold]")

@@ -21,6 +21,7 @@ from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION
 from teleop_core.session.links import link_texts
+from teleop_core.texts import printable
 
 START_TIMEOUT = 180.0
 """A node that is not at work, and gets no further, for this long never will be [s]."""
@@ -215,7 +216,7 @@ class _Session:
 
     def _say(self, text: str) -> None:
         with suppress(OSError):  # who closed the terminal is not to hold up the end
-            self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+            self._console.print(printable(text), highlight=False, markup=False, soft_wrap=True)
 
     def _stop(self) -> list[str]:
         """End all nodes in order, whatever signals come; returns what is to be told of it."""

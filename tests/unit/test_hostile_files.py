@@ -1,0 +1,180 @@
+"""Files that want to hurt: bombs, pipes, paths that lead outside, codes that terminals obey."""
+
+import os
+import struct
+import tracemalloc
+from pathlib import Path
+
+import lz4.frame
+import numpy as np
+import pytest
+import zstandard
+from mcap.opcode import Opcode
+from mcap.records import DataEnd, Footer, Header
+from rich.console import Console
+
+from teleop_core import cli, topics
+from teleop_core.bags.compression import LARGEST
+from teleop_core.bags.mcap_file import MAGIC, encode
+from teleop_core.bags.reader import Bag, recover
+from teleop_core.bags.reports import report
+from teleop_core.bags.rosbag2 import records_of
+from teleop_core.bags.writer import BagWriter
+from teleop_core.errors import RecordingError, TeleopError, UnknownNameError
+from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.robots.dh import load_table
+from teleop_core.session.layers import load_file
+from teleop_core.texts import LONGEST_LINE, one_line, printable, shown
+
+MS = 1_000_000
+GIGABYTE = 1 << 30
+ESCAPES = "\x1b]0;owned\x07\x1b[2J\x1b[31m\x9b\u202e"
+STREAMS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_SETPOINT_CP, topics.SLAVE_SERVO_CP,
+           topics.MASTER_MEASURED_CP)  # fmt: skip
+
+
+@pytest.fixture
+def little_memory():
+    """A test in which no more than 100 MB may be taken, at any time."""
+    tracemalloc.start()
+    yield
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 100e6
+
+
+def bomb(path: Path, name: str, packed: bytes, told: int) -> Path:
+    """A recording of one chunk that says that it unpacks to ``told`` bytes."""
+    schemas, channels = records_of([topics.SLAVE_MEASURED_CP])
+    head = struct.pack("<QQQI", 1, 2, told, 0) + struct.pack("<I", len(name)) + name.encode()
+    body = head + struct.pack("<Q", len(packed)) + packed
+    chunk = struct.pack("<BQ", Opcode.CHUNK, len(body)) + body
+    start = MAGIC + encode(Header("ros2", "x"), *schemas, *channels)
+    path.write_bytes(start + chunk + encode(DataEnd(0), Footer(0, 0, 0)) + MAGIC)
+    return path
+
+
+def zeros(compress, size: int) -> bytes:
+    """So many zero bytes, packed bit by bit."""
+    block = bytes(1 << 20)
+    return b"".join([*(compress.compress(block) for _ in range(size >> 20)), compress.flush()])
+
+
+def lz4_zeros(size: int) -> bytes:
+    with lz4.frame.LZ4FrameCompressor() as compress:
+        parts = [compress.begin(), *(compress.compress(bytes(1 << 20)) for _ in range(size >> 20))]
+        return b"".join([*parts, compress.flush()])
+
+
+BOMBS = {
+    "zstd": lambda size: zeros(zstandard.ZstdCompressor().compressobj(size=size), size),
+    "zstd of no told size": lambda size: zeros(zstandard.ZstdCompressor().compressobj(), size),
+    "lz4": lz4_zeros,
+}
+
+
+@pytest.fixture(scope="module")
+def packed(kind: str) -> bytes:
+    return BOMBS[kind](200 << 20)
+
+
+@pytest.mark.parametrize("told", [3 * GIGABYTE, 1000], ids=["told", "not told"])
+@pytest.mark.parametrize("kind", BOMBS, scope="module")
+def test_a_small_chunk_that_unpacks_to_gigabytes_is_refused(
+    tmp_path, packed, little_memory, kind, told
+):
+    path = bomb(tmp_path / "bomb.mcap", kind.partition(" ")[0], packed, told)
+    with pytest.raises(RecordingError, match="is damaged") as error:
+        Bag(path)
+    assert len(str(error.value)) <= LONGEST_LINE
+    with pytest.raises(RecordingError, match="nothing can be recovered"):
+        recover(path)
+
+
+def test_the_largest_chunk_is_far_above_those_of_known_writers():
+    assert LARGEST > 50 * (1 << 20)
+
+
+def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path):
+    pipe = tmp_path / "pipe.mcap"
+    os.mkfifo(pipe)
+    for attempt in (load_file, load_table, Bag, recover):
+        with pytest.raises(TeleopError):
+            attempt(pipe)
+    bag = tmp_path / "bag"
+    with BagWriter(bag, [STREAMS[0]], ()) as writer:
+        writer.write_block({STREAMS[0]: (np.arange(2), np.ones((2, 7)), np.arange(2))})
+    (bag / "metadata.yaml").unlink()
+    os.mkfifo(bag / "metadata.yaml")
+    with pytest.raises(RecordingError, match="pipe"):
+        Bag(bag)
+
+
+def recorded(path: Path, **metadata: str) -> Path:
+    times = np.arange(1, 1500) * MS
+    values = np.zeros((len(times), 7))
+    values[:, 3] = 1.0
+    values[:, 0] = 0.01 * np.sin(times * 1e-9)
+    with BagWriter(path, topics.ALL, tuple("abcdef"), metadata=metadata) as writer:
+        writer.write_block(dict.fromkeys(STREAMS, (times, values, times)))
+        for level in (0, 2):
+            text = report(MS, f"node{ESCAPES}", level, ESCAPES, {f"late{ESCAPES}": ESCAPES})
+            writer.write(topics.DIAGNOSTICS, MS, text)
+    return path
+
+
+def test_no_command_prints_codes_that_stand_in_a_recording(tmp_path, capsys):
+    path = recorded(tmp_path / "bag", scenario=ESCAPES, robot=ESCAPES, seed=ESCAPES)
+    assert cli.main(["evaluate", str(path), "--html", str(tmp_path / "page.html")]) == 0
+    said = "".join(capsys.readouterr())
+    assert "\u241b" in said  # shown, not obeyed
+    assert not set(ESCAPES) & set("\x1b\x07\x9b\u202e") & set(said)
+    reports = Bag(path).reports(topics.DIAGNOSTICS)
+    assert all(printable(text) == text for one in reports for text in (one.name, one.message))
+
+
+def test_a_recording_without_state_reports_has_a_page(tmp_path):
+    page = tmp_path / "page.html"
+    evaluate_bags([recorded(tmp_path / "bag")], None, page, Console(quiet=True))
+    assert page.stat().st_size > 10_000
+
+
+def test_metadata_cannot_lead_out_of_the_directory(tmp_path):
+    path, other = recorded(tmp_path / "bag"), recorded(tmp_path / "other")
+    (other / "other_0.mcap").rename(tmp_path / "secret_0.mcap")
+    index = path / "metadata.yaml"
+    whole = index.read_text()
+    for outside in ("../secret_0.mcap", str(tmp_path / "secret_0.mcap"), "..", "."):
+        index.write_text(whole.replace("- bag_0.mcap", f"- {outside}"))
+        with pytest.raises(RecordingError, match="lacks its files"):
+            Bag(path)
+
+
+def test_a_file_that_is_listed_three_thousand_times_is_refused_in_one_line(tmp_path):
+    path = recorded(tmp_path / "bag")
+    index = path / "metadata.yaml"
+    index.write_text(index.read_text().replace("- bag_0.mcap\n", "- bag_0.mcap\n  " * 3000))
+    with pytest.raises(RecordingError, match="damaged") as told:
+        Bag(path)
+    assert len(str(told.value)) <= LONGEST_LINE
+
+
+VALUES = {
+    "number": 10**5000, "numbers": [10**5000], "text": "x" * 10**6, "texts": ["y" * 99] * 9999,
+    "codes": ESCAPES,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
+def test_every_value_is_shown_in_a_few_printable_words(value):
+    text = str(UnknownNameError("name", value, ["a", "b"]))
+    assert len(text) <= LONGEST_LINE
+    assert printable(text) == text
+    assert len(shown(value)) <= 250
+
+
+def test_a_long_message_keeps_its_beginning_and_its_end():
+    line = one_line("begin " + "middle " * 1000 + "end")
+    assert line.startswith("begin")
+    assert line.endswith("end")
+    assert len(line) <= LONGEST_LINE
