@@ -132,11 +132,10 @@ class _Drill:
             self._rig.session.start()
         deadline = time.monotonic() + _FOLLOWS
         while not self._rig.is_following():
-            if self._rig.operation().get("state") not in {None, State.ENABLED}:
-                self._help(self._rig)  # a busy machine may have paused it already
+            self._help(self._rig)  # a busy machine may have paused it already
             self._rig.wait(0.1)
             if time.monotonic() > deadline:
-                raise SessionError(f"the slave does not follow: {self._rig.operation()}")
+                raise SessionError(f"the slave does not follow: {self._rig.complaints()}")
         return self._rig
 
     def _close(self) -> None:
@@ -252,6 +251,9 @@ class _Drill:
             rig.command("reset")
         if state in {State.FAULT, State.DISABLED}:
             rig.command("enable")
+            return Cure.RESET
+        if state == State.ENABLED and not operation["is_homed"] and not operation["is_busy"]:
+            rig.command("home")
             return Cure.RESET
         return Cure.NOTHING
 

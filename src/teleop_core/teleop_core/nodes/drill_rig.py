@@ -32,7 +32,7 @@ from teleop_core.topics import SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
 
 _ANSWER = 3.0  # patience with a service [s]
 _FOUND = 3.0  # patience with discovery [s]
-_FRESH = 0.1  # a setpoint that is older is none of a running slave [s]
+_FRESH = 0.3  # a setpoint that is older is none of a running slave [s]
 
 
 class LiveRig:
@@ -125,9 +125,15 @@ class LiveRig:
             return False
         if self.tap.age(SLAVE_SETPOINT_JS) > _FRESH or not self.session.is_running("slave_sim"):
             return False
-        rows = self.tap.recent(SLAVE_SETPOINT_JS, 50)
+        rows = self.tap.recent(SLAVE_SETPOINT_JS, 60)
         moves = np.any(np.diff(rows, axis=0) != 0.0, axis=1)
-        return bool(len(moves) >= 40 and np.mean(moves) > 0.5)
+        return bool(len(moves) >= 40 and np.mean(moves) > 0.3)
+
+    def complaints(self) -> str:
+        """What nodes complain of, in one line."""
+        age = self.tap.age(SLAVE_SETPOINT_JS)
+        told = [f"{n}: {s.message}" for n, s in self.observer.statuses.items()]
+        return "; ".join((f"newest setpoint {age:.2f} s old", *told))
 
     # -- processes -------------------------------------------------------------------------------
 
