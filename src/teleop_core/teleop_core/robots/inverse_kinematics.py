@@ -41,7 +41,8 @@ class InverseKinematicsParameters(RobotParameters):
     )
     longest_pause: float = parameter(
         0.3, unit="s", lower=0.002, upper=5.0,
-        doc="time between commands that joints may use, at most; a longer pause counts as this",
+        doc="time between commands of one stream, at most; for one that comes alone, after a "
+        "longer pause, joints go as far as 0.45 s of full speed",
     )  # fmt: skip
     feedback_timeout: float = parameter(
         0.1, unit="s", lower=0.002, upper=5.0,
@@ -73,6 +74,11 @@ _FOLLOWED, _NEAR_SINGULAR = int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR)
 _STATE = [(name, "i8") for name in ("last_ns", "asked", "limited", "limit", "joint")]
 # A step [rad or m] that no speed limit is: a path still, but one that has all the time it needs.
 _ANY_STEP = 1e6
+# Full speed for this long [s] is what a command may ask for that comes alone, or first: the slave
+# takes half a second of it for one motion, and goes all the way.
+_ALONE = 0.45
+# A way of joints is long for a tremor [s at full speed]: a prismatic joint goes a millimetre in it.
+_FAR = 0.02
 # A joint this close to its limit [rad or m] is at it.
 _AT = 1e-9
 
@@ -134,29 +140,63 @@ def _has_own_way(s: Any, solver: Any, row: Any, timeout_ns: int) -> bool:
     return moves
 
 
+@inner
+def _goes_far(p: Any, solver: Any) -> bool:
+    """Whether the answer turns a joint farther than small motions of the tip need."""
+    for i in range(solver.q.shape[0]):
+        if abs(solver.q[i] - solver.seed[i]) > _FAR * p.speed[i]:
+            return True
+    return False
+
+
+@inner
+def _solve(p: Any, solver: Any, time: float, is_alone: bool) -> int:
+    """Write the answer within ``time`` [s] of full speed, or all the way to a command alone.
+
+    Next to a singularity a tremor of the first command would turn joints far for nothing: such
+    ways are gone only for what is not within the tolerances anyway.
+    """
+    longest = _ALONE if is_alone else time
+    status = -1
+    for attempt in range(3):
+        for i in range(solver.q.shape[0]):
+            solver.limits[2, i] = p.speed[i] * longest
+        status = solver.ik(
+            solver.T, solver.seed, solver.limits, solver.geometry, solver.q, solver.residual
+        )
+        near = solver.residual[0] <= p.tolerance[0] and solver.residual[1] <= p.tolerance[1]
+        if attempt == 0 and is_alone and _goes_far(p, solver):
+            longest = time
+        elif attempt == 1 and not near:
+            longest = _ALONE
+        else:
+            break
+    return status
+
+
 @kernel
 def inverse_kinematics_step(p: Any, s: Any, solver: Any, row: Any, dt: float) -> None:
     """One slave pose: write slave_servo_jp and slave_reach.
 
     The answer is the neighbour of the last one; while the slave does not follow, of the slave's
     own setpoint, so that a restart never asks for another branch. Joints move as far as their
-    speed allows in the time since the last command, whatever the rate of commands.
+    speed allows in the time since the last command, whatever the rate of commands; a command that
+    comes alone is answered with all of its way, which the slave goes at its own limits.
     """
-    T, seed, q, limits = solver.T, solver.seed, solver.q, solver.limits
+    T, seed, q = solver.T, solver.seed, solver.q
     elapsed_ns = row.slave_servo_cp_ns - s.last_ns
-    if s.last_ns == 0 or elapsed_ns <= 0:
+    is_alone = s.last_ns == 0 or elapsed_ns > p.longest_ns
+    if elapsed_ns <= 0:
         elapsed_ns = round(dt * 1e9)
     elapsed_ns = min(elapsed_ns, p.longest_ns)
     if s.last_ns == 0 or _has_own_way(s, solver, row, max(p.timeout_ns, 2 * elapsed_ns)):
         copy(row.slave_setpoint_js, seed)
     s.last_ns = row.slave_servo_cp_ns
-    for i in range(q.shape[0]):
-        limits[2, i] = p.speed[i] * (elapsed_ns * 1e-9)
     transform_from_pose(row.slave_servo_cp, T)
     reach = row.slave_reach
     for i in range(reach.shape[0]):
         reach[i] = 0.0
-    status = solver.ik(T, seed, limits, solver.geometry, q, solver.residual)
+    status = _solve(p, solver, elapsed_ns * 1e-9, is_alone)
     reach[_STATUS], reach[_LIMIT], reach[_JOINT] = status, _NONE, -1.0
     if status >= 0:
         copy(solver.residual, reach[_RESIDUAL : _RESIDUAL + 2])

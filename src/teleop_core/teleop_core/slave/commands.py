@@ -131,7 +131,8 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
     """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
 
     A jump is farther from the command in force than full speed reaches in the command timeout, or
-    in the time since the message before: no stream can be that far.
+    in the time since the message before, half a second at most, which is what the first one has: no
+    stream can be that far.
     """
     stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
     if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
@@ -140,9 +141,9 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
     if s.state != _ENABLED or s.is_busy or s.motion != 0 or not s.is_homed:
         return _not_followed(s, row)
     if stamp > s.seen_ns:
-        period_ns = min(stamp - s.seen_ns, _SLOWEST_NS) if s.seen_ns > 0 else 0
+        is_first, period_ns = s.seen_ns == 0, min(stamp - s.seen_ns, _SLOWEST_NS)
         s.seen_ns = stamp
-        far = max(p.timeout_ns, period_ns) * 1e-9
+        far = max(p.timeout_ns, _SLOWEST_NS if is_first else period_ns) * 1e-9
         for i in range(s.command.shape[0]):
             near = abs(row.slave_servo_jp[i] - s.target[i]) <= p.speed_limit[i] * far
             if not near:  # NaN is not near either
@@ -150,7 +151,8 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
                 _age_of_command(p, s, now_ns)
                 return 2
         # Commands whose stamps run ahead of the clock that they come by are as near as they come.
-        begin_way(p, s, row.slave_servo_jp, min(period_ns, now_ns - s.arrival_ns), dt)
+        period_ns = 0 if is_first else min(period_ns, now_ns - s.arrival_ns)
+        begin_way(p, s, row.slave_servo_jp, period_ns, dt)
         is_next = s.arrival_ns > 0 and now_ns - s.arrival_ns <= p.timeout_ns
         s.in_row = s.in_row + 1 if is_next else 0
         s.command_stamp_ns, s.arrival_ns, s.refused_before = stamp, now_ns, s.refused

@@ -11,6 +11,7 @@ from teleop_core.operation.watch import (
     OPERATION_STATE,
     begin_tick,
     is_braked,
+    measure_rest,
     tell,
     watch_joints,
     watch_limits,
@@ -246,6 +247,7 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
         watch_tip(p, s, row.slave_setpoint_cp, row.slave_measured_cp)
     watch_limits(p, s, row.now_ns)
     s.is_moving = _is_moving(p, s)
+    measure_rest(s, row.slave_measured_cp, row.now_ns)
     tell(s, row.slave_operation)
     wander(p, s)
     if is_braked(p, s):
