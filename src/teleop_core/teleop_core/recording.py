@@ -178,7 +178,11 @@ class Recording:
         Raises:
             UnknownNameError: There is no such topic.
         """
-        names = topics or tuple(n for n in self.topics if not n.endswith(("diagnostics", "state")))
+        names = topics or tuple(
+            name
+            for name in self.topics
+            if kind_of(name, self._bag.topics[name].type) is not Kind.REPORT
+        )
         frames = []
         for name in names:
             frame = self[name].frame().drop(columns="stamp_ns").add_prefix(f"{name}.")

@@ -14,8 +14,10 @@ from teleop_core.errors import RecordingError, SessionError
 from teleop_core.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.interrupt import Interrupt
+from teleop_core.nodes.keys import Keys
 from teleop_core.nodes.leftovers import remove_leftovers
 from teleop_core.nodes.observer import WARNING, Observer, Status
+from teleop_core.nodes.operator import Operator
 from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.session.configuration import Configuration
@@ -77,7 +79,8 @@ def live(
         session = _Session(configuration, console, observer, parameters, env, interrupt)
         session.crews = _crews(configuration.graph, is_composed=is_composed)
         session.tell_where(out)
-        session.run()
+        with Keys(observer.press) as keys:
+            session.run(keys)
 
 
 class _Session:
@@ -106,8 +109,9 @@ class _Session:
         self._say(f"ROS domain {domain}; others join it with ROS_DOMAIN_ID={domain}")
         self._say(f"recording to {out}")
 
-    def run(self) -> None:
+    def run(self, keys: Keys) -> None:
         """Start, watch and stop all nodes; the recorder comes first and goes last."""
+        self._keys = keys
         try:
             self._work()
         except BaseException as error:
@@ -123,6 +127,8 @@ class _Session:
         try:
             for crew in self.crews:
                 self._start(crew)
+            if self._keys.is_there:
+                self._say("space stops all arms; e lets them go on")
             self._await_operator()
             is_begun = True
             self._watch()
@@ -173,9 +179,23 @@ class _Session:
         for child in self._children.values():
             child.check()
 
+    def _obey(self) -> None:
+        """Do what keys ask for, beside the stop, which does not wait for us."""
+        while self._keys.waiting:
+            if self._keys.waiting.popleft() != "e":
+                continue
+            self._observer.press(is_pressed=False)
+            try:
+                with Operator(int(self._env["ROS_DOMAIN_ID"])) as operator:
+                    for line in operator.go_on():
+                        self._say(line)
+            except SessionError as error:
+                self._say(str(error))
+
     def _check(self) -> None:
         """Make sure that nobody stops it, all processes run and all nodes report."""
         self._interrupt.check()
+        self._obey()
         for crew in self.crews:
             for name in [name for name in crew if name in self._children]:
                 child = self._children[name]

@@ -16,7 +16,7 @@ from teleop_core.bags.messages import read_reports
 from teleop_core.errors import SessionError
 from teleop_core.nodes.operation import STOP_TOPIC
 from teleop_core.nodes.streams import Subscription
-from teleop_core.operation import operation_text
+from teleop_core.operation import State, operation_text
 from teleop_core.topics import OPERATION, SLAVE_OPERATION
 
 _PERIOD = 0.01
@@ -122,6 +122,15 @@ class Operator:
         for _ in range(5):
             self._button.publish(Bool(data=False))
             self._turn()
+
+    def go_on(self) -> list[str]:
+        """Release the stop, and reset and enable, or resume, every arm; what they answer."""
+        self.release()
+        told = []
+        for arm, state in self.arms.items():
+            words = ("resume",) if state.values["state"] == State.PAUSED else ("reset", "enable")
+            told += [self.command(word, arm)[1] for word in words]
+        return told
 
     def command(self, name: str, arm: str = "") -> tuple[bool, str]:
         """Send a state command to an arm; whether it was taken, and the arm's answer.
