@@ -7,7 +7,7 @@ from teleop_core.bags import compression
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.parameters import parameter
 from teleop_core.stage import Stage
-from teleop_core.topics import BY_NAME, Kind, Topic
+from teleop_core.topics import BY_NAME, Kind, Quality, Stamp, Topic
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +59,8 @@ class RecordingParameters:
         return out
 
 
+MARKS = Topic("recorder/marks", Kind.REPORT, Stamp("time of the mark"), quality=Quality.REPORT)
+"""Marks that somebody set during a live recording: one text each."""
 RECORDER = Stage("recorder", RecordingParameters, reads=(), writes=(),
                  node="teleop_core.nodes.recorder:RecorderNode")  # fmt: skip
 """The recorder; it reads every topic of its graph, of all arms."""

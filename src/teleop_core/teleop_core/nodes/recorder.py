@@ -1,19 +1,23 @@
 """Node ``recorder``: every message of the graph as it came, in an MCAP recording."""
 
 import sys
+import threading
 import time
 from collections import deque
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from teleop_core.bags.arms import NAMESPACE_KEY
-from teleop_core.bags.recording import RECORDER, RecordingParameters
+from teleop_core.bags.recording import MARKS, RECORDER, RecordingParameters
+from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError
+from teleop_core.errors import RecordingError, SessionError
 from teleop_core.graph import RECORDER_NAME, Graph
-from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.files import graph_of, session_of
+from teleop_core.nodes.recorder_services import serve
 from teleop_core.nodes.streams import Subscription
 from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.configuration import Configuration
@@ -41,6 +45,7 @@ class RecorderParameters(RecordingParameters):
         "", fixed=True, doc="parameter file of the session, as text, kept with the recording"
     )
     scenario: str = parameter("", fixed=True, doc="name of the session, kept with the recording")
+    mark: str = parameter("", doc="text of the next marks; empty: their number")
 
 
 class _Channel:
@@ -120,6 +125,10 @@ class RecorderNode(CoreNode):
         self.patience = 10.0  # a slow disk is no reason to end a session
         self.stages: dict[str, Any] = {}
         """Parameters of the stages of the process, by their names in the graph."""
+        self._writing = threading.Lock()  # held while something is written, or the file changes
+        self._is_recording, self._part, self._marks = False, 0, 0
+        self._last: dict[Topic, bytes] = {}  # of latched topics, for the next recording
+        serve(self, self, self.fail)
 
     def setup(self, parameters: RecorderParameters) -> None:
         """Make the recording's directory."""
@@ -127,15 +136,26 @@ class RecorderNode(CoreNode):
         graph = self._graph or (
             configuration.graph if parameters.configuration else graph_of(sys.argv)
         )
-        name = parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S")
+        self._path = Path(parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S"))
         topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
-        self._writer = BagWriter(
-            Path(name), topics, {}, parameters=parameters, metadata=self._about(configuration),
-            start_ns=time.time_ns(), hold_ns=HOLD_NS,
-        )  # fmt: skip
-        self.stage, self._is_broken = self._writer, False
         every = parameters.every_nth(topics)
         self._recorded = [topic for topic in topics if every[topic.name]]
+        self._mark_topic, self._part, self._marks = MARKS.of_arm(self.arm), 0, 0
+        self._last.clear()
+        self._open = partial(
+            BagWriter, topics=(*topics, self._mark_topic), joint_names={}, parameters=parameters,
+            metadata=self._about(configuration), hold_ns=HOLD_NS,
+        )  # fmt: skip
+        self._begin_recording(self._path)
+        self._is_broken = False
+
+    def _begin_recording(self, path: Path) -> None:
+        """Make a recording, which begins with the last messages of latched topics."""
+        now_ns = time.time_ns()
+        self._writer = self.stage = self._open(path, start_ns=now_ns)
+        self._is_recording = True
+        for topic, data in self._last.items():
+            self._writer.write(topic, now_ns, data, now_ns)
 
     def _configuration(self, parameters: RecorderParameters) -> Configuration:
         """Configuration of the session: as given, as its stages have it, or the defaults."""
@@ -160,14 +180,16 @@ class RecorderNode(CoreNode):
     def turn(self) -> None:
         """Record what has come."""
         time.sleep(_PAUSE)
-        self._drain()
+        with self._writing:
+            self._drain()
         self.counts.ticks += 1
 
     def stop(self) -> None:
         """Record what came last, and close the topics."""
         try:
             if not self._is_broken:
-                self._drain()
+                with self._writing:
+                    self._drain()
         finally:
             for channel in self.channels.values():
                 channel.close()
@@ -199,6 +221,9 @@ class RecorderNode(CoreNode):
         for channel in self.channels.values():
             channel.drain(came)
         came.sort(key=lambda message: message[0])
+        self._last.update({m[1]: m[2] for m in came if m[1].quality is Quality.LATCHED})
+        if not self._is_recording:
+            return
         try:
             for received_ns, topic, data, sent_ns in came:
                 self._writer.write(topic, received_ns, data, sent_ns)
@@ -207,6 +232,73 @@ class RecorderNode(CoreNode):
             self._is_broken = True  # said once; what is safe has been closed
             self.exit_code = self.exit_code or 1
             raise
+
+    # -- services --------------------------------------------------------------------------------
+
+    def start_recording(self) -> str:
+        """Record again, in a new directory; raises as :class:`Recorder` says."""
+        if self.stage is None:
+            if self.trigger_configure() is not SUCCESS or self.trigger_activate() is not SUCCESS:
+                raise SessionError("did not start; its log says why")
+            return f"records to {self._writer.path}"
+        self._insist(is_recording=False)
+        with self._writing:
+            self._begin_recording(self._next_path())
+        return f"records to {self._writer.path}"
+
+    def stop_recording(self) -> str:
+        """Close the recording; raises as :class:`Recorder` says."""
+        self._insist(is_recording=True)
+        with self._writing:
+            self._end_recording()
+        return f"stopped; recorded in {self._writer.path}"
+
+    def split_recording(self) -> str:
+        """Close the recording and go on in a new directory; raises as :class:`Recorder` says."""
+        self._insist(is_recording=True)
+        with self._writing:
+            closed = self._writer.path
+            self._end_recording()
+            self._begin_recording(self._next_path())
+        return f"{closed} is closed; goes on in {self._writer.path}"
+
+    def mark_recording(self) -> str:
+        """Note that something happens now; raises as :class:`Recorder` says."""
+        self._insist(is_recording=True)
+        with self._writing:
+            self._drain()
+            now_ns, self._marks = time.time_ns(), self._marks + 1
+            text = self.parameters.mark or str(self._marks)
+            data = report(now_ns, self.member_name, 0, text, {"number": str(self._marks)})
+            self._writer.write(self._mark_topic, now_ns, data, now_ns)
+        return f"marked {text!r} in {self._writer.path}"
+
+    def _insist(self, *, is_recording: bool) -> None:
+        if self.stage is None or not self.is_at_work:
+            raise SessionError("is not active, so that it does not record")
+        if self._is_recording is not is_recording:
+            text = "records already to" if self._is_recording else "is stopped; the last one is"
+            raise SessionError(f"{text} {self._writer.path}")
+
+    def _end_recording(self) -> None:
+        self._drain()
+        self._is_recording = False
+        try:
+            self._writer.close()
+        except RecordingError:
+            self._is_broken = True
+            self.exit_code = self.exit_code or 1
+            raise
+
+    def _next_path(self) -> Path:
+        """First directory after the last one that is not there: bag_1, bag_2."""
+        while True:
+            self._part += 1
+            path = self._path.with_name(f"{self._path.name}_{self._part}")
+            if not path.exists():
+                return path
+
+    # -- diagnostics -----------------------------------------------------------------------------
 
     def concerns(self) -> list[str]:
         """Topics of which messages were lost before they came here."""
@@ -218,7 +310,7 @@ class RecorderNode(CoreNode):
 
     def values(self) -> dict[str, str]:
         """What came, what was lost, and where it is recorded."""
-        values = {"out": str(self._writer.path)}
+        values = {"out": str(self._writer.path), "is_recording": str(int(self._is_recording))}
         for channel in self.channels.values():
             values[f"received.{channel.topic.name}"] = str(channel.received)
             values[f"lost.{channel.topic.name}"] = str(channel.lost)
