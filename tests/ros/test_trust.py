@@ -80,3 +80,23 @@ def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer):
         return "its stamps are 0: stamp each" in peer.status("motion_scaling").message
 
     peer.wait(told, "the advice")
+
+
+def test_a_recorder_does_not_take_a_second_publisher_for_losses(peer, tmp_path):
+    peer.start("recorder", out=str(tmp_path / "bag"))
+    topic = topics.MASTER_MEASURED_CP
+    first = peer.publisher(topic)
+    second = peer.node.create_publisher(message_type(topic.kind.ros_type), topic.name, 10)
+    data = layout(topic, ()).encode_one(1, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+    for _ in range(1000):
+        first.publish(data)
+
+    def recorded():
+        for _ in range(20):
+            first.publish(data)
+            second.publish(data)
+        status = peer.status("recorder")
+        return status and status.number(f"received.{topic.name}") > 4000
+
+    peer.wait(recorded, "messages of both")
+    assert peer.status("recorder").number(f"lost.{topic.name}") < 1000

@@ -9,7 +9,8 @@ BEGIN = 77 * SECOND
 
 def feed(sender, numbers, begin=BEGIN, step=MS):
     """What is answered to messages one step apart."""
-    return [sender.admit(number, begin + i * step) for i, number in enumerate(numbers)]
+    times = [begin + i * step for i in range(len(numbers))]
+    return [sender.admit(n, t, t) for n, t in zip(numbers, times, strict=True)]
 
 
 def test_a_sender_of_consecutive_numbers_is_the_owner_and_loses_nothing():
@@ -22,6 +23,14 @@ def test_numbers_that_are_missing_are_counted():
     sender = Sender()
     assert feed(sender, [1, 2, 5, 6, 16]) == [None] * 5
     assert sender.gaps == 2 + 9
+
+
+def test_a_burst_after_a_stall_is_the_owners_although_thousands_were_lost_in_it():
+    """All of it arrives within a moment: what counts is when it was sent."""
+    sender = Sender()
+    feed(sender, [1, 2, 3])
+    assert sender.admit(2003, BEGIN + 2003 * MS, BEGIN + 3 * MS) is None
+    assert sender.gaps == 1999
 
 
 def test_a_second_publisher_is_refused_and_the_first_one_goes_on():
@@ -45,8 +54,8 @@ def test_a_topic_goes_to_another_once_its_owner_is_silent():
     sender = Sender(silence=0.5)
     feed(sender, range(1000, 1010))
     later = BEGIN + 9 * MS
-    assert sender.admit(1, later + 500 * MS) is Refusal.SECOND_PUBLISHER
-    assert sender.admit(2, later + 501 * MS) is None
+    assert sender.admit(1, later, later + 500 * MS) is Refusal.SECOND_PUBLISHER
+    assert sender.admit(2, later, later + 501 * MS) is None
     assert feed(sender, [3, 4, 5], later + 502 * MS) == [None] * 3
     assert (sender.owners, sender.conflict) == (2, False)
 

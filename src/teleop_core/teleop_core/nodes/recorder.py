@@ -18,6 +18,7 @@ from teleop_core.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.files import graph_of, session_of
 from teleop_core.nodes.recorder_services import serve
+from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Subscription
 from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.configuration import Configuration
@@ -32,6 +33,8 @@ HOLD_NS = 100_000_000
 """Longest time for which messages wait before they go to the disk [ns]: what a loss of power or the
 end of the process costs is this time and that of writing one chunk, together below 0.2 s."""
 _PAUSE = 5e-3
+_MOST = 20_000
+"""Messages of one publisher a second at most: more are not taken for losses."""
 Arrival = tuple[int, Topic, bytes, int]
 """Time of arrival [ns], topic, bytes, time of sending [ns]."""
 
@@ -53,8 +56,7 @@ class _Channel:
 
     def __init__(self, node: CoreNode, topic: Topic) -> None:
         self.topic, self._node = topic, node
-        self.received = self.lost = self._number = 0
-        self.publishers = 0 if topic is DIAGNOSTICS else 1
+        self.received, self._sender = 0, Sender(limit=_MOST)
         self._given: deque[Arrival] = deque()
         self._subscription: Subscription | None = None
         self._inside_ns: int | None = None
@@ -81,7 +83,7 @@ class _Channel:
         while self._subscription is not None and (taken := self._subscription.take()) is not None:
             data, about = taken
             if inside_ns is None or about["source_timestamp"] < inside_ns:
-                self.count(about["publication_sequence_number"])
+                self.count(about["publication_sequence_number"], about["source_timestamp"])
                 arrival_ns = about["received_timestamp"]
                 came.append((arrival_ns, self.topic, data, about["source_timestamp"]))
         self._follow()
@@ -92,10 +94,8 @@ class _Channel:
             self.close()
         elif self._subscription is None:
             depth = 10 if self.topic.quality is Quality.LATCHED else DEPTH
-            self._subscription, self._number = (
-                Subscription(self._node, self.topic, f"/{self.topic.name}", depth),
-                0,
-            )
+            self._sender.release()
+            self._subscription = Subscription(self._node, self.topic, f"/{self.topic.name}", depth)
 
     def close(self) -> None:
         """Stop listening to the topic."""
@@ -103,16 +103,20 @@ class _Channel:
             self._subscription.close()
             self._subscription = None
 
-    def count(self, number: int) -> None:
-        """Note a message by its number in its publisher's sequence; a smaller one starts anew.
+    @property
+    def lost(self) -> int:
+        """Messages that the middleware lost, of the publisher that was first."""
+        return self._sender.gaps
 
-        The middleware does not say which publisher a message comes from, so that losses are
-        counted while there is one.
+    def count(self, number: int, sent_ns: int) -> None:
+        """Note a message by its number in its publisher's sequence.
+
+        The middleware does not say which publisher a message comes from: what does not go on with
+        the numbers of the first one is no loss. A topic of many senders is not counted.
         """
         self.received += 1
-        if self._number and number > self._number and self.publishers == 1:
-            self.lost += number - self._number - 1
-        self._number = number
+        if self.topic is not DIAGNOSTICS:
+            self._sender.admit(number, sent_ns, time.monotonic_ns())
 
 
 class RecorderNode(CoreNode):
@@ -302,9 +306,6 @@ class RecorderNode(CoreNode):
 
     def concerns(self) -> list[str]:
         """Topics of which messages were lost before they came here."""
-        for channel in self.channels.values():
-            is_shared = channel.topic is DIAGNOSTICS
-            channel.publishers = 0 if is_shared else self.count_publishers(f"/{channel.topic.name}")
         lost = sum(channel.lost for channel in self.channels.values())
         return [f"the middleware lost {lost} messages on the way here"] if lost else []
 

@@ -14,7 +14,7 @@ SECOND_NS = 1_000_000_000
 AHEAD_NS = SECOND_NS
 """Stamps that lie farther in the future are those of another clock [ns]."""
 _JUMP = 100
-"""Messages that may be lost at once, beside what a flood would bring in the time of silence."""
+"""Messages that may be lost at once, beside what a flood would have brought in between."""
 
 
 class StampFault(Enum):
@@ -49,7 +49,7 @@ class Sender:
 
     def forget(self) -> None:
         """Let the next message be that of the owner, whoever sends it."""
-        self._number = self._heard_ns = self._window_ns = self._in_window = 0
+        self._number = self._sent_ns = self._heard_ns = self._window_ns = self._in_window = 0
         self.has_other = self.conflict = False
         self.fault: StampFault | None = None
         self.clear_ages()
@@ -59,11 +59,12 @@ class Sender:
         self.ages.clear()
         self.newest_age_ns = 0
 
-    def admit(self, number: int, now_ns: int) -> Refusal | None:
+    def admit(self, number: int, sent_ns: int, now_ns: int) -> Refusal | None:
         """Reason to refuse a message before it is read; None for one of the owner.
 
         Args:
             number: Its number in its publisher's sequence; 0 where the middleware has none.
+            sent_ns: When it was sent, by the clock of the sender [ns].
             now_ns: Monotonic time [ns].
         """
         if now_ns - self._window_ns >= SECOND_NS:
@@ -72,21 +73,25 @@ class Sender:
         if self._in_window > self._limit:
             return Refusal.FLOOD
         step = number - self._number
-        if step != 1 and self._number and number and not self._is_own(step, now_ns):
+        if step != 1 and self._number and number and not self._is_own(step, sent_ns, now_ns):
             self.has_other = True
             return Refusal.SECOND_PUBLISHER
-        self._number, self._heard_ns = number, now_ns
+        self._number, self._sent_ns, self._heard_ns = number, sent_ns, now_ns
         self.conflict = self.conflict or self.has_other  # the owner is still there
         self.owners = self.owners or 1
         return None
 
-    def _is_own(self, step: int, now_ns: int) -> bool:
-        """Whether a message that is not the next one may be the owner's, or makes a new owner."""
-        silence_ns = now_ns - self._heard_ns
-        if 0 < step <= _JUMP + self._limit * silence_ns // SECOND_NS:
+    def _is_own(self, step: int, sent_ns: int, now_ns: int) -> bool:
+        """Whether a message that is not the next one may be the owner's, or makes a new owner.
+
+        The owner can have sent no more messages in between than there was time for; how long they
+        took to arrive tells nothing.
+        """
+        between_ns = max(sent_ns - self._sent_ns, 0)
+        if 0 < step <= _JUMP + self._limit * between_ns // SECOND_NS:
             self.gaps += step - 1
             return True
-        if silence_ns > self._silence_ns:
+        if now_ns - self._heard_ns > self._silence_ns:
             self.owners += 1
             self.has_other = False
             return True

@@ -201,8 +201,9 @@ class Input:
         """Next message of the subscription that can be read."""
         while self.subscription is not None and (taken := self.subscription.take()) is not None:
             self.received += 1
-            number = taken[1]["publication_sequence_number"]
-            if reason := self.sender.admit(number, time.monotonic_ns()):
+            about = taken[1]
+            number, sent_ns = about["publication_sequence_number"], about["source_timestamp"]
+            if reason := self.sender.admit(number, sent_ns, time.monotonic_ns()):
                 self.refused[reason] += 1
                 continue
             known = None
