@@ -132,7 +132,7 @@ def test_no_node_outlives_the_command_and_the_recording_is_closed(start, number,
     wait_until(lambda: are_gone(nodes), "end of all nodes", 30.0)
     code = session.wait()
     assert code == (-signal.SIGKILL if number == signal.SIGKILL else 0), session.text
-    assert session.recorded().topics["slave/measured_js"].count > 500
+    assert session.recorded().topics["slave/measured_js"].count > 100
     assert list(session.temporary.iterdir()) == []
 
 
@@ -159,7 +159,7 @@ def test_a_stage_that_never_comes_back_is_found_within_a_second(start, tmp_path,
     assert "hangs.py" in session.text  # where it is
     bag = session.recorded()
     assert 0.7 < float(found[1]) - bag.read("test/beat").log_ns[-1] * 1e-9 < 2.0
-    assert bag.topics["slave/measured_js"].count > 500
+    assert bag.topics["slave/measured_js"].count > 100
 
 
 def test_a_process_that_stands_still_ends_the_session(start):
@@ -169,7 +169,7 @@ def test_a_process_that_stands_still_ends_the_session(start):
     node.suspend()
     assert session.wait(60) == 2
     assert "inverse_kinematics stands still" in session.text
-    assert session.recorded().topics["slave/measured_js"].count > 500
+    assert session.recorded().topics["slave/measured_js"].count > 100
 
 
 def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(start, tmp_path):
@@ -184,7 +184,7 @@ def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(start, tmp_p
         busy.wait()
     assert "teleop_session: compiling kernels" in session.text
     counts = {name: topic.count for name, topic in session.recorded().topics.items()}
-    assert counts[topics.SLAVE_MEASURED_JS.name] > 500
+    assert counts[topics.SLAVE_MEASURED_JS.name] > 100
 
 
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])

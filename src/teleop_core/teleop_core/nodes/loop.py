@@ -28,6 +28,7 @@ class Loop:
         name: Name of the thread.
         turns: Number of turns taken.
         patience: As given.
+        is_running: Whether it goes on; False once it is to stop.
         is_ready: Whether it is prepared.
         is_hung: Whether a watchdog has found it so.
     """
@@ -43,7 +44,7 @@ class Loop:
         self.name, self.turns, self.patience = name, 0, patience
         self.is_ready = self.is_hung = False
         self._turn, self._fail, self._prepare = turn, fail, prepare
-        self._is_running = True
+        self.is_running = True
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:
@@ -52,7 +53,7 @@ class Loop:
 
     def stop(self) -> bool:
         """End after the present turn; whether it did, or is left behind because it hangs."""
-        self._is_running = False
+        self.is_running = False
         if threading.current_thread() is self._thread:
             return True
         self._thread.join(0.0 if self.is_hung else _END_PATIENCE)
@@ -76,7 +77,7 @@ class Loop:
             if self._prepare is not None:
                 self._prepare()
                 self.is_ready = True
-            while self._is_running:
+            while self.is_running:
                 turn()
                 self.turns += 1
         except TeleopError as error:

@@ -71,6 +71,7 @@ class TeleopSession:
         """All ticks that are due, each through all stages."""
         if not self._loop.is_ready and any(node.is_at_work for node in self.nodes):
             self._stages[-1].prepare()  # now that all kernels are there
+            self._schedule.start()  # what passed meanwhile is not to be made up for
             self._loop.is_ready = True
         with self._gate:
             at_work = tuple(node.is_at_work for node in self.nodes)
@@ -82,6 +83,8 @@ class TeleopSession:
             self._schedule.start()
             return
         for tick_ns in self._schedule.due():
+            if not self._loop.is_running:  # there may be a thousand ticks to make up for
+                return
             self._tick(tick_ns)
 
     def _tick(self, tick_ns: int) -> None:
