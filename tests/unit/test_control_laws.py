@@ -239,7 +239,7 @@ def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated
     )
     arm = slave("looking", gravity_compensation="all")
     arm.step()
-    (found,) = [one for one in seen if len(one) == 48]
+    found = next(one for one in reversed(seen) if len(one) == 48)
     gravity = np.empty(6)
     at = np.array(arm.state["measured"])
     ARM.dynamics.gravity(at, ARM.dynamics.parameters.copy(), gravity)

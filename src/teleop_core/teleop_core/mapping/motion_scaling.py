@@ -71,7 +71,7 @@ _STATE = [
     ("is_fixture_on", "i8"), ("last_ns", "i8"),
     ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
     ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
-    *WALL_STATE, *PLAUSIBILITY_STATE,
+    *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"),
 ]  # fmt: skip
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
@@ -275,6 +275,8 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
         s.must_latch = 1
         for i in range(7):
             s.command[i] = row.slave_setpoint_cp[i]
+    if s.must_latch and s.is_engaged and s.last_ns != 0:
+        s.aligned += 1
     if s.must_latch or clutch > 0.0 or s.buttons[0] > 0.0:
         _latch(s, pose)
     else:
@@ -318,7 +320,7 @@ class MotionScaling(RunningStage):
 
     def reset(self) -> None:
         """Forget the latched poses: the next sample starts from the slave's setpoint."""
-        s, self._told = self.state, 0
+        s, self._told = self.state, (0, 0)
         assign(s, 0)
         assign(self._sent, 0)
         s["is_fine"], s["joint"] = MODES.index(self._values.mode), -1
@@ -375,12 +377,21 @@ class MotionScaling(RunningStage):
         self.arguments = (self.parameters, self.state, self._sent, self._shape)
         self._bound = None
 
+    def fall_silent(self) -> None:
+        """Tell that nothing is followed, for no sample came for long."""
+        self.signals["teleop_state"][_FOLLOWING] = 0.0
+
     def concerns(self) -> list[str]:
         """Samples that no hand can have made, and buttons that fell silent, in words."""
-        found, count = [], int(self.state["implausible"])
-        if count > self._told:
-            found.append(f"held {count - self._told} samples of the master that no hand can make")
-        self._told = count
+        found, told = [], self._told
+        count, aligned = self._told = int(self.state["implausible"]), int(self.state["aligned"])
+        if count > told[0]:
+            found.append(f"held {count - told[0]} samples of the master that no hand can make")
+        elif aligned > told[1]:
+            found.append(
+                "aligned hand and slave anew, which shifts the one against the other, "
+                f"{aligned - told[1]} times: the master paused, or the slave did not follow"
+            )
         if self.state["is_lost"]:
             found.append("the buttons fell silent: holds as if clutched")
         return found

@@ -29,6 +29,7 @@ class AnsweringNode(CoreNode):
     def start(self) -> None:
         """Start from where the slave is, whatever was before."""
         self.stage.reset()
+        self._was_silent = True
         for port in self.description.reads:
             self.row[f"{port.field}_ns"] = 0
 
@@ -56,6 +57,16 @@ class AnsweringNode(CoreNode):
                 self.answer(stamp_ns)
         if not has_come:
             self.read_ports(self._trigger)
+            self._tell_silence()
+
+    def _tell_silence(self) -> None:
+        """Report once that nothing is answered any more, where a stage has something to say."""
+        is_silent = self._question.age() > self._timeout
+        if is_silent and not self._was_silent and hasattr(self.stage, "fall_silent"):
+            with self.lock:
+                self.stage.fall_silent()
+            self.send_report(time.time_ns())
+        self._was_silent = is_silent
 
     def answer(self, stamp_ns: int) -> None:
         """Make one step of the stage, send what came of it, and report the state if it changed."""
@@ -70,6 +81,10 @@ class AnsweringNode(CoreNode):
 
     def concerns(self) -> list[str]:
         """Topics that are missing or silent."""
-        timeout = getattr(self.parameters, "feedback_timeout", 0.1)
         inputs = (self._question, *self._needed)
-        return [f"no {entry.topic.name}" for entry in inputs if entry.age() > timeout]
+        return [f"no {entry.topic.name}" for entry in inputs if entry.age() > self._timeout]
+
+    @property
+    def _timeout(self) -> float:
+        """Time after which an input counts as silent [s]."""
+        return float(getattr(self.parameters, "feedback_timeout", 0.1))
