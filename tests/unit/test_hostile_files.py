@@ -22,6 +22,7 @@ from teleop_core.bags.rosbag2 import records_of
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError, TeleopError, UnknownNameError
 from teleop_core.evaluation.command import evaluate_bags
+from teleop_core.exchange import as_master_bag
 from teleop_core.robots.dh import load_table
 from teleop_core.session.layers import load_file
 from teleop_core.texts import LONGEST_LINE, one_line, printable, shown
@@ -98,7 +99,7 @@ def test_the_largest_chunk_is_far_above_those_of_known_writers():
 def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path):
     pipe = tmp_path / "pipe.mcap"
     os.mkfifo(pipe)
-    for attempt in (load_file, load_table, Bag, recover):
+    for attempt in (load_file, load_table, Bag, recover, as_master_bag):
         with pytest.raises(TeleopError):
             attempt(pipe)
     bag = tmp_path / "bag"

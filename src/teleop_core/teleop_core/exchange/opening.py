@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from teleop_core.errors import RecordingError
 from teleop_core.exchange.options import ImportOptions
 from teleop_core.exchange.source import Source
+from teleop_core.plain_yaml import UnreadableError, check_regular
 
 if TYPE_CHECKING:
     from teleop_core.exchange.tables import Table
@@ -27,6 +28,10 @@ def open_source(path: Path, options: ImportOptions) -> Source:
     """
     if not path.exists():
         raise RecordingError(path, "does not exist")
+    try:
+        check_regular(path)
+    except UnreadableError as error:
+        raise RecordingError(path, str(error)) from error
     if is_bag(path):
         from teleop_core.exchange.bag_source import BagSource
 

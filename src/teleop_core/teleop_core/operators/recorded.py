@@ -20,6 +20,7 @@ from teleop_core.geometry import Array
 from teleop_core.operators import Motion, Operator, Setting
 from teleop_core.operators.shapes import minimum_jerk
 from teleop_core.parameters import parameter
+from teleop_core.plain_yaml import check_regular
 from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
 
 COLUMNS = ("t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode")
@@ -108,9 +109,10 @@ def _approach(setting: Setting) -> float:
 def columns_of(path: Path) -> ImportOptions | None:
     """Columns of a table that are called as :data:`COLUMNS`; None for other tables."""
     try:
+        check_regular(path)
         with path.open(newline="", encoding="utf-8") as file:
             head = [name.strip() for name in next(csv.reader(file), [])]
-    except (OSError, UnicodeDecodeError, csv.Error):
+    except (OSError, ValueError, csv.Error):
         return None
     if not set(COLUMNS[:4]) <= set(head):
         return None
