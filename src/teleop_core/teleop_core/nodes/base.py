@@ -20,6 +20,7 @@ from teleop_core.errors import ParameterError, SessionError, TeleopError
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.loop import PATIENCE, Loop
+from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import PREFIX, QualityOverrides, profile
 from teleop_core.nodes.rate import Recent, Schedule, TickCounts
@@ -166,7 +167,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self._reported: tuple[bytes, Any] = (b"", None)
         self._fresh_counts()
         self._word = "unconfigured"
-        self._reporter = Reporter(self)
+        self._reporter, self._commanders = Reporter(self), Commanders(self, self.description)
         self._report_timer = self.create_timer(1.0, self._report_in_time)
         self.ending = threading.Lock()
         """Held while the end is told; shared by the nodes of a process, as ``ended`` is."""
@@ -213,7 +214,11 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def news(self, word: str) -> str:
         """Line for the log when the node has come to another state, said in a word."""
-        return word
+        if word != _NEWS["active"]:
+            return word
+        inputs, robot = self.ports.all_inputs(), getattr(self.parameters, "robot", "")
+        names = [topic.name for topic in self.ports.outputs]
+        return f"{word}: {introduction(self.description, inputs, names, robot)}"
 
     def abandon(self) -> None:
         """Save what must not be lost, in any thread, when an orderly end has become impossible."""
@@ -547,6 +552,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         values |= recent_values("lateness", self.schedule.lateness)
         values |= recent_values("delay", self.delay) | (self.values() if is_active else {})
         self._reporter.send(concerns, self._word, values)
+        for line in self._commanders.news(inputs):
+            self.get_logger().info(line)
 
     def flush(self) -> None:
         """Wait a moment until the last report has arrived."""
