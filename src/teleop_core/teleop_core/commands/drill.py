@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from teleop_core.commands.arguments import command, ros_module
+from teleop_core.commands.arguments import command, ros_module, setting_arguments
 from teleop_core.errors import RecordingError
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ without a name all faults are injected, which takes minutes:
   teleop drill stop_topic kill_motion_scaling
   teleop drill --short                     five faults, less than a minute
   teleop drill --composed --json drill.json
+  teleop drill --set real_time.priority=50  on a machine that others keep busy
 it starts sessions of its own, simulated, on a ROS domain of their own, kills and stops processes of
 these sessions alone, and keeps the machine's cores busy for seconds. Exit code 0: all as expected.
 """
@@ -38,6 +39,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="keep the recordings here; must not exist"
     )
+    setting_arguments(parser)
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -55,23 +57,21 @@ def _run(arguments: argparse.Namespace) -> int:
             check_place(file)
     if arguments.out is not None and arguments.out.exists():
         raise RecordingError(arguments.out, "exists already; choose another --out")
-    outcomes = _outcomes(exercises, arguments.out, is_composed=arguments.composed)
+    outcomes = _outcomes(exercises, arguments)
     _write(outcomes, arguments)
     return _show(outcomes)
 
 
-def _outcomes(
-    exercises: "tuple[Exercise, ...]", out: Path | None, *, is_composed: bool
-) -> "list[Outcome]":
+def _outcomes(exercises: "tuple[Exercise, ...]", arguments: argparse.Namespace) -> "list[Outcome]":
     from rich.console import Console
 
-    console = Console()
+    console, out = Console(), arguments.out
     with ExitStack() as end:
         folder = out or Path(end.enter_context(tempfile.TemporaryDirectory(prefix="drill_")))
         return ros_module("drill").drill(  # type: ignore[no-any-return]
             exercises, folder,
             lambda line: console.print(line, highlight=False, markup=False, soft_wrap=True),
-            is_composed=is_composed,
+            is_composed=arguments.composed, files=arguments.config, texts=arguments.settings,
         )  # fmt: skip
 
 

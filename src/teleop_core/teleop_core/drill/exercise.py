@@ -45,6 +45,9 @@ class Rig(Protocol):
     def mark(self) -> None:
         """The fault begins now; without a word it is when :attr:`Exercise.inject` is called."""
 
+    def note(self, text: str) -> None:
+        """Say something that belongs beside the state."""
+
     def wait(self, seconds: float) -> None:
         """Let time pass [s]."""
 
@@ -83,6 +86,9 @@ class Rig(Protocol):
 
     def setpoint(self) -> Array:
         """Newest joint setpoint (n,) of the slave [rad or m]."""
+
+    def effort_limit(self) -> Array:
+        """What the slave's drives can give, shape (n,) [N·m or N]."""
 
     def now_ns(self) -> int:
         """Time [ns]."""

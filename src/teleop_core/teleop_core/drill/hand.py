@@ -17,6 +17,8 @@ PERIOD = 2e-3
 """Time from sample to sample [s], as of a device at 500 Hz."""
 RADIUS, ROUND = 0.02, 2.0
 """Radius [m] and time of one round [s] of the circle."""
+SPEED = 2.0 * math.pi * RADIUS / ROUND
+"""Speed of the stylus [m/s]."""
 _EASE = 1.0  # it sets in within this time [s]
 
 

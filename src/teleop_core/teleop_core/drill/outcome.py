@@ -9,6 +9,8 @@ from teleop_core.operation import Fault, State
 LARGEST_RATIO = 1.0 + 1e-9
 """Largest step of a setpoint over what its drive can do, up to rounding."""
 
+_SHORT = 20  # notes that fit beside the state
+
 
 @dataclass(kw_only=True)
 class Outcome:
@@ -71,9 +73,10 @@ class Outcome:
 
     @property
     def state_text(self) -> str:
-        """State and fault: ``"PAUSED: silence"``."""
+        """State, fault, and a note if it is short: ``"PAUSED: silence"``."""
         text = _state(self.state)
-        return text if self.fault is Fault.NONE else f"{text}: {self.fault.word}"
+        text = text if self.fault is Fault.NONE else f"{text}: {self.fault.word}"
+        return f"{text} ({self.note})" if 0 < len(self.note) < _SHORT else text
 
     def to_json(self) -> dict[str, object]:
         """All of it, in SI units, for a file."""

@@ -134,7 +134,8 @@ SAMPLES = (
     _disturbed("stamps_frozen", "hand's stamps stand still", hand.frozen_stamps(), is_held=True),
     _disturbed("stamps_zero", "hand's stamps are 0", hand.stamped(lambda _: 0), is_held=True),
     _disturbed(
-        "stamps_ahead", "hand's stamps 2 s ahead", hand.stamped(lambda ns: ns + _AHEAD_NS)
+        "stamps_ahead", "hand's stamps 2 s ahead", hand.stamped(lambda ns: ns + _AHEAD_NS),
+        is_held=True,
     ),
     Exercise(
         name="buttons_silent", text="buttons silent for 1.5 s, hand goes on", inject=_mute,

@@ -49,14 +49,14 @@ def _press_while_masked(rig: Rig) -> None:
     rig.press(is_pressed=True)
     rig.wait(0.1)
     rig.press(is_pressed=False)
-    rig.command("enable")
-    rig.command("resume")
+    is_taken = rig.command("enable") or rig.command("resume")
+    rig.note("taken" if is_taken else "refused")
 
 
 def _load_joints(rig: Rig) -> None:
     """Friction that no drive overcomes: as a payload far too heavy, or a hand that holds."""
     rig.mark()
-    rig.set("slave_sim", "coulomb", [1e3] * len(rig.setpoint()))
+    rig.set("slave_sim", "coulomb", (2.0 * rig.effort_limit()).tolist())
 
 
 def _unload(rig: Rig) -> None:
@@ -66,13 +66,15 @@ def _unload(rig: Rig) -> None:
 def _take_bad_gains(rig: Rig) -> None:
     """A bandwidth at which no sampled loop at 1 kHz is stable."""
     rig.mark()
-    rig.set("slave_sim", "controller.pid.bandwidth", [3000.0] * len(rig.setpoint()))
+    is_taken = rig.set("slave_sim", "controller.pid.bandwidth", [3000.0] * len(rig.setpoint()))
+    rig.note("taken" if is_taken else "refused")
 
 
 def _take_slack_gains(rig: Rig) -> None:
     """A bandwidth at which the arm follows nothing."""
     rig.mark()
-    rig.set("slave_sim", "controller.pid.bandwidth", [0.1] * len(rig.setpoint()))
+    is_taken = rig.set("slave_sim", "controller.pid.bandwidth", [0.1] * len(rig.setpoint()))
+    rig.note("taken" if is_taken else "refused")
 
 
 def _take_good_gains(rig: Rig) -> None:

@@ -16,6 +16,7 @@ from teleop_core.drill.exercise import Cure, Exercise, Master, Motion
 from teleop_core.drill.outcome import Outcome
 from teleop_core.drill.recordings import check_recording
 from teleop_core.errors import SessionError
+from teleop_core.geometry import Array
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.drill_rig import LiveRig
 from teleop_core.operation import Fault, State
@@ -46,7 +47,13 @@ Say = Callable[[str], None]
 
 
 def drill(
-    exercises: Sequence[Exercise], folder: Path, say: Say, *, is_composed: bool = False
+    exercises: Sequence[Exercise],
+    folder: Path,
+    say: Say,
+    *,
+    is_composed: bool = False,
+    files: Sequence[Path] = (),
+    texts: Sequence[str] = (),
 ) -> list[Outcome]:
     """Do exercises in sessions of their own, on a ROS domain of their own.
 
@@ -55,9 +62,11 @@ def drill(
         folder: Where recordings go.
         say: Told a line about each.
         is_composed: Whether all nodes share one process.
+        files: Parameter files over the scenario ``free_motion``.
+        texts: Parameters ``key=value`` over all files.
 
     Raises:
-        SessionError: A session cannot be started.
+        TeleopError: A parameter is wrong, or a session cannot be started.
     """
     sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for its turn
     outcomes: list[Outcome] = []
@@ -66,7 +75,8 @@ def drill(
         if own:
             place = folder / master.name.lower()
             place.mkdir(parents=True)
-            outcomes += _Drill(master, place, say, is_composed=is_composed).run(own)
+            made = _configuration(master, files, texts)
+            outcomes += _Drill(master, made, place, say, is_composed=is_composed).run(own)
     order = [one.name for one in exercises]
     return sorted(outcomes, key=lambda outcome: order.index(outcome.exercise.name))
 
@@ -75,17 +85,19 @@ def drill(
 class _Limits:
     """What the slave's drives can do."""
 
-    speed: np.ndarray
-    braking: np.ndarray
+    speed: Array
+    braking: Array
 
 
 class _Drill:
     """Exercises with one master."""
 
-    def __init__(self, master: Master, folder: Path, say: Say, *, is_composed: bool) -> None:
+    def __init__(
+        self, master: Master, configuration: Configuration, folder: Path, say: Say, *,
+        is_composed: bool,
+    ) -> None:  # fmt: skip
         self._master, self._folder, self._say = master, folder, say
-        self._is_composed = is_composed
-        self._configuration = _configuration(master)
+        self._is_composed, self._configuration = is_composed, configuration
         slave = SlaveSim(self._configuration.group("slave_sim"))
         self._robot: Robot = slave.robot
         self._limits = _Limits(
@@ -106,6 +118,7 @@ class _Drill:
                 outcomes.append(outcome)
                 self._say(_line(outcome))
                 if math.isnan(outcome.recovered):
+                    outcome.note = rig.complaints()
                     self._close()
         finally:
             self._close()
@@ -174,12 +187,12 @@ class _Drill:
         rig.wait(exercise.watch)
         end_ns = time.time_ns()
         self._note_state(outcome, rig, before)
-        self._note_motion(outcome, rig, joints, end_ns)
-        dead = rig.session.dead()
-        if exercise.ends_process and dead and exercise.name.startswith("kill"):
-            self._killed[rig.session.recordings[-1]] = rig.begin_ns
+        outcome.note, begin_ns = rig.said, rig.begin_ns
+        if exercise.ends_process and rig.session.dead() and exercise.name.startswith("kill"):
+            self._killed[rig.session.recordings[-1]] = begin_ns
         exercise.undo(rig)
         self._recover(outcome, rig)
+        self._note_motion(outcome, rig, joints, begin_ns, end_ns)  # which takes a while
         return outcome
 
     def _note_state(self, outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None:
@@ -209,9 +222,10 @@ class _Drill:
         wanted, found = rig.tap.trace(SLAVE_SETPOINT_CP), rig.tap.trace(SLAVE_MEASURED_CP)
         outcome.ratio = measure.step_ratio(setpoints, self._limits.speed, DT)
         outcome.travel = measure.travel(found, begin_ns, end_ns)
-        outcome.extra["stop_s"] = measure.stop_delay(setpoints, begin_ns)
+        stopped = setpoints.within(0, end_ns)
+        outcome.extra["stop_s"] = measure.stop_delay(stopped, begin_ns)
         outcome.extra["tip_speed"] = measure.tip_speed(found.within(begin_ns, end_ns))
-        speed = measure.speed_before(wanted, begin_ns)
+        speed = min(measure.speed_before(wanted, begin_ns), 1.5 * hand.SPEED)
         jacobian = self._robot.jacobian(joints)
         bound = measure.lag(wanted, found, begin_ns) + measure.RESOLUTION
         bound += measure.braking_way(setpoints, begin_ns, jacobian, self._limits.braking)
@@ -258,13 +272,13 @@ class _Drill:
         return Cure.NOTHING
 
 
-def _configuration(master: Master) -> Configuration:
+def _configuration(master: Master, files: Sequence[Path], texts: Sequence[str]) -> Configuration:
     """Configuration of a session: the hand goes round at constant speed."""
-    if master is Master.DEVICE:
-        return api.configuration("free_motion", texts=_CIRCLE)
-    load_own_parts([Path(inside.__file__)])
-    stages = f"teleop.stages=[{inside.STAGE_NAME}]"
-    return api.configuration("free_motion", texts=(*_CIRCLE, stages))
+    own = _CIRCLE
+    if master is Master.DRILL:
+        load_own_parts([Path(inside.__file__)])
+        own = (*own, f"teleop.stages=[{inside.STAGE_NAME}]")
+    return api.configuration("free_motion", files=files, texts=(*own, *texts))
 
 
 def _environment(master: Master) -> dict[str, str]:
@@ -285,4 +299,5 @@ def _differs(report: dict[str, float], before: dict[str, float]) -> bool:
 def _line(outcome: Outcome) -> str:
     failures = outcome.failures()
     mark = "✗" if failures else "✓"
-    return f"{mark} {outcome.exercise.name}: {'; '.join(failures) or outcome.state_text}"
+    note = f" ({outcome.note})" if outcome.note else ""
+    return f"{mark} {outcome.exercise.name}: {'; '.join(failures) or outcome.state_text}{note}"

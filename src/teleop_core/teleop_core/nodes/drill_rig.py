@@ -28,6 +28,7 @@ from teleop_core.operation import State
 from teleop_core.operation.states import COMMANDS
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
+from teleop_core.session.layers import SESSION
 from teleop_core.topics import SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
 
 _ANSWER = 3.0  # patience with a service [s]
@@ -70,8 +71,11 @@ class LiveRig:
         }
         self._settings = self._node.create_client(SetParameters, "/slave_sim/set_parameters")
         self._intruders: dict[str, Any] = {}
-        self.begin_ns, self.warned = 0, dict[str, int]()
-        self.tap = Tap(self._own, robot.joint_names, has_hand=master is Master.DRILL)
+        self.begin_ns, self.warned, self.said = 0, dict[str, int](), ""
+        self.tap = Tap(
+            self._own, robot.joint_names, configuration.groups[SESSION].real_time,
+            has_hand=master is Master.DRILL,
+        )  # fmt: skip
 
     def _make_node(self, name: str) -> Node:
         return Node(name, context=self._context, use_global_arguments=False, enable_rosout=False)
@@ -92,7 +96,11 @@ class LiveRig:
 
     def mark(self) -> None:
         """The fault begins now."""
-        self.begin_ns, self.warned = time.time_ns(), {}
+        self.begin_ns, self.warned, self.said = time.time_ns(), {}, ""
+
+    def note(self, text: str) -> None:
+        """Say something that belongs beside the state."""
+        self.said = text
 
     def now_ns(self) -> int:
         """Time [ns]."""
@@ -112,6 +120,11 @@ class LiveRig:
         """Newest joint setpoint (n,) of the slave [rad or m]."""
         rows = self.tap.recent(SLAVE_SETPOINT_JS, 1)
         return np.array(rows[-1] if len(rows) else self._robot.home)
+
+    def effort_limit(self) -> Array:
+        """What the slave's drives can give, shape (n,) [N·m or N]."""
+        assert self._robot.drives is not None
+        return np.array(self._robot.drives.effort_limit)
 
     def operation(self) -> dict[str, float]:
         """Newest report of the slave's operation; empty before the first."""

@@ -13,7 +13,9 @@ from teleop_core.drill import hand
 from teleop_core.drill.hand import Distortion, Sample
 from teleop_core.drill.measure import Trace
 from teleop_core.geometry import Array
+from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.streams import Subscription, message_type, profile
+from teleop_core.session.layers import RealTimeParameters
 from teleop_core.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
@@ -38,6 +40,7 @@ class Tap:
     Args:
         node: Node that owns its topics; no executor serves it.
         joint_names: Of the slave.
+        real_time: What its thread asks of the system.
         has_hand: Whether it is the master.
 
     Attributes:
@@ -45,7 +48,11 @@ class Tap:
         is_mute: Whether no buttons are sent.
     """
 
-    def __init__(self, node: Node, joint_names: tuple[str, ...], *, has_hand: bool) -> None:
+    def __init__(
+        self, node: Node, joint_names: tuple[str, ...], real_time: RealTimeParameters, *,
+        has_hand: bool,
+    ) -> None:  # fmt: skip
+        self._real_time = real_time
         self.distortion: Distortion = hand.faithful
         self.is_mute, self._joint_names = False, joint_names
         self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
@@ -110,6 +117,7 @@ class Tap:
         ]
 
     def _run(self) -> None:
+        apply_options(self._real_time)
         due = time.monotonic()
         while self._is_running:
             if self._hand is not None:
