@@ -1,0 +1,80 @@
+"""Bytes on every topic that is subscribed to: numbers of the right shape come out, or a reason."""
+
+import math
+
+import pytest
+from hypothesis import strategies as st
+
+from fuzzing import damaged, fuzz
+from teleop_core.bags.messages import (
+    Refusal,
+    check,
+    discover,
+    layout,
+    read_any,
+    read_numbers,
+    read_reports,
+    report,
+)
+from teleop_core.stage import STAGES
+from teleop_core.topics import DIAGNOSTICS, Kind
+
+JOINTS = ("theta1", "theta2", "d3", "theta4", "theta5", "theta6")
+READ = {topic.name: topic for name in STAGES.names() for topic in STAGES.find(name).reads}
+STREAMS = [topic for topic in READ.values() if topic.kind is not Kind.REPORT]
+REPORTS = [topic for topic in READ.values() if topic.kind is Kind.REPORT]
+PARTS = len(STREAMS) + len(REPORTS) + 1
+STAMPS = st.one_of(st.none(), st.integers(0, 2**62))
+
+
+def broken(whole):
+    return st.one_of(st.binary(max_size=400), damaged(whole), st.just(whole))
+
+
+def streams(topic):
+    """Test of what an input does with the bytes of a stream."""
+    names, width = topic.names(JOINTS), topic.width(len(JOINTS))
+    form = layout(topic, JOINTS)
+    whole = form.encode_one(7, form.decode_one(form.template.tobytes())[1])
+
+    @fuzz("CDR", PARTS, data=broken(whole), last_ns=STAMPS)
+    def case(data, last_ns):
+        found = form.decode_one(data) or read_any(topic.kind, data, names)
+        if isinstance(found, Refusal):
+            return
+        stamp_ns, values = found
+        assert values.shape == (width,)
+        reason = check(topic.kind, stamp_ns, values, last_ns)
+        if reason is None:
+            assert all(map(math.isfinite, values.tolist()))
+            assert last_ns is None or stamp_ns > last_ns
+        discover(topic.kind, data)
+
+    return case
+
+
+@pytest.mark.parametrize("topic", STREAMS, ids=lambda topic: topic.name)
+def test_any_bytes_of_a_stream_give_sound_numbers_or_a_reason(topic):
+    streams(topic)()
+
+
+def reports(columns):
+    """Test of what is made of the bytes of a report."""
+    whole = report(5, "slave_sim", 1, "fine", dict.fromkeys(columns, "1.5"))
+
+    @fuzz("CDR", PARTS, data=broken(whole))
+    def case(data):
+        found = read_numbers(data, columns)
+        assert isinstance(found, Refusal) or found[1].shape == (len(columns),)
+        if found is Refusal.MALFORMED:
+            with pytest.raises(ValueError, match="bytes are no"):
+                read_reports(data)
+        else:
+            read_reports(data)
+
+    return case
+
+
+@pytest.mark.parametrize("topic", [*REPORTS, DIAGNOSTICS], ids=lambda topic: topic.name)
+def test_any_bytes_of_a_report_give_numbers_or_a_reason(topic):
+    reports(topic.columns or ("rate_hz", "late"))()
