@@ -64,7 +64,8 @@ def topics_page(graph: Graph) -> str:
     rows.append(topic_row(DIAGNOSTICS, "every node", graph))
     return page([
         "# Topics",
-        "CRTK names, standard messages, SI units. Streams are best effort with a queue of one, "
+        "CRTK names, standard messages, SI units. Streams are offered reliable with a queue of "
+        "one, so that subscribers of both kinds get them, and read best effort, "
         "`teleop/state` is latched, `diagnostics` comes once a second. The recorder takes all of "
         "them. Those of a further arm stand below its name: `left/slave/servo_cp`.",
         "\n".join(rows),

@@ -20,7 +20,7 @@ the tip got meanwhile [m], both 0 until then."""
 class Quality(Enum):
     """How a topic is transported."""
 
-    STREAM = "best effort, keep last 1: only the newest sample matters"
+    STREAM = "offered reliable, read best effort, keep last 1: only the newest sample matters"
     LATCHED = "reliable, transient local, keep last 1: late joiners get the last value"
     REPORT = "reliable, keep last 10: rare reports"
 
