@@ -70,7 +70,7 @@ def _wrong(code: int, bag: Path, temporary: Path) -> str:
             found.append("recording empty")
     except (TeleopError, KeyError) as error:
         found.append(f"recording not readable: {error}")
-    left = [path.name for path in temporary.iterdir()]
+    left = [path.name for path in temporary.rglob("*") if not path.is_dir()]
     found += [f"left {name}" for name in left]
     return ", ".join(found + [f"process {pid} is left" for pid in _left(temporary)])
 
