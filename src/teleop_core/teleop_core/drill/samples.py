@@ -148,8 +148,8 @@ SAMPLES = (
     ),
     Exercise(
         name="second_commander", text="second publisher of slave/servo_jp",
-        inject=_second_commander, undo=_leave(SLAVE_SERVO_JP), states=(State.PAUSED,),
-        faults=(Fault.PUBLISHERS,), cures=(Cure.RESUME,), allowed=0.3,
+        inject=_second_commander, undo=_leave(SLAVE_SERVO_JP), motion=Motion.GOES_ON,
+        states=(State.ENABLED, State.PAUSED), faults=_WRONG, cures=(Cure.NOTHING, Cure.RESUME),
     ),
     Exercise(
         name="spoofed_setpoint", text="forged slave/setpoint_js, 0.05 rad off, stamp 0",

@@ -216,8 +216,9 @@ class _Drill:
         rest = rig.operation().get("rest_time", 0.0)
         outcome.extra["rest_s"] = rest if outcome.state is not State.ENABLED else math.nan
 
-    def _note_motion(self, outcome: Outcome, rig: LiveRig, joints: np.ndarray, end_ns: int) -> None:
-        begin_ns = rig.begin_ns
+    def _note_motion(
+        self, outcome: Outcome, rig: LiveRig, joints: Array, begin_ns: int, end_ns: int
+    ) -> None:
         setpoints = rig.tap.trace(SLAVE_SETPOINT_JS)
         wanted, found = rig.tap.trace(SLAVE_SETPOINT_CP), rig.tap.trace(SLAVE_MEASURED_CP)
         outcome.ratio = measure.step_ratio(setpoints, self._limits.speed, DT)
@@ -274,7 +275,7 @@ class _Drill:
 
 def _configuration(master: Master, files: Sequence[Path], texts: Sequence[str]) -> Configuration:
     """Configuration of a session: the hand goes round at constant speed."""
-    own = _CIRCLE
+    own: tuple[str, ...] = _CIRCLE
     if master is Master.DRILL:
         load_own_parts([Path(inside.__file__)])
         own = (*own, f"teleop.stages=[{inside.STAGE_NAME}]")
@@ -299,5 +300,5 @@ def _differs(report: dict[str, float], before: dict[str, float]) -> bool:
 def _line(outcome: Outcome) -> str:
     failures = outcome.failures()
     mark = "✗" if failures else "✓"
-    note = f" ({outcome.note})" if outcome.note else ""
+    note = f" ({outcome.note})" if math.isnan(outcome.recovered) else ""
     return f"{mark} {outcome.exercise.name}: {'; '.join(failures) or outcome.state_text}{note}"
