@@ -1,0 +1,57 @@
+"""Drill: the short form of the fault matrix, as the command that people run."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from teleop_core.drill import SHORT
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+LIMITS = 1.0 + 1e-9
+
+
+def run_drill(tmp_path, *arguments):
+    """Exit code, output and outcomes by name of ``teleop drill``."""
+    file = tmp_path / "drill.json"
+    command = [sys.executable, "-m", "teleop_core.cli", "drill", *arguments, "--json", str(file)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)
+    text = done.stdout + done.stderr
+    assert file.exists(), text
+    found = json.loads(file.read_text(encoding="utf-8"))["faults"]
+    return done.returncode, text, {one["fault"]: one for one in found}
+
+
+def test_the_short_form_of_the_fault_matrix_holds_in_five_processes(tmp_path):
+    code, text, outcomes = run_drill(tmp_path, "--short", "--out", str(tmp_path / "bags"))
+    assert set(outcomes) == set(SHORT)
+    for one in outcomes.values():
+        assert one["step_ratio"] <= LIMITS, text
+        assert one["recording"] == "intact", text
+        assert one["recovered_s"] is not None, text
+    assert outcomes["kill_motion_scaling"]["state"] == "PAUSED", text
+    assert outcomes["stop_topic"]["state"] == "FAULT", text
+    assert outcomes["stop_topic"]["told"] == "stop", text
+    assert (code == 0) is all(one["is_passed"] for one in outcomes.values())
+    assert {file.name for file in (tmp_path / "bags").rglob("metadata.yaml")} == {"metadata.yaml"}
+
+
+def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path):
+    names = ("stop_service", "nan", "infinite", "teleport")
+    code, text, outcomes = run_drill(tmp_path, "--composed", *names)
+    assert set(outcomes) == set(names)
+    for one in outcomes.values():
+        assert one["step_ratio"] <= LIMITS, text
+        assert one["recovered_s"] is not None, text
+        assert one["recording"] == "intact", text
+    assert (code == 0) is all(one["is_passed"] for one in outcomes.values())
+
+
+def test_a_fault_that_there_is_not_is_refused_in_one_line_before_anything_starts():
+    command = [sys.executable, "-m", "teleop_core.cli", "drill", "explode"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert "explode" in done.stderr
+    assert "kill_motion_scaling" in done.stderr
