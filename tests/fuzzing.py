@@ -32,12 +32,12 @@ from teleop_core.texts import LONGEST_LINE, printable
 USUAL = 20_000
 CASES = int(os.environ.get("TELEOP_FUZZ_CASES", USUAL))
 SHARES = {
-    "CDR": 0.20,
+    "CDR": 0.29,
     "chunks": 0.20,
-    "configurations": 0.05,
-    "metadata": 0.10,
+    "configurations": 0.03,
+    "metadata": 0.08,
     "recordings": 0.15,
-    "settings": 0.15,
+    "settings": 0.10,
     "state commands": 0.10,
     "stored configurations": 0.05,
 }

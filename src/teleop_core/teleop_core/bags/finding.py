@@ -48,10 +48,17 @@ def _listed(path: Path, index: Path) -> list[Path]:
     plain = [Path(name).name for name in names]
     if twice := [name for name in dict.fromkeys(plain) if plain.count(name) > 1]:
         raise _damaged(index, f"it lists {twice[0]} {plain.count(twice[0])} times")
-    missing = [name for name in plain if name in {"", ".."} or not (path / name).is_file()]
+    missing = [name for name in plain if name in {"", ".."} or not _is_file(path / name)]
     if missing:
         raise RecordingError(path, f"lacks its files {', '.join(missing)}")
     return [path / name for name in plain]
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # its name is too long
+        return False
 
 
 def _information(index: Path) -> Mapping[str, object]:
