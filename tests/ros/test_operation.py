@@ -1,0 +1,146 @@
+"""Operation over real topics: who may move, how an arm is stopped, and how it goes on."""
+
+import time
+
+import numpy as np
+import pytest
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.operation import State
+from teleop_core.robots import load_robot
+from teleop_core.topics import SLAVE_OPERATION, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS
+
+pytestmark = pytest.mark.ros
+HOME = load_robot("rcrt1").home
+
+
+class Streamer:
+    """Commands that swing joint 1, and what the slave makes of them."""
+
+    def __init__(self, peer):
+        self.peer, self.begin = peer, time.monotonic()
+        self.setpoints = peer.listen(SLAVE_SETPOINT_JS)
+        peer.publisher(SLAVE_SERVO_JP)
+
+    def send(self):
+        """One command of the swing."""
+        goal = HOME.copy()
+        goal[0] += 0.1 * np.sin(2.0 * np.pi * (time.monotonic() - self.begin))
+        self.peer.send(SLAVE_SERVO_JP, time.time_ns(), goal)
+        self.setpoints.take()
+
+    def until(self, condition, what):
+        """Send commands until something is so."""
+
+        def turn():
+            self.send()
+            time.sleep(0.001)  # the rate of commands, not a wait
+            return condition()
+
+        return self.peer.wait(turn, what)
+
+    def moves(self):
+        """Whether the last setpoints differ."""
+        last = self.setpoints.values[-50:]
+        return len(last) == 50 and np.ptp(np.array(last)[:, 0]) > 1e-3
+
+    def rests(self):
+        """Whether the last setpoints are one and the same."""
+        last = self.setpoints.values[-50:]
+        return len(last) == 50 and np.ptp(np.array(last)[:, 0]) == 0.0
+
+
+def state(peer):
+    status = operation(peer)
+    return None if status is None else State(int(float(status["state"])))
+
+
+def operation(peer):
+    """Newest report of the slave's operation, by name."""
+    if not hasattr(peer, "operation"):
+        from teleop_core.bags.reports import read_reports
+        from teleop_core.nodes.streams import Subscription
+
+        peer.operation, peer.read = Subscription(peer.node, SLAVE_OPERATION, "slave/operation"), {}
+        peer.read_reports = read_reports
+    while (taken := peer.operation.take()) is not None:
+        for report in peer.read_reports(taken[0]):
+            peer.read = report.values
+    return peer.read or None
+
+
+def command(peer, name):
+    answer = peer.call(Trigger, f"/slave/{name}", Trigger.Request())
+    return answer.success, answer.message
+
+
+def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable_end_it(peer):
+    peer.start("slave_sim")
+    streamer = Streamer(peer)
+    streamer.until(streamer.moves, "motion")
+    button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
+    streamer.until(lambda: button.get_subscription_count() >= 1, "a reader of the stop")
+    pressed_ns = time.time_ns()
+    button.publish(Bool(data=True))
+    streamer.until(lambda: state(peer) is State.FAULT, "FAULT")
+    streamer.until(streamer.rests, "standstill")
+    stopped_at = np.array(streamer.setpoints.values)[-1, 0]
+    streamer.until(lambda: float(operation(peer)["rest_time"]) > 0.0, "rest")
+    count = len(streamer.setpoints.values)
+    streamer.until(lambda: len(streamer.setpoints.values) > count + 100, "more setpoints")
+    assert np.ptp(np.array(streamer.setpoints.values)[count - 50 :, 0]) == 0.0
+    assert float(operation(peer)["is_stopped"]) == 1.0
+    assert pressed_ns > 0
+    ok, text = command(peer, "enable")
+    assert not ok
+    assert "reset" in text
+    assert not command(peer, "reset")[0]  # still pressed
+    button.publish(Bool(data=False))
+
+    def is_reset():
+        return command(peer, "reset")[0]
+
+    streamer.until(is_reset, "a reset after the release")
+    streamer.until(lambda: command(peer, "enable")[0], "enabled")
+    streamer.until(streamer.moves, "motion after the stop")
+    assert abs(stopped_at - HOME[0]) <= 0.11
+
+
+def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer):
+    peer.start("slave_sim", operation__starts_enabled=False)
+    streamer = Streamer(peer)
+    streamer.until(lambda: state(peer) is State.DISABLED, "DISABLED")
+    streamer.until(lambda: len(streamer.setpoints.values) > 300, "setpoints")
+    assert np.ptp(np.array(streamer.setpoints.values)[:, 0]) == 0.0
+    ok, text = command(peer, "home")
+    assert not ok
+    assert "enable first" in text
+    assert command(peer, "enable")[0]
+    assert command(peer, "home")[0]
+    streamer.until(streamer.moves, "motion")
+    assert command(peer, "pause")[0]
+    streamer.until(lambda: state(peer) is State.PAUSED, "PAUSED")
+    streamer.until(streamer.rests, "standstill")
+    streamer.until(lambda: command(peer, "resume")[0], "resumed, once it is at rest")
+    streamer.until(streamer.moves, "motion again")
+
+
+def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer):
+    peer.start("slave_sim", arm="left")
+    peer.start("slave_sim", arm="right")
+    for arm in ("left", "right"):
+        answer = peer.call(Trigger, f"/{arm}/slave/pause", Trigger.Request())
+        assert answer.success
+    assert peer.call(Trigger, "/left/slave/resume", Trigger.Request()).success
+    button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
+    peer.wait(lambda: button.get_subscription_count() >= 2, "both arms at the stop")
+    button.publish(Bool(data=True))
+    for arm in ("left", "right"):
+
+        def is_stopped(arm=arm):
+            answer = peer.call(Trigger, f"/{arm}/slave/resume", Trigger.Request())
+            return not answer.success and "FAULT" in answer.message
+
+        peer.wait(is_stopped, f"{arm} stopped")
