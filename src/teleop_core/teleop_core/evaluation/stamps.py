@@ -5,7 +5,7 @@ import numpy as np
 from teleop_core.evaluation.accumulators import Distribution
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.windows import Window
-from teleop_core.topics import Topic
+from teleop_core.topics import NO_COMMAND_NS, Topic
 
 
 class StampTally:
@@ -20,8 +20,8 @@ class StampTally:
         own = window.own(self._topic)
         if own.stop > own.start:
             stamps = window.series[self._topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
-            # A slave without any command yet holds its pose under the stamp 0.
-            steps = np.diff(stamps)[stamps[:-1] > 0]
+            # A slave without any command yet holds its pose under this stamp, or 0 in old recordings.
+            steps = np.diff(stamps)[stamps[:-1] > NO_COMMAND_NS]
             if self._topic.stamp.of:
                 self._repeats += int((steps == 0).sum())
             self._steps.add(steps[steps > 0])
