@@ -332,6 +332,25 @@ def test_steps_add_up_from_command_to_command(bench):
     np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.05 * SMALL, atol=1e-12)
 
 
+def test_steps_that_come_within_one_tick_are_all_taken(bench):
+    for _ in range(5):
+        bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS)
+    bench.run(200)
+    np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.005 * SMALL, atol=1e-12)
+
+
+def test_steps_are_taken_after_references_of_the_topic(bench):
+    for _ in range(20):
+        bench.follow(MIDDLE)
+    old_ns = int(bench.slave.signals["slave_servo_jp_ns"])
+    for _ in range(10):
+        bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS // 2)
+        bench.run(1)
+        bench.slave.signals["slave_servo_jp_ns"] = old_ns  # as a node does that heard nothing new
+    bench.run(200)
+    np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.01 * SMALL, atol=1e-12)
+
+
 def test_references_by_command_are_followed_as_those_of_the_topic():
     one, other = Bench(), Bench()
     for share in np.linspace(0.0, 0.2, 200):

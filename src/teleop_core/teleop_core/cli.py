@@ -9,7 +9,16 @@ import warnings
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.commands import calibrate, drill, exchange, experiment, fit, operate, reach
+from teleop_core.commands import (
+    calibrate,
+    conformance,
+    drill,
+    exchange,
+    experiment,
+    fit,
+    operate,
+    reach,
+)
 from teleop_core.commands.arguments import (
     command,
     configured,
@@ -105,6 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     fit.add(commands)
     drill.add(commands)
     operate.add(commands)
+    conformance.add(commands)
     return parser
 
 

@@ -94,7 +94,7 @@ class CrtkSlave:
             ("interpolate_jp", _JOINTS, True,
              lambda m: self._locked(motion.servo, self._of(m), now())),
             ("interpolate_cp", _POSE, True, self._interpolate_cp),
-            ("servo_jr", _JOINTS, True,
+            ("servo_jr", _JOINTS, False,  # each counts
              lambda m: self._locked(motion.servo_by, self._of(m), now())),
             ("servo_jv", _JOINTS, True,
              lambda m: self._locked(motion.drive_joints, self._of(m, "velocity"), now())),

@@ -34,7 +34,6 @@ class Commanded(Protocol):
     robot: Robot
     parameters: Any
     state: Any
-    signals: Any
 
     def request(self, event: Event | str) -> Told:
         """Take a command of the state machine."""
@@ -161,13 +160,15 @@ class MotionCommands:
         wanted = self._joints(joints)
         if refusal := self._unfit(wanted) or self._refusal():
             return refusal
-        row = self._slave.signals
-        row["slave_servo_jp"], row["slave_servo_jp_ns"] = wanted, now_ns
+        s = self._slave.state
+        s["asked"], s["asked_ns"] = wanted, now_ns
         return Answer.DONE, "servo: taken"
 
     def servo_by(self, step: object, now_ns: int) -> Told:
         """Follow steps of joints (n,) [rad or m], each from the last command."""
-        return self.servo(self._slave.state["target"] + self._joints(step), now_ns)
+        s = self._slave.state
+        last = s["asked"] if s["asked_ns"] else s["target"]
+        return self.servo(last + self._joints(step), now_ns)
 
     def hold(self) -> Told:
         """Brake to rest, and stay there until the next command; a stream in force goes on.

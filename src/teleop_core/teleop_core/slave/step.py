@@ -56,7 +56,7 @@ def slave_records(n: int) -> tuple[Any, Any]:
     rows = [(name, "f8", (n,)) for name in joints]
     numbers = [(name, "f8") for name in scalars] + [(name, "i8") for name in counts]
     moved = ("command", "filtered", "setpoint", "target", *WAY_FIELDS, "step", "move_from",
-             "move_to", "drive")  # fmt: skip
+             "move_to", "drive", "asked")  # fmt: skip
     plant = ("measured", "speed", "bent", "grip", "astray", "carried")
     state: list[Field] = [(name, "f8", (n,)) for name in (*moved, *plant)]
     state += [(name, "i8", (n,)) for name in ("noise", "full_ticks")] + [("tool_step", "f8")]
@@ -64,6 +64,7 @@ def slave_records(n: int) -> tuple[Any, Any]:
     stamps = (
         "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "refused_before", "in_row",
         "moved_ticks", "move_ticks", "ticks", "span", "motion", "driven_ns",
+        "asked_ns",
     )  # fmt: skip
     whole = [*state, *((name, "i8") for name in stamps), *OPERATION_STATE]
     return records([*rows, *numbers, *OPERATION_PARAMETERS])[0], records(whole)[0]
@@ -211,6 +212,9 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     """
     joints, n = arm.joints, arm.q.shape[0]
     begin_tick(p, s, row.now_ns)
+    if s.asked_ns != 0:  # as a message of servo_jp would
+        copy(s.asked, row.slave_servo_jp)
+        row.slave_servo_jp_ns, s.asked_ns = s.asked_ns, 0
     row.command_status = take_command(p, s, row, dt)
     if s.state != _ENABLED:
         s.motion = 0
