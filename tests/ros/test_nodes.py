@@ -122,7 +122,7 @@ def test_slave_sim_follows_and_passes_the_stamp_of_the_command_on(peer):
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     peer.start("slave_sim")
     peer.wait(lambda: measured.take() > 100, "slave/measured_js")
-    assert set(setpoints.stamps) <= {0}
+    assert set(setpoints.stamps) <= {topics.NO_COMMAND_NS}
     wanted, stamp = HOME - 0.001 * np.eye(6)[0], 0
 
     def passed_on():
@@ -134,7 +134,7 @@ def test_slave_sim_follows_and_passes_the_stamp_of_the_command_on(peer):
     peer.wait(passed_on, "stamp passed on")
 
     def arrived():
-        setpoints.take()
+        passed_on()
         return np.allclose(setpoints.values[-1], wanted, atol=1e-9)
 
     peer.wait(arrived, "slave at the reference")

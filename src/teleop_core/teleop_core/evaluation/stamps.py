@@ -20,7 +20,7 @@ class StampTally:
         own = window.own(self._topic)
         if own.stop > own.start:
             stamps = window.series[self._topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
-            # A slave without any command yet holds its pose under this stamp, or 0 in old recordings.
+            # Before the first command a slave holds its pose under this stamp; 0 in old recordings.
             steps = np.diff(stamps)[stamps[:-1] > NO_COMMAND_NS]
             if self._topic.stamp.of:
                 self._repeats += int((steps == 0).sum())
