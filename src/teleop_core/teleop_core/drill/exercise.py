@@ -127,7 +127,7 @@ class Exercise:
         allowed: Time for which it may go on as it moves [s], before it has to brake.
         watch: Time for which it is watched after the injection [s].
         ways: Which ways of running it makes sense in: True for composed.
-        ends_process: Whether the process of the recorder does not survive.
+        cuts_recording: Whether its recorder cannot close it.
         repeats: How often it is done; the worst of all is told.
     """
 
@@ -143,5 +143,5 @@ class Exercise:
     allowed: float = 0.1
     watch: float = 0.5
     ways: tuple[bool, ...] = (False, True)
-    ends_process: bool = False
+    cuts_recording: bool = False
     repeats: int = 1

@@ -81,7 +81,7 @@ def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exerci
     )  # fmt: skip
     together = Exercise(
         name=name, text=f"{text}: ends the session", inject=inject, undo=_mend, states=(None,),
-        cures=(Cure.RESTART,), watch=4.0, ways=(True,), ends_process=True,
+        cures=(Cure.RESTART,), watch=4.0, ways=(True,),
     )  # fmt: skip
     return alone, together
 
@@ -94,12 +94,12 @@ PROCESSES = (
     ),
     Exercise(
         name="kill_recorder", text="recorder killed", inject=partial(_kill, "recorder"),
-        motion=Motion.GOES_ON, master=Master.DEVICE, watch=1.0, ways=(False,), ends_process=True,
+        motion=Motion.GOES_ON, master=Master.DEVICE, watch=1.0, ways=(False,), cuts_recording=True,
     ),
     Exercise(
         name="kill_session", text="whole session killed", inject=partial(_kill, "slave_sim"),
         states=(None,), cures=(Cure.RESTART,), master=Master.DEVICE, ways=(True,),
-        ends_process=True,
+        cuts_recording=True,
     ),
     *(_frozen(node) for node in _STAGES),
     Exercise(
@@ -138,12 +138,12 @@ PROCESSES = (
     ),
     Exercise(
         name="disk_full", text="disk full under the recording", inject=_fill_disk,
-        motion=Motion.GOES_ON, ways=(False,), ends_process=True,
+        motion=Motion.GOES_ON, ways=(False,), cuts_recording=True,
     ),
     Exercise(
         name="disk_full", text="disk full under the recording: ends the session",
         inject=_fill_disk, states=(None,), cures=(Cure.RESTART,), allowed=3.0, watch=2.0,
-        ways=(True,), ends_process=True,
+        ways=(True,), cuts_recording=True,
     ),
 )  # fmt: skip
 """What becomes of processes and of the machine that they run on."""

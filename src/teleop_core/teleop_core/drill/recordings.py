@@ -17,10 +17,17 @@ LONGEST_LOSS = 0.2
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a recording, in words, and whether that is as it should be."""
+    """What became of a recording.
+
+    Attributes:
+        text: In words.
+        is_good: Whether that is as it should be.
+        is_saved: Whether what was recorded up to its end can be read, if only after ``recover``.
+    """
 
     text: str
     is_good: bool
+    is_saved: bool = False
 
 
 def check_recording(path: Path, killed_ns: int | None = None) -> Verdict:
@@ -28,7 +35,7 @@ def check_recording(path: Path, killed_ns: int | None = None) -> Verdict:
 
     Args:
         path: Its directory.
-        killed_ns: When its writer was killed [ns]; None if it was to close it itself.
+        killed_ns: When its writer lost its process or its disk [ns]; None if it was to close it.
     """
     try:
         if killed_ns is None:
@@ -52,11 +59,12 @@ def _opened(bag: Bag) -> Verdict:
                 pass
     if ours != theirs:
         return Verdict(f"{ours} messages, mcap finds {theirs}", is_good=False)
-    return Verdict("intact", is_good=True)
+    return Verdict("intact", is_good=True, is_saved=True)
 
 
 def _saved(path: Path, killed_ns: int) -> Verdict:
     saved, _ = recover(path, path.with_name(f"{path.name}_recovered"))
     last_ns = int(Bag(saved).read(SLAVE_MEASURED_JS).log_ns[-1])
     lost = max(0.0, 1e-9 * (killed_ns - last_ns))
-    return Verdict(f"all but the last {lost:.2f} s", is_good=lost <= LONGEST_LOSS)
+    text = f"all but the last {lost:.3f} s"
+    return Verdict(text, is_good=lost <= LONGEST_LOSS, is_saved=True)

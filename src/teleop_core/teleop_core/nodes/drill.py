@@ -33,7 +33,7 @@ from teleop_core.topics import (
     TELEOP_STATE,
 )
 
-_BEFORE = 0.4  # motion that is seen before a fault [s]
+_BEFORE = 0.2  # motion that is seen before a fault [s]
 _PATIENCE = 1.0  # for an arm that goes on by itself [s]
 _LONGEST = 60.0  # until an arm follows again, whatever it takes [s]
 _FOLLOWS = 90.0  # until it follows after the start [s]
@@ -42,6 +42,7 @@ _CIRCLE = (
     f"operator.period={hand.ROUND}", "operator.approach_time=1.0", "haptic_master.patience=0.0",
     "operator.rotation=0.0",
 )  # fmt: skip
+_STEADY = 4  # looks, a tenth of a second apart, at an arm that follows
 _STRENGTH = (Cure.NOTHING, Cure.RESUME, Cure.RESET, Cure.RESTART)
 Say = Callable[[str], None]
 
@@ -123,10 +124,16 @@ class _Drill:
         finally:
             self._close()
         for path, recorded in self._open.items():
-            verdict = check_recording(path, self._killed.get(path))
-            for outcome in recorded:
-                outcome.recording, outcome.is_recorded = verdict.text, verdict.is_good
+            self._judge(path, recorded)
         return outcomes
+
+    def _judge(self, path: Path, recorded: list[Outcome]) -> None:
+        """Say of each fault during a recording what it did to it."""
+        verdict = check_recording(path, self._killed.get(path))
+        for outcome in recorded:
+            outcome.recording, outcome.is_recorded = verdict.text, verdict.is_good
+            if verdict.is_saved and not outcome.exercise.cuts_recording:
+                outcome.recording, outcome.is_recorded = "intact", True
 
     # -- sessions --------------------------------------------------------------------------------
 
@@ -144,8 +151,13 @@ class _Drill:
             self._say(f"starts a session: {way}, the hand is that of {_who(self._master)}")
             self._rig.session.start()
         deadline = time.monotonic() + _FOLLOWS
-        while not self._rig.is_following():
-            self._help(self._rig)  # a busy machine may have paused it already
+        steady = 0
+        while steady < _STEADY:
+            if self._rig.is_following():
+                steady += 1
+            else:
+                steady = 0
+                self._help(self._rig)  # a busy machine may have paused it already
             self._rig.wait(0.1)
             if time.monotonic() > deadline:
                 raise SessionError(f"the slave does not follow: {self._rig.complaints()}")
@@ -188,7 +200,7 @@ class _Drill:
         end_ns = time.time_ns()
         self._note_state(outcome, rig, before)
         outcome.note, begin_ns = rig.said, rig.begin_ns
-        if exercise.ends_process and rig.session.dead() and exercise.name.startswith("kill"):
+        if exercise.cuts_recording:
             self._killed[rig.session.recordings[-1]] = begin_ns
         exercise.undo(rig)
         self._recover(outcome, rig)

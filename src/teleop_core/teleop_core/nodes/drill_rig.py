@@ -72,6 +72,7 @@ class LiveRig:
         self._settings = self._node.create_client(SetParameters, "/slave_sim/set_parameters")
         self._intruders: dict[str, Any] = {}
         self.begin_ns, self.warned, self.said = 0, dict[str, int](), ""
+        self._warned_before: set[str] = set()
         self.tap = Tap(
             self._own, robot.joint_names, configuration.groups[SESSION].real_time,
             has_hand=master is Master.DRILL,
@@ -97,6 +98,8 @@ class LiveRig:
     def mark(self) -> None:
         """The fault begins now."""
         self.begin_ns, self.warned, self.said = time.time_ns(), {}, ""
+        told = self.observer.statuses.items()
+        self._warned_before = {name for name, status in told if status.level >= WARNING}
 
     def note(self, text: str) -> None:
         """Say something that belongs beside the state."""
@@ -112,7 +115,9 @@ class LiveRig:
         while (left := deadline - time.monotonic()) > 0.0:
             self.observer.listen(min(left, 0.02))
             for name, status in tuple(self.observer.statuses.items()):
-                if status.level >= WARNING and name not in self.warned:
+                if status.level < WARNING:
+                    self._warned_before.discard(name)
+                elif name not in self.warned and name not in self._warned_before:
                     age_ns = round(1e9 * (time.monotonic() - status.arrival))
                     self.warned[name] = time.time_ns() - age_ns
 
