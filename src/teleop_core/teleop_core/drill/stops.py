@@ -14,8 +14,9 @@ def _press(rig: Rig) -> None:
 
 
 def _release(rig: Rig) -> None:
-    rig.press(is_pressed=False)
-    rig.wait(0.05)
+    for _ in range(5):  # a reader on a bad line may miss one
+        rig.press(is_pressed=False)
+        rig.wait(0.01)
 
 
 def _call(rig: Rig) -> None:

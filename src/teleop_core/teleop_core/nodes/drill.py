@@ -114,13 +114,13 @@ class _Drill:
         outcomes = []
         try:
             for exercise in exercises:
-                rig = self._ready()
+                rig = self._prepared()
                 outcome = self._repeated(exercise, rig)
                 outcomes.append(outcome)
-                self._say(_line(outcome))
                 if math.isnan(outcome.recovered):
                     outcome.note = rig.complaints()
                     self._close()
+                self._say(_line(outcome))
         finally:
             self._close()
         for path, recorded in self._open.items():
@@ -136,6 +136,17 @@ class _Drill:
                 outcome.recording, outcome.is_recorded = "intact", True
 
     # -- sessions --------------------------------------------------------------------------------
+
+    def _prepared(self) -> LiveRig:
+        """As :meth:`_ready`; a session that cannot go on is given up once."""
+        if self._rig is None:
+            return self._ready()
+        try:
+            return self._ready()
+        except SessionError as error:
+            self._say(f"gives the session up: {error}")
+            self._close()
+            return self._ready()
 
     def _ready(self) -> LiveRig:
         """A session whose slave follows the hand; a new one if the last did not survive."""
@@ -174,7 +185,11 @@ class _Drill:
         """The worst of all repetitions; of times that of a stop, the median as well."""
         found = [self._once(exercise, rig)]
         while len(found) < exercise.repeats and not math.isnan(found[-1].recovered):
-            self._ready()
+            try:
+                self._ready()
+            except SessionError:
+                found[-1].recovered = math.nan
+                break
             found.append(self._once(exercise, rig))
         failed = [one for one in found if one.failures()]
         worst = failed[0] if failed else max(found, key=lambda one: one.travel)

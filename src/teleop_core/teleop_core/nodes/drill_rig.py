@@ -157,11 +157,13 @@ class LiveRig:
 
     def kill(self, node: str) -> None:
         """Kill a node's process."""
+        self.mark()
         self.session.send(node, signal.SIGKILL)
         self.session.await_end(node, 2.0)
 
     def freeze(self, node: str, seconds: float) -> None:
         """Stop a node's process for a time [s], then let it go on."""
+        self.mark()
         self.session.send(node, signal.SIGSTOP)
         try:
             self.wait(seconds)
