@@ -151,7 +151,9 @@ class LiveRig:
         """What nodes complain of, in one line."""
         age = self.tap.age(SLAVE_SETPOINT_JS)
         told = [f"{n}: {s.message}" for n, s in self.observer.statuses.items()]
-        return "; ".join((f"newest setpoint {age:.2f} s old", *told))
+        moves = np.any(np.diff(self.tap.recent(SLAVE_SETPOINT_JS, 60), axis=0) != 0.0, axis=1)
+        seen = f"newest setpoint {age:.2f} s old, {np.sum(moves)} of the last {len(moves)} moved"
+        return "; ".join((f"{seen}; {self.operation()}", *told))
 
     # -- processes -------------------------------------------------------------------------------
 
