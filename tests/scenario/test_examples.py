@@ -23,7 +23,9 @@ PUBLIC = {
     "teleop_core.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",
 }  # fmt: skip
+ROS_EXAMPLES = {"crtk_client", "ros_device"}
 ROS = {
+    "crtk_msgs.msg",
     "rclpy",
     "diagnostic_msgs.msg",
     "rclpy.node",
@@ -242,6 +244,23 @@ def test_commands_take_the_parts_of_the_examples(tmp_path):
     assert "jerk" in done.stdout
 
 
+@pytest.mark.ros
+def test_a_crtk_client_moves_the_tip_and_comes_back(tmp_path):
+    pytest.importorskip("crtk_msgs")
+    from teleop_core.nodes.children import environment, free_domain
+
+    env = environment() | {"ROS_DOMAIN_ID": free_domain()}
+    slave = subprocess.Popen([sys.executable, "-m", "teleop_core.nodes", "slave_sim"], env=env)
+    try:
+        text = run("crtk_client", tmp_path, **env)
+    finally:
+        slave.terminate()
+        code = slave.wait(60)
+    assert code == 0
+    assert "done" in text
+    assert text.splitlines()[-1] == "back"
+
+
 def test_laws_of_the_table_track_better_from_row_to_row(tmp_path):
     text = run("compare_controllers", tmp_path)
     errors = numbers(r"\n\w+ +(\d+) µm", text)
@@ -260,7 +279,7 @@ def test_example_needs_the_public_api_alone(name):
             imported |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             imported.add(node.module)
-    allowed = PUBLIC | set(sys.stdlib_module_names) | (ROS if name == "ros_device" else set())
+    allowed = PUBLIC | set(sys.stdlib_module_names) | (ROS if name in ROS_EXAMPLES else set())
     assert imported <= allowed
 
 

@@ -1,0 +1,284 @@
+"""CRTK: a stock client moves our arms, and the conformance test finds what is wrong with others."""
+
+import math
+import threading
+import time
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
+
+from teleop_core.conformance import Verdict
+from teleop_core.nodes.children import free_domain
+from teleop_core.nodes.conformance import examine
+from teleop_core.nodes.conformance_arm import Arm
+
+crtk = pytest.importorskip("crtk_msgs.msg")
+pytestmark = pytest.mark.ros
+
+MIDDLE = [0.1, 1.7, 0.36, 0.2, 0.5, 0.1]
+# A busy machine is no fault of the arm's.
+CALM = {"operation__longest_outage": 0.0, "start": MIDDLE, "start_speed": 1.0}
+
+
+class StockClient:
+    """What crtk_python_client does: reliable, ten deep, stamped now, joints without names."""
+
+    def __init__(self, peer, arm="slave"):
+        self.peer, self.arm, self.newest, self.was_busy = peer, arm, {}, False
+        for name, kind in (
+            ("operating_state", crtk.OperatingState), ("setpoint_cp", PoseStamped),
+            ("setpoint_js", JointState), ("goal_js", JointState), ("measured_cv", TwistStamped),
+        ):  # fmt: skip
+            peer.node.create_subscription(kind, f"{arm}/{name}", self.taker(name), 10)
+        self.commands = {}
+
+    def taker(self, name):
+        def take(message):
+            self.newest[name] = message
+            if name == "operating_state":
+                self.was_busy = self.was_busy or message.is_busy
+
+        return take
+
+    def spin(self):
+        self.peer._executor.spin_once(timeout_sec=0.02)
+
+    def wait(self, condition, what):
+        def turn():
+            self.spin()
+            return condition()
+
+        return self.peer.wait(turn, what)
+
+    def send(self, name, message):
+        if name not in self.commands:
+            own = self.peer.node.create_publisher(type(message), f"{self.arm}/{name}", 10)
+            self.commands[name] = own
+            self.wait(lambda: own.get_subscription_count() > 0, f"a reader of {name}")
+        if hasattr(message, "header"):
+            message.header.stamp = self.peer.node.get_clock().now().to_msg()
+        self.commands[name].publish(message)
+
+    def state(self):
+        found = self.newest.get("operating_state")
+        return found and (found.state, found.is_homed, found.is_busy)
+
+    def reaches(self, state):
+        return self.wait(lambda: self.state() == state, f"{state}, not {self.state()}")
+
+    def joints(self):
+        return np.array(self.newest["setpoint_js"].position)
+
+
+@pytest.fixture
+def client(peer):
+    peer.start("slave_sim", **CALM)
+    client = StockClient(peer)
+    client.reaches(("ENABLED", True, False))
+    client.wait(lambda: len(client.newest) >= 3, "setpoints")
+    return client
+
+
+def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(client):
+    goal = [a + 0.05 for a in MIDDLE]
+    goal[2] = 0.35
+    client.was_busy = False
+    client.send("move_jp", JointState(position=goal))
+    client.wait(lambda: client.was_busy, "busy")
+    client.reaches(("ENABLED", True, False))
+    client.wait(lambda: np.allclose(client.joints(), goal, atol=1e-9), "the goal")
+    client.wait(lambda: np.allclose(client.newest["goal_js"].position, goal), "goal_js")
+
+
+def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client):
+    pose = client.newest["setpoint_cp"].pose
+    goal = PoseStamped(pose=pose)
+    goal.pose.position.z -= 0.01
+    client.was_busy = False
+    client.send("move_cp", goal)
+    client.wait(lambda: client.was_busy, "busy")
+    client.reaches(("ENABLED", True, False))
+    z = goal.pose.position.z
+    client.wait(lambda: abs(client.newest["setpoint_cp"].pose.position.z - z) < 1e-9, "the pose")
+    goal.pose.position.z -= 5.0
+    client.send("move_cp", goal)
+    client.peer.wait_value("slave_sim", "refused.slave/move_cp", lambda count: count == 1)
+
+
+def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client):
+    before = client.joints()
+    client.send("state_command", crtk.StringStamped(string="pause"))
+    client.reaches(("PAUSED", True, False))
+    client.send("move_jp", JointState(position=[a - 0.05 for a in MIDDLE]))
+    client.peer.wait_value("slave_sim", "refused.slave/move_jp", lambda count: count == 1)
+    client.send("state_command", crtk.StringStamped(string="resume"))
+    client.reaches(("ENABLED", True, False))
+    np.testing.assert_array_equal(client.joints(), before)
+
+
+def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client):
+    goal = [a + 0.02 for a in MIDDLE]
+    goal[2] = 0.36
+    client.send("servo_jp", JointState(position=goal))
+    client.wait(lambda: np.allclose(client.joints(), goal, atol=1e-6), "the reference")
+
+
+def test_speeds_end_with_the_messages_and_hold_ends_a_move(client):
+    before = client.joints()
+    for _ in range(10):
+        client.send("servo_jv", JointState(velocity=[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        client.spin()
+    client.wait(lambda: client.joints()[0] > before[0], "motion")
+    status = client.peer.status
+    client.peer.wait(lambda: status("slave_sim").values["motion"] == "nothing", "rest")
+    client.send("move_jp", JointState(position=[a - 0.3 if i == 0 else a
+                                                for i, a in enumerate(MIDDLE)]))  # fmt: skip
+    client.reaches(("ENABLED", True, True))
+    client.send("hold", Empty())
+    client.reaches(("ENABLED", True, False))
+    assert client.joints()[0] > MIDDLE[0] - 0.299
+
+
+def test_a_disabled_master_pushes_with_no_force(peer):
+    peer.start("haptic_master", patience=3600.0)
+    client = StockClient(peer, "master")
+    client.reaches(("ENABLED", True, False))
+    client.send("state_command", crtk.StringStamped(string="disable"))
+    client.reaches(("DISABLED", True, False))
+
+
+class ForeignArm(Node):
+    """A small CRTK arm of somebody else, with three joints, and what is wrong with it."""
+
+    def __init__(self, context, faults):
+        super().__init__("foreign", context=context, use_global_arguments=False,
+                         enable_rosout=False)  # fmt: skip
+        self.faults, self.state, self.q = faults, "ENABLED", [0.1, 0.2, 0.3]
+        self.goal, self.speed, self.busy_until = list(self.q), 0.5, 0.0
+        best = ReliabilityPolicy.BEST_EFFORT
+        quality = QoSProfile(depth=10, **({"reliability": best} if "qos" in faults else {}))
+        if "no state" not in faults:
+            self.states = self.create_publisher(crtk.OperatingState, "PSM/operating_state", 10)
+        self.measured = self.create_publisher(JointState, "PSM/measured_js", quality)
+        kind = JointState if "type" in faults else PoseStamped
+        self.pose = self.create_publisher(kind, "PSM/measured_cp", 10)
+        self.create_subscription(crtk.StringStamped, "PSM/state_command", self.command, 10)
+        self.create_subscription(JointState, "PSM/move_jp", self.move, 10)
+        self.create_timer(0.01, self.tick)
+
+    def command(self, message):
+        word = {"pause": "PAUSED", "resume": "ENABLED"}.get(message.string)
+        if "any word" in self.faults:
+            word = word or "DISABLED"
+        self.state = word or self.state
+
+    def move(self, message):
+        if self.state == "ENABLED" or "moves paused" in self.faults:
+            self.goal = list(message.position)
+            self.busy_until = time.monotonic() + 0.15
+
+    def tick(self):
+        now = self.get_clock().now().to_msg()
+        is_busy = False
+        for i in range(3):
+            step = min(max(self.goal[i] - self.q[i], -2e-3), 2e-3)
+            self.q[i] += step
+            is_busy = is_busy or abs(step) > 0.0
+        is_busy = (
+            is_busy or time.monotonic() < self.busy_until
+        ) and "never busy" not in self.faults
+        if "no state" not in self.faults:
+            state = crtk.OperatingState(state=self.state, is_homed=True, is_busy=is_busy)
+            state.header.stamp = now
+            self.states.publish(state)
+        joints = JointState(name=["a", "b", "c"], position=list(self.q))
+        if "stamp" not in self.faults:
+            joints.header.stamp = now
+        if "nan" in self.faults:
+            joints.position[1] = math.nan
+        if "length" in self.faults:
+            joints.velocity = [0.0]
+        self.measured.publish(joints)
+        if "type" not in self.faults:
+            pose = PoseStamped()
+            pose.header.stamp, pose.pose.orientation.w = now, 0.5 if "unit" in self.faults else 1.0
+            self.pose.publish(pose)
+
+
+def findings_of(*faults, may_move=False):
+    """What is found of a foreign arm with these faults, by topic."""
+    domain, context = int(free_domain()), Context()
+    context.init(args=[], domain_id=domain)
+    node, executor = ForeignArm(context, faults), SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+
+    def spin():
+        with suppress(ExternalShutdownException):
+            executor.spin()
+
+    thread = threading.Thread(target=spin, daemon=True)
+    thread.start()
+    try:
+        with Arm("PSM", domain) as arm:
+            assert arm.is_there(20.0)
+            return {found.row.name: found for found in examine(arm, may_move=may_move)}
+    finally:
+        executor.shutdown()
+        thread.join(10)
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes():
+    found = findings_of(may_move=True)
+    verdicts = {name: one.verdict for name, one in found.items()}
+    sound = ("operating_state", "state_command", "measured_js", "measured_cp", "move_jp")
+    assert {name: verdicts[name] for name in sound} == dict.fromkeys(sound, Verdict.OK), found
+    others = {verdict for name, verdict in verdicts.items() if name not in sound}
+    assert others == {Verdict.ABSENT}
+
+
+@pytest.mark.parametrize(
+    ("fault", "topic", "note"),
+    [
+        ("stamp", "measured_js", "stamp is 0"),
+        ("nan", "measured_js", "not finite"),
+        ("length", "measured_js", "different lengths"),
+        ("unit", "measured_cp", "length 0.5"),
+        ("type", "measured_cp", "must be geometry_msgs/msg/PoseStamped"),
+        ("qos", "measured_js", "best effort"),
+        ("no state", "operating_state", ""),
+    ],
+)
+def test_faults_of_a_foreign_arm_are_found_by_looking(fault, topic, note):
+    found = findings_of(fault)[topic]
+    assert found.verdict is Verdict.FAILED
+    assert note in found.note
+
+
+@pytest.mark.parametrize(
+    ("fault", "topic", "note"),
+    [
+        ("moves paused", "state_command", "while PAUSED"),
+        ("any word", "state_command", "no command changed the state"),
+        ("never busy", "move_jp", "never rose"),
+    ],
+)
+def test_faults_of_a_foreign_arm_are_found_by_trying(fault, topic, note):
+    found = findings_of(fault, may_move=True)[topic]
+    assert found.verdict is Verdict.FAILED
+    assert note in found.note
+
+
+def test_nothing_is_commanded_when_only_looking():
+    found = findings_of()
+    assert found["move_jp"].verdict is Verdict.SKIPPED
+    assert found["state_command"].note == "read only"
