@@ -413,7 +413,7 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(commands
         wild = np.array(numbers)
         now_ns, motion = bench.now_ns, bench.motion
         if name == "stream":
-            bench.follow(bench.setpoint + 0.02 * wild)
+            path.append(bench.follow(bench.setpoint + 0.02 * wild)[None])
         elif name in {"move", "pose", "joints", "tip", "step", "hold"}:
             {
                 "move": lambda w=wild: motion.move(bench.setpoint + w),
