@@ -59,7 +59,11 @@ def _run(arguments: argparse.Namespace) -> int:
         raise RecordingError(arguments.out, "exists already; choose another --out")
     outcomes = _outcomes(exercises, arguments)
     _write(outcomes, arguments)
-    return _show(outcomes)
+    code = _show(outcomes)
+    if len(outcomes) < len(exercises):
+        print(f"{len(exercises) - len(outcomes)} were not done")
+        return 1
+    return code
 
 
 def _outcomes(exercises: "tuple[Exercise, ...]", arguments: argparse.Namespace) -> "list[Outcome]":

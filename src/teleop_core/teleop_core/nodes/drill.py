@@ -77,7 +77,10 @@ def drill(
             place = folder / master.name.lower()
             place.mkdir(parents=True)
             made = _configuration(master, files, texts)
-            outcomes += _Drill(master, made, place, say, is_composed=is_composed).run(own)
+            part = _Drill(master, made, place, say, is_composed=is_composed)
+            outcomes += part.run(own)
+            if part.is_over:
+                break
     order = [one.name for one in exercises]
     return sorted(outcomes, key=lambda outcome: order.index(outcome.exercise.name))
 
@@ -108,10 +111,12 @@ class _Drill:
         self._sessions = 0
         self._open: dict[Path, list[Outcome]] = {}
         self._killed: dict[Path, int] = {}
+        self.is_over = False
+        """Whether it was stopped before its end."""
 
     def run(self, exercises: Sequence[Exercise]) -> list[Outcome]:
         """Do them, and look at the recordings when all is over."""
-        outcomes = []
+        outcomes: list[Outcome] = []
         try:
             for exercise in exercises:
                 rig = self._prepared()
@@ -121,6 +126,11 @@ class _Drill:
                     outcome.note = rig.complaints()
                     self._close()
                 self._say(_line(outcome))
+        except (KeyboardInterrupt, SessionError) as error:
+            if not outcomes:
+                raise
+            self._say(f"stopped: {error or 'interrupted'}; what was measured until now:")
+            self.is_over = True
         finally:
             self._close()
         for path, recorded in self._open.items():
