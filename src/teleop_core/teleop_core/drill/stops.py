@@ -3,7 +3,7 @@
 from teleop_core.drill.exercise import Cure, Exercise, Motion, Rig
 from teleop_core.operation import Fault, State
 
-HEARTBEAT = 0.2
+HEARTBEAT = 0.5
 """Silence of the stop button that counts as pressed, while it is drilled [s]."""
 _AT_ONCE = 2e-3  # what a stop may take
 
@@ -98,7 +98,7 @@ STOPS = (
         states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=_AT_ONCE,
     ),
     Exercise(
-        name="heartbeat", text="stop button falls silent (heartbeat 0.2 s)",
+        name="heartbeat", text="stop button falls silent (heartbeat 0.5 s)",
         inject=_miss_heartbeat, undo=_hear_again,
         states=(State.FAULT,), faults=(Fault.HEARTBEAT,), cures=(Cure.RESET,),
         allowed=HEARTBEAT + 5e-3,
