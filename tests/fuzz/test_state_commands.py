@@ -1,0 +1,59 @@
+"""State commands in any order, beside ticks and faults: flags agree, and nothing moves unasked."""
+
+import numpy as np
+from hypothesis import strategies as st
+
+from fuzzing import fuzz
+from teleop_core.operation import Fault, OperationParameters, State
+from teleop_core.operation.states import COMMANDS
+from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+
+WORDS = st.one_of(
+    st.sampled_from(COMMANDS), st.text(max_size=20), st.sampled_from([f for f in Fault if f]),
+    st.booleans(), st.integers(1, 30), st.floats(-1e9, 1e9),
+)  # fmt: skip
+"""A command, or what is none; a fault; the stop button; ticks; a place for all joints."""
+
+
+def arm(standstill):
+    return SlaveSim(SlaveSimParameters(
+        robot="planar_3r", starts_at_home=True,
+        operation=OperationParameters(standstill=standstill, longest_outage=0.15),
+    ))  # fmt: skip
+
+
+ARMS = {standstill: arm(standstill) for standstill in ("hold", "brake")}
+
+
+def play(slave, words):
+    """Send words one by one; after each the flags must agree and the setpoint keep its limits."""
+    row, ns = slave.signals, 10**9
+    reach = slave.robot.drives.speed_limit * 1e-3
+    for word in words:
+        ticks = word if isinstance(word, int) and not isinstance(word, bool | Fault) else 1
+        if isinstance(word, str):
+            slave.request(word)
+        elif isinstance(word, Fault):
+            slave.fail(word, 1.0, 0.5)
+        elif isinstance(word, bool):
+            slave.press(is_pressed=word, now_ns=ns)
+        for _ in range(ticks):
+            ns += 10**6
+            before = np.array(row["slave_setpoint_js"])
+            row["now_ns"] = ns
+            if isinstance(word, float):
+                row["slave_servo_jp"], row["slave_servo_jp_ns"] = slave.robot.home + word, ns
+            slave.step()
+            values = slave.operation
+            state = State(int(values["state"]))
+            assert not values["is_stopped"] or state is State.FAULT
+            assert not values["is_busy"] or state is State.ENABLED
+            step = np.abs(row["slave_setpoint_js"] - before)
+            assert (step <= reach * (1 + 1e-9)).all()
+
+
+@fuzz("state commands", words=st.lists(WORDS, max_size=12), standstill=st.sampled_from(list(ARMS)))
+def test_any_words_leave_flags_that_agree_and_a_setpoint_within_its_limits(words, standstill):
+    slave = ARMS[standstill]
+    slave.reset()
+    play(slave, words)
