@@ -49,9 +49,9 @@ def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path):
 
 
 def test_a_fault_that_there_is_not_is_refused_in_one_line_before_anything_starts():
-    command = [sys.executable, "-m", "teleop_core.cli", "drill", "explode"]
+    command = [sys.executable, "-m", "teleop_core.cli", "drill", "kill_motion_scalin"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1
-    assert "explode" in done.stderr
+    assert "kill_motion_scalin" in done.stderr
     assert "kill_motion_scaling" in done.stderr
