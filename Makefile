@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup crtk_msgs demo test coverage lint format bench bench-setup endurance clean
+.PHONY: setup crtk_msgs demo test coverage lint format bench bench-setup endurance fuzz clean
 
 setup: $(VENV)/.installed
 

@@ -105,7 +105,6 @@ class NodeParameters:
         return found or [(port, 0.0)]
 
 
-_SHOWN_AFTER = 0.1
 """Parameters that a stage changes by itself are shown so much later at most [s]."""
 
 
@@ -146,7 +145,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self.add_pre_set_parameters_callback(self._type_empty_lists)
         self.add_on_set_parameters_callback(self._accept)
         self._shows_present = False
-        self.create_timer(_SHOWN_AFTER, self._show_present)
+        self._present = self.create_guard_condition(self._show_present)
         self.stage: Any = None
         self.row: Any = None
         """The stage's signals, to be read and written by names of fields only."""
@@ -281,6 +280,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self._reported = bits, parameters
         described: dict[str, str] = getattr(self.stage, "described", dict)()
         self._report_publisher.publish(report_of(self._report, stamp_ns, self._state, described))
+        if hasattr(self.stage, "present"):
+            self._present.trigger()  # the executor shows it: setting parameters takes long
 
     def input(self, port: Topic) -> Input:
         """What the node reads at a port, of several the one that others are added to."""

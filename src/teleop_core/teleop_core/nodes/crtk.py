@@ -20,7 +20,7 @@ from teleop_core.operation.states import COMMANDS, Answer
 
 OPERATING_STATE = "crtk_msgs/msg/OperatingState"
 STATE_COMMAND = "crtk_msgs/msg/StringStamped"
-_PERIOD = 0.2  # of operating_state where nothing changes [s]
+_PERIOD = 1.0  # of operating_state where nothing changes [s]
 _QUIET = 1.0  # between two lines of the log about one topic [s]
 Condition = tuple[str, bool, bool]
 """Name of the state, whether the arm is homed, whether it is busy."""

@@ -36,7 +36,7 @@ _JOINTS, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
 _TWIST, _EMPTY = "geometry_msgs/msg/TwistStamped", "std_msgs/msg/Empty"
 _MATRIX = "std_msgs/msg/Float64MultiArray"
 _PERIOD = 0.01  # of what is measured here, as long as somebody reads it [s]
-_LOOK = 0.5  # time from one look for readers to the next [s]
+_LOOK = 1.0  # time from one look for readers to the next [s]
 
 
 class CrtkSlave:

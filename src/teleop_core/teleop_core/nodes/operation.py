@@ -12,6 +12,7 @@ from teleop_core.operation.states import COMMANDS, Answer
 
 STOP_TOPIC = "/teleop/stop"
 """Emergency stop of all arms, std_msgs/Bool: true stops; false says that it is alive."""
+_EVERY = 4
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""
 
@@ -25,10 +26,10 @@ def stop_profile(reliability: ReliabilityPolicy) -> QoSProfile:
 
 
 class StopInput:
-    """The emergency stop, looked at in every tick: 4 µs, and no executor on the way.
+    """The emergency stop, looked at in every tick: 2 µs, and no executor on the way.
 
     Of a reliable sender no message is lost, but a reliable reader does not hear one that sends at
-    best effort; so there are two readers.
+    best effort; so there are two readers, the second of which is looked at in every fourth tick.
 
     Args:
         node: Node that owns it.
@@ -45,11 +46,13 @@ class StopInput:
             for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT)
         ]  # fmt: skip
         self._take = [own.handle.take_message for own in self._own]
+        self._ticks = 0
 
     def take(self) -> bool | None:
         """Whether it was pressed since the last call; None if nothing was said."""
         found = None
-        for take in self._take:
+        self._ticks += 1
+        for take in self._take if self._ticks % _EVERY == 0 else self._take[:1]:
             while (taken := take(Bool, True)) is not None:
                 data = taken[0]
                 if len(data) >= _BYTES:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterable
 
+from teleop_core.bags.messages import Refusal
 from teleop_core.nodes.crtk_slave import CrtkSlave
 from teleop_core.nodes.operation import CommandServices, StopInput
 from teleop_core.nodes.ticking import TickingNode
@@ -15,6 +16,8 @@ from teleop_core.topics import SLAVE_OPERATION, SLAVE_SERVO_JP
 _SERVO = SLAVE_SERVO_JP.name
 
 
+_SELDOM = 10
+"""Turns from one look at clocks and publishers to the next."""
 _CLOCK_STEP_NS = 100_000_000
 """A clock that moves by more against the monotonic one between two turns was stepped [ns]."""
 
@@ -43,7 +46,8 @@ class SlaveSimNode(TickingNode):
     def start(self) -> None:
         """Relate the clocks; what they do later is seen against this."""
         super().start()
-        self._offset_ns, self._dropped = self.epoch_ns, self.counts.dropped
+        self._offset_ns, self._dropped, self._turns = self.epoch_ns, self.counts.dropped, 0
+        self._floods = 0
 
     def work(self, ticks: Iterable[int]) -> None:
         """Take the newest command and the steps of some ticks [ns, monotonic]."""
@@ -61,18 +65,29 @@ class SlaveSimNode(TickingNode):
         if pressed is not None:
             with self.lock:
                 self.stage.press(is_pressed=pressed, now_ns=due[0] + self.epoch_ns)
-        offset_ns = time.time_ns() - time.monotonic_ns()
-        if abs(offset_ns - self._offset_ns) > _CLOCK_STEP_NS:
-            step = 1e-9 * (offset_ns - self._offset_ns)
-            self._offset_ns = offset_ns
-            self._fail(Fault.CLOCK, abs(step), 1e-9 * _CLOCK_STEP_NS)
         longest = self.parameters.operation.longest_outage
         missed = (len(due) + self.counts.dropped - self._dropped) * TICK_NS * 1e-9
         self._dropped = self.counts.dropped
         if 0.0 < longest < missed:
             self._fail(Fault.STALL, missed, longest)
-        if any(getattr(entry, "conflict", False) for entry in self.ports.inputs[_SERVO]):
+        self._turns += 1
+        if self._turns % _SELDOM == 0:
+            self._look_around()
+
+    def _look_around(self) -> None:
+        """Find a clock that was stepped, and two publishers of commands."""
+        offset_ns = time.time_ns() - time.monotonic_ns()
+        if abs(offset_ns - self._offset_ns) > _CLOCK_STEP_NS:
+            step = 1e-9 * (offset_ns - self._offset_ns)
+            self._offset_ns = offset_ns
+            self._fail(Fault.CLOCK, abs(step), 1e-9 * _CLOCK_STEP_NS)
+        commands = self.ports.inputs[_SERVO]
+        if any(entry.conflict for entry in commands):
             self._fail(Fault.PUBLISHERS)
+        floods = sum(entry.refused[Refusal.FLOOD] for entry in commands)
+        if floods > self._floods:
+            self._floods = floods
+            self._fail(Fault.FLOOD)
 
     def _fail(self, fault: Fault, value: float = 0.0, bound: float = 0.0) -> None:
         with self.lock:

@@ -22,7 +22,6 @@ class Fault(IntEnum):
     PUBLISHERS = 11
     FLOOD = 12
     STALL = 13
-    FORCE = 14
 
     @property
     def word(self) -> str:
@@ -60,9 +59,8 @@ FAULTS: Mapping[Fault, FaultKind] = {
     Fault.JOINT_LIMIT: FaultKind(Reaction.REPORT, "commands press a joint into its limit", "s"),
     Fault.CLOCK: FaultKind(Reaction.PAUSE, "this machine's clock was stepped", "s"),
     Fault.PUBLISHERS: FaultKind(Reaction.PAUSE, "two publishers on a command topic"),
-    Fault.FLOOD: FaultKind(Reaction.REPORT, "more messages than anybody needs", "1/s"),
+    Fault.FLOOD: FaultKind(Reaction.REPORT, "more messages than anybody needs"),
     Fault.STALL: FaultKind(Reaction.PAUSE, "the slave's own loop stood still", "s"),
-    Fault.FORCE: FaultKind(Reaction.REPORT, "force out of the range of its sensor", "N"),
 }
 """What there is, with its reaction; those that a session names as ``reported`` only report."""
 NAMES = tuple(fault.word for fault in Fault if fault is not Fault.NONE)
