@@ -272,3 +272,11 @@ def test_a_script_commands_at_its_times():
     assert still[240:398].all()
     assert not still[100:195].any()
     assert arm.state is F
+
+
+def test_a_stream_with_a_gap_before_its_last_command_pauses_the_arm_too():
+    arm = Arm(seconds=1.0, longest_outage=0.5)
+    arm.run(0.2, commanded=False)
+    arm.run(0.001)
+    arm.run(0.7, commanded=False)
+    assert arm.state is P

@@ -110,7 +110,7 @@ def come_to_rest(p: Any, s: Any, how: int, dt: float) -> None:
 def _not_followed(s: Any, row: Any) -> int:
     """Status of an arm that follows nothing; what comes meanwhile is seen, and old later."""
     s.seen_ns = max(s.seen_ns, row.slave_servo_jp_ns)
-    s.arrival_ns, s.in_row = 0, 0
+    s.arrival_ns, s.in_row, s.is_stream = 0, 0, 0
     return 3 if s.is_busy or s.motion != 0 else 4
 
 
@@ -120,7 +120,7 @@ def _age_of_command(p: Any, s: Any, now_ns: int) -> int:
     silence_ns = now_ns - s.arrival_ns
     if silence_ns <= p.timeout_ns:
         return 0
-    if s.in_row > 0 and 0 < p.outage_ns < silence_ns:
+    if s.is_stream and 0 < p.outage_ns < silence_ns:
         fault = _JUMP if s.refused > s.refused_before else _SILENCE
         fail(p, s, fault, -1, 1e-9 * silence_ns, 1e-9 * p.outage_ns)
     return 1
@@ -155,6 +155,7 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
         begin_way(p, s, row.slave_servo_jp, period_ns, dt)
         is_next = s.arrival_ns > 0 and now_ns - s.arrival_ns <= p.timeout_ns
         s.in_row = s.in_row + 1 if is_next else 0
+        s.is_stream = max(s.is_stream, s.in_row)  # a gap does not make single commands of it
         s.command_stamp_ns, s.arrival_ns, s.refused_before = stamp, now_ns, s.refused
     return _age_of_command(p, s, now_ns)
 
