@@ -151,7 +151,7 @@ def test_the_directory_says_what_rosbag2_says(tmp_path, rng):
         by_topic = {c.topic: c for c in reader.connections}
     state, pose = by_topic["/teleop/state"], by_topic["/slave/measured_cp"]
     assert pose.digest == ros_types.type_hash("geometry_msgs/msg/PoseStamped")
-    assert pose.ext.offered_qos_profiles[0].reliability is QosReliability.BEST_EFFORT
+    assert pose.ext.offered_qos_profiles[0].reliability is QosReliability.RELIABLE
     assert state.ext.offered_qos_profiles[0].reliability is QosReliability.RELIABLE
     assert state.ext.offered_qos_profiles[0].durability is QosDurability.TRANSIENT_LOCAL
     assert by_topic["/diagnostics"].ext.offered_qos_profiles[0].depth == 10

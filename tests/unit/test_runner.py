@@ -22,7 +22,7 @@ def test_setpoints_are_recorded_with_the_stamp_of_the_command_in_force(tmp_path)
     simulate(configure(settings=settings), tmp_path / "bag")
     bag = Bag(tmp_path / "bag")
     sampled = bag.read(topics.MASTER_MEASURED_CP).stamp_ns
-    in_force = np.maximum(sampled - DELAY_TICKS * TICK_NS, 0)
+    in_force = np.maximum(sampled - DELAY_TICKS * TICK_NS, topics.NO_COMMAND_NS)
     for topic in (topics.SLAVE_SETPOINT_JS, topics.SLAVE_SETPOINT_CP):
         assert np.array_equal(bag.read(topic).stamp_ns, in_force), topic.name
     for topic in (topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP, topics.SLAVE_MEASURED_JS):
