@@ -1,9 +1,7 @@
 """A CRTK client with rclpy alone: waits for an arm, moves its tip by 10 mm, and comes back.
 
-Start an arm first, ``teleop live --composed --out bags/crtk`` or ``ros2 run teleop_core slave_sim``, on the same
-ROS domain, and make CRTK's messages if ROS does not bring them: ``make crtk_msgs``.
-
-    python examples/crtk_client.py slave
+Start an arm first, ``teleop live --composed --out bags/crtk`` or ``ros2 run teleop_core slave_sim``
+on the same ROS domain, and make CRTK's messages if ROS does not bring them: ``make crtk_msgs``.
 """
 
 import sys
@@ -19,7 +17,7 @@ AXES = "xyz"
 WAY = 0.01  # [m]
 
 
-class Client(Node):  # type: ignore[misc]
+class Client(Node):
     """What a stock client has: the newest state and setpoint, and a move that it waits for."""
 
     def __init__(self, arm: str) -> None:
@@ -85,7 +83,6 @@ def main() -> None:
         print(f"-{1e3 * WAY:g} mm along {axis}:", "done" if client.move(goal) else "out of reach")
     client.move(home)
     print("back")
-    client.destroy_node()
     rclpy.shutdown()
 
 

@@ -12,13 +12,19 @@ from teleop_core.bags.series import Series
 from teleop_core.geometry import pose_from_transform
 from teleop_core.mapping.motion_scaling import MotionScaling
 from teleop_core.mapping.parameters import MotionScalingParameters
+from teleop_core.mapping.plausibility import PlausibilityParameters
 from teleop_core.operators.shapes import minimum_jerk
 from teleop_core.robots import load_robot
 from teleop_core.robots.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.session.runner import replayed_blocks
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.signals import STATE, TICK_NS
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_REACH, Limit
+from teleop_core.topics import MASTER_MEASURED_CP, NO_COMMAND_NS, SLAVE_REACH, Limit
+
+ANY_HAND = PlausibilityParameters(
+    speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0
+)
+"""A hand that may jump, as tests have it do."""
 
 REACH = {name: index for index, name in enumerate(SLAVE_REACH.columns)}
 # The published map of the master's axes to the slave's.
@@ -34,7 +40,7 @@ class Chain:
 
     def __init__(self, robot, delay=1, **values):
         self.robot, self.delay = load_robot(robot), delay
-        self.scaling = MotionScaling(MotionScalingParameters(**values))
+        self.scaling = MotionScaling(MotionScalingParameters(**{"plausible": ANY_HAND} | values))
         self.ik = InverseKinematics(InverseKinematicsParameters(robot=robot))
         self.joints, self.stamp_ns = self.robot.start.copy(), 1_000_000_000
         self.hand, self.attitude, self.clutch = np.zeros(3), Rotation.identity(), 0.0
@@ -205,7 +211,7 @@ def setpoints(stamps_ns, **values):
     session = VirtualTime(configuration(settings=values), is_replay=True)
     rows = np.concatenate(list(replayed_blocks(session, master_bag(stamps_ns))[0]))
     last = rows["now_ns"][-1] - stamps_ns[-1]
-    rows = rows[rows["slave_setpoint_cp_ns"] > 0]  # after the move to where it starts
+    rows = rows[rows["slave_setpoint_cp_ns"] > NO_COMMAND_NS]  # after the move to where it starts
     return (rows["now_ns"] - last) * 1e-9, rows["slave_setpoint_cp"][:, :3]
 
 

@@ -9,6 +9,7 @@ import teleop_core as tc
 from teleop_core.experiments.bench import Bench
 from teleop_core.experiments.controllers import GOAL_UM, LAWS, compared, tracking_of
 from teleop_core.robots import load_robot
+from teleop_core.topics import NO_COMMAND_NS
 
 BETTER = ("computed_torque", "disturbance_observer", "friction_compensation", "adaptive")
 SHORT = 16.0
@@ -40,7 +41,7 @@ def test_tracking_is_what_its_definition_gives_of_the_recording():
     recording = tc.run("fine_box", seed=2, settings=law)
     frames = {name: recording[f"slave/{name}"].frame() for name in
               ("setpoint_cp", "measured_cp", "true_cp", "measured_js")}  # fmt: skip
-    kept = (recording["slave/setpoint_cp"].stamp_ns > 0).nonzero()[0]
+    kept = (recording["slave/setpoint_cp"].stamp_ns > NO_COMMAND_NS).nonzero()[0]
     wanted, seen, true = (
         frames[name][["x", "y", "z"]].iloc[kept] * 1e6
         for name in ("setpoint_cp", "measured_cp", "true_cp")

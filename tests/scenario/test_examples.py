@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 PUBLIC = {
-    "teleop_core.calibration",
+    "teleop_core.calibration", "teleop_core.operation",
     "teleop_core", "teleop_core.evaluation", "teleop_core.operators", "teleop_core.fixtures",
     "teleop_core.controllers", "teleop_core.robots", "teleop_core.topics",
     "teleop_core.experiments", "numpy",
@@ -270,6 +270,14 @@ def test_laws_of_the_table_track_better_from_row_to_row(tmp_path):
     assert all(error <= 34.0 for error in errors[2:])
 
 
+def test_a_stopped_arm_stands_still_and_goes_on_when_it_is_enabled(tmp_path):
+    text = run("operation", tmp_path)
+    before, stopped, after, paused, again = numbers(r"moved +([\d.]+) mm", text)
+    assert stopped == paused == 0.0
+    assert min(before, after, again) > 1.0
+    assert re.findall(r"s  (\w+)", text)[-1] == "ENABLED"
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_example_needs_the_public_api_alone(name):
     tree = ast.parse((EXAMPLES / f"{name}.py").read_text(encoding="utf-8"))
@@ -279,8 +287,9 @@ def test_example_needs_the_public_api_alone(name):
             imported |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             imported.add(node.module)
-    allowed = PUBLIC | set(sys.stdlib_module_names) | (ROS if name in ROS_EXAMPLES else set())
-    assert imported <= allowed
+    allowed = PUBLIC | (ROS if name in ROS_EXAMPLES else set())
+    standard = {module for module in imported if module.split(".")[0] in sys.stdlib_module_names}
+    assert imported - standard <= allowed
 
 
 def test_every_example_is_run_here():

@@ -15,7 +15,7 @@ from teleop_core.session.virtual import VirtualTime
 from teleop_core.signals import STATE, TICK_NS
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.trajectory import shortest_move_time
-from teleop_core.topics import SLAVE_REACH, STREAMS
+from teleop_core.topics import NO_COMMAND_NS, SLAVE_REACH, STREAMS
 
 ARM = load_robot("rcrt1")
 DEGREE, MM = math.pi / 180.0, 1e-3
@@ -134,7 +134,9 @@ def test_stamps_step_by_one_tick(box):  # case 31
     _, block = box
     assert np.array_equal(np.diff(block["now_ns"]), np.full(len(block) - 1, TICK_NS))
     for topic in STREAMS:
-        is_sent = block[f"{topic.field}_ns"] > 0  # no command is in force on the way to the start
+        is_sent = (
+            block[f"{topic.field}_ns"] > NO_COMMAND_NS
+        )  # no command is in force on the way to the start
         assert is_sent[np.argmax(is_sent) :].all(), topic.name
         assert np.array_equal(block[f"{topic.field}_ns"][is_sent], block["now_ns"][is_sent])
 

@@ -16,6 +16,7 @@ from teleop_core.bags.messages import (
     report,
     write_values,
 )
+from teleop_core.texts import printable
 from teleop_core.topics import Kind
 
 POSE = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
@@ -119,7 +120,8 @@ def test_stamps_that_stand_still_or_go_back_are_refused(last):
     assert check(Kind.POSE, 5, POSE, last) is Refusal.NOT_NEWER
 
 
-TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"))
+# Control codes are shown, not kept: see teleop_core.texts.
+TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0")).map(printable)
 
 
 @settings(deadline=None)

@@ -15,10 +15,16 @@ from teleop_core.geometry import (
 )
 from teleop_core.mapping.motion_scaling import MotionScaling, mapped_orientation, to_slave_axes
 from teleop_core.mapping.parameters import FixtureParameters, MotionScalingParameters
+from teleop_core.mapping.plausibility import PlausibilityParameters
 from teleop_core.master.haptic_master import REST_POSITION, REST_TILT
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.signals import STATE, TICK_NS
+
+ANY_HAND = PlausibilityParameters(
+    speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0
+)
+"""A hand that may jump, as tests have it do."""
 
 DEGREE, MM = math.pi / 180.0, 1e-3
 # Sums and products of a few numbers of size one.
@@ -32,7 +38,7 @@ class Desk:
     """Motion scaling with a hand to move and a slave that stands where it was told to."""
 
     def __init__(self, **values):
-        self.scaling = MotionScaling(MotionScalingParameters(**values))
+        self.scaling = MotionScaling(MotionScalingParameters(**{"plausible": ANY_HAND} | values))
         self.row = self.scaling.signals
         self.hand, self.turn = np.array(REST_POSITION), np.eye(3)
         self.pressed = np.zeros(3)
@@ -171,7 +177,7 @@ def test_change_of_gain_at_run_time_moves_nothing():
     desk = Desk()
     desk.step()
     before = desk.step((5 * MM, 0, 0))
-    desk.scaling.retune(MotionScalingParameters(coarse_gain=3.0, fine_gain=0.2))
+    desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, coarse_gain=3.0, fine_gain=0.2))
     assert np.array_equal(desk.step(), before)
     assert np.allclose(desk.step((MM, 0, 0)) - before, (0, -3 * MM, 0), rtol=0, atol=ROUNDING)
 
@@ -179,7 +185,7 @@ def test_change_of_gain_at_run_time_moves_nothing():
 def test_mode_parameter_switches_the_mode_at_run_time():
     desk = Desk()
     desk.step()
-    desk.scaling.retune(MotionScalingParameters(mode="fine"))
+    desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
     desk.step()
     assert (desk.state("is_fine"), desk.state("gain")) == (1.0, 0.1)
 
@@ -188,7 +194,7 @@ def test_retuning_something_else_leaves_the_mode_of_the_button():
     desk = Desk()
     desk.step()
     desk.press("mode")
-    desk.scaling.retune(MotionScalingParameters(coarse_gain=2.0))
+    desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, coarse_gain=2.0))
     desk.step()
     assert desk.state("is_fine") == 1.0
 
@@ -282,7 +288,7 @@ def test_change_of_the_tool_roll_turns_nothing():
     desk = Desk()
     desk.step(turn=rotation("x", 0.2))
     before = desk.attitude()
-    desk.scaling.retune(MotionScalingParameters(tool_roll=0.0))
+    desk.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, tool_roll=0.0))
     desk.step()
     assert np.allclose(desk.attitude(), before, rtol=0, atol=ROUNDING)
 

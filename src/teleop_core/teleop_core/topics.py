@@ -7,6 +7,10 @@ arm called ``left`` has ``left/slave/servo_cp`` and so on.
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
+STATE_COMMANDS = (
+    "enable", "disable", "pause", "resume", "home", "unhome", "reset", "stop"
+)  # fmt: skip
+"""What an arm in operation is told, by name; see :mod:`teleop_core.operation`."""
 OPERATION = (
     "state", "is_homed", "is_busy", "is_stopped", "fault", "fault_joint", "fault_value",
     "fault_bound", "rest_time", "travel",

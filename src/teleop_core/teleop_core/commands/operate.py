@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from teleop_core.commands.arguments import command, ros_module
 from teleop_core.errors import SessionError
-from teleop_core.operation.states import COMMANDS
+from teleop_core.topics import STATE_COMMANDS
 
 if TYPE_CHECKING:
     from teleop_core.nodes.operator import ArmState, Operator
@@ -24,7 +24,7 @@ without commands it says how the arms are; commands are sent one after the other
   teleop operate enable home                 an arm that waits for people
   teleop operate release reset enable        after an emergency stop
   teleop operate pause --arm left            one arm of several
-commands: release, """ + ", ".join(COMMANDS)
+commands: release, """ + ", ".join(STATE_COMMANDS)
 
 
 def add(commands: Any) -> None:

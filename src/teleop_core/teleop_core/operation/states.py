@@ -12,6 +12,7 @@ import numpy as np
 
 from teleop_core.errors import UnknownNameError
 from teleop_core.kernels import inner
+from teleop_core.topics import STATE_COMMANDS
 
 
 class State(IntEnum):
@@ -40,7 +41,7 @@ class Event(IntEnum):
     LAPSED = 11  # commands were silent for so long that motion is resumed on purpose only
 
 
-COMMANDS = ("enable", "disable", "pause", "resume", "home", "unhome", "reset", "stop")
+COMMANDS = STATE_COMMANDS
 """Events that people and programs send, by name."""
 
 

@@ -153,7 +153,8 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
         # Commands whose stamps run ahead of the clock that they come by are as near as they come.
         period_ns = 0 if is_first else min(period_ns, now_ns - s.arrival_ns)
         begin_way(p, s, row.slave_servo_jp, period_ns, dt)
-        is_next = s.arrival_ns > 0 and now_ns - s.arrival_ns <= p.timeout_ns
+        is_next = s.arrival_ns > 0 and now_ns - s.arrival_ns <= _longest_gap(p, s)
+        s.gap_ns = period_ns
         s.in_row = s.in_row + 1 if is_next else 0
         s.is_stream = max(s.is_stream, s.in_row)  # a gap does not make single commands of it
         s.command_stamp_ns, s.arrival_ns, s.refused_before = stamp, now_ns, s.refused
@@ -161,11 +162,17 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
 
 
 @inner
+def _longest_gap(p: Any, s: Any) -> int:
+    """Time [ns] after which a stream is broken: of slow ones twice their period."""
+    return max(p.timeout_ns, 2 * s.gap_ns)
+
+
+@inner
 def follows(p: Any, s: Any, now_ns: int) -> bool:
     """Whether the setpoint goes to the command: it is fresh, or alone and no stream that broke."""
     if s.state != _ENABLED or s.is_busy or not s.is_homed:
         return False
-    return bool(now_ns - s.arrival_ns <= p.timeout_ns or s.in_row == 0)
+    return bool(now_ns - s.arrival_ns <= _longest_gap(p, s) or s.in_row == 0)
 
 
 @inner

@@ -63,7 +63,7 @@ def slave_records(n: int) -> tuple[Any, Any]:
     state += [("twist", "f8", (6,))]
     stamps = (
         "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "refused_before", "in_row",
-        "is_stream", "moved_ticks", "move_ticks", "ticks", "span", "motion", "driven_ns",
+        "is_stream", "gap_ns", "moved_ticks", "move_ticks", "ticks", "span", "motion", "driven_ns",
         "asked_ns",
     )  # fmt: skip
     whole = [*state, *((name, "i8") for name in stamps), *OPERATION_STATE]
