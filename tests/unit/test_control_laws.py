@@ -184,7 +184,7 @@ def test_adaptive_law_learns_the_friction_there_is():
 
 def test_adaptive_law_stays_within_its_bounds_whatever_it_is_asked_for():
     rng = np.random.default_rng(11)
-    arm = slave("adaptive", own={"adaptive.rate": 10.0}, reference_filter=UNFILTERED)
+    arm = slave("adaptive", own={"adaptive.rate": 7.0}, reference_filter=UNFILTERED)
     reach = 0.05 * ARM.drives.speed_limit
     way = np.clip(
         ARM.home + np.cumsum(rng.uniform(-reach, reach, (3000, 6)), axis=0) * 0.2,

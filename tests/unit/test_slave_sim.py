@@ -324,7 +324,7 @@ def test_command_is_fresh_until_the_timeout_and_stale_after_it():
 
 
 def test_lone_command_is_reached_and_held():
-    bench = Bench()
+    bench = Bench(operation=OperationParameters(longest_outage=0.0))
     bench.go_to(MIDDLE)
     for _ in range(TIMEOUT_TICKS + 1):
         bench.tick()
