@@ -144,6 +144,8 @@ def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_fir
     session = start(duration=1.0)
     session.wait_text("recorder is ready")
     lines = session.text.splitlines()
+    # A process that is just being started has no environment yet.
+    wait_until(lambda: all("ROS_DOMAIN_ID" in n.environ() for n in session.nodes()), "nodes", 30.0)
     (environ,) = {node.environ()["ROS_DOMAIN_ID"] for node in session.nodes()}
     assert lines[0].endswith(f"ROS_DOMAIN_ID={environ}")
     assert lines[1] == f"recording to {session.bag}"

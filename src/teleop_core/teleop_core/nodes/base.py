@@ -382,8 +382,9 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         except Exception:  # rclpy would turn it into ERROR without a word
             self.get_logger().fatal(f"{transition} crashed:\n{traceback.format_exc()}")
             return ERROR
+        if self._word not in {"unconfigured", "failed"} or word != "finalized":
+            self.get_logger().info(self.news(_NEWS.get(word, word)))
         self._word = word
-        self.get_logger().info(self.news(_NEWS.get(word, word)))
         self.report()
         return SUCCESS
 
