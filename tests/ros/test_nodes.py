@@ -199,11 +199,11 @@ def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer, tm
     (line,) = [one for one in told if "[INFO]" not in one]
     assert "cannot be written any further" in line
     assert "recover" in line or "are safe" in line
+    bag = tmp_path / "bag"
     if "recover" in line:  # not even the end of the file found room
-        subprocess.run(
-            [sys.executable, "-m", "teleop_core.cli", "recover", str(tmp_path / "bag")], check=True
-        )
-    assert Bag(tmp_path / "bag").topics["master/measured_cp"].count > 0
+        subprocess.run([sys.executable, "-m", "teleop_core.cli", "recover", str(bag)], check=True)
+        bag = tmp_path / "bag_recovered"
+    assert Bag(bag).topics["master/measured_cp"].count > 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
