@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.mapping.motion_scaling import MotionScaling
 from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
+from teleop_core.mapping.plausibility import PlausibilityParameters
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
@@ -21,6 +22,10 @@ ROUNDING = 1e-14
 ANGLE_ROUNDING = 1e-14
 # Box centres are reported to a nanometre.
 NANOMETRE = 1.0e-9
+ANY_HAND = PlausibilityParameters(
+    speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0
+)
+"""A hand that may jump, as tests have it do."""
 PAUSE_NS = round(MotionScalingParameters().longest_pause * 1e9)
 R_SLAVE_MASTER = axis_map("axes", MotionScalingParameters().axes)
 HOME = load_robot("rcrt1").fk(load_robot("rcrt1").home)
@@ -48,7 +53,7 @@ class Desk:
     """Motion scaling between a hand and a slave that stands where it was told to."""
 
     def __init__(self):
-        self.scaling = MotionScaling(MotionScalingParameters())
+        self.scaling = MotionScaling(MotionScalingParameters(plausible=ANY_HAND))
         self.row = self.scaling.signals
         self.hand, self.attitude = np.zeros(3), Rotation.identity()
         self.buttons = np.zeros(3)
@@ -94,6 +99,7 @@ class Desk:
             fine = 0.01 + 0.09 * value
             self.scaling.retune(
                 MotionScalingParameters(
+                    plausible=ANY_HAND,
                     coarse_gain=0.1 + 3.0 * value, fine_gain=fine, tool_roll=3.0 * value,
                     mode="fine" if value > 0.5 else "coarse",
                 )
@@ -207,7 +213,7 @@ def test_box_stays_where_it_is_until_gain_box_or_slave_change(happened):
 @given(events)
 def test_the_same_hand_never_moves_the_slave_further_in_fine_mode(happened):
     coarse, fine = Desk(), Desk()
-    fine.scaling.retune(MotionScalingParameters(mode="fine"))
+    fine.scaling.retune(MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
     fine.sample(np.zeros(3), np.zeros(3))
     for action, value, step, turn in happened:
         if action in {"mode", "retune"}:
@@ -328,7 +334,9 @@ def test_parameters_changed_in_a_running_session_never_move_the_slave(seed):
         coarse, roll = rng.uniform(0.1, 3.0), rng.uniform(-3.0, 3.0)
         mode = ("coarse", "fine")[rng.integers(2)]
         session.stages["motion_scaling"].retune(
-            MotionScalingParameters(coarse_gain=coarse, mode=mode, tool_roll=roll)
+            MotionScalingParameters(
+                plausible=ANY_HAND, coarse_gain=coarse, mode=mode, tool_roll=roll
+            )
         )
         block = session.run(200)
         assert_command_moves_with_the_hand(np.concatenate((before[-1:], block)), 0)

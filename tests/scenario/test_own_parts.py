@@ -79,7 +79,7 @@ def test_delay_of_20_ms_on_the_joint_commands_shifts_the_setpoints_by_20_ticks(o
         assert np.allclose(delayed[field][20:], plain[field][:-20], rtol=0, atol=1e-9), field
     assert np.allclose(delayed["slave_setpoint_js"][:20], HOME, rtol=0, atol=1e-15)
     assert np.array_equal(
-        delayed["slave_setpoint_js_ns"], np.maximum(plain["slave_servo_jp_ns"] - 20 * TICK_NS, 0)
+        delayed["slave_setpoint_js_ns"], np.maximum(plain["slave_servo_jp_ns"] - 20 * TICK_NS, 1)
     )
 
 
