@@ -11,6 +11,7 @@ from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.kernels import kernel, records
 from teleop_core.operation import Answer, Event, OperationParameters, State, command_event
 from teleop_core.operation.states import COMMANDS, STATE_FIELDS, TABLE, answer_text, change
+from teleop_core.parameters import build
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 
 D, E, P, F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT
@@ -280,3 +281,9 @@ def test_a_stream_with_a_gap_before_its_last_command_pauses_the_arm_too():
     arm.run(0.001)
     arm.run(0.7, commanded=False)
     assert arm.state is P
+
+
+@pytest.mark.parametrize("word", ["stop", "heartbeat"])
+def test_no_session_can_have_an_emergency_stop_told_only(word):
+    with pytest.raises(ParameterError, match="reported"):
+        build(OperationParameters, {"reported": (word,)})

@@ -41,8 +41,7 @@ class HapticMasterNode(TickingNode):
         for entry in self.ports.inputs[MASTER_SERVO_CF.name]:
             if entry.age() > self.parameters.force_timeout:
                 entry.zero()
-        pressed = self._stop.take()
-        if pressed is not None:
+        for pressed in self._stop.take():
             self.stage.press(is_pressed=pressed)
             self._crtk.press(is_pressed=pressed)
         super().read_ports(trigger)

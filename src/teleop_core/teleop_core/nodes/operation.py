@@ -48,15 +48,15 @@ class StopInput:
         self._take = [own.handle.take_message for own in self._own]
         self._ticks = 0
 
-    def take(self) -> bool | None:
-        """Whether it was pressed since the last call; None if nothing was said."""
-        found = None
+    def take(self) -> list[bool]:
+        """What was said since the last call, oldest first: pressed or not; mostly nothing."""
+        found = []
         self._ticks += 1
         for take in self._take if self._ticks % _EVERY == 0 else self._take[:1]:
             while (taken := take(Bool, True)) is not None:
                 data = taken[0]
                 if len(data) >= _BYTES:
-                    found = bool(found) or data[_BYTES - 1] != 0
+                    found.append(data[_BYTES - 1] != 0)
         return found
 
     def close(self) -> None:

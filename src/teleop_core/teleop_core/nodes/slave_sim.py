@@ -61,8 +61,7 @@ class SlaveSimNode(TickingNode):
 
     def _look(self, due: tuple[int, ...]) -> None:
         """Take the emergency stop, and find the faults that only a node can see."""
-        pressed = self._stop.take()
-        if pressed is not None:
+        for pressed in self._stop.take():
             with self.lock:
                 self.stage.press(is_pressed=pressed, now_ns=due[0] + self.epoch_ns)
         longest = self.parameters.operation.longest_outage

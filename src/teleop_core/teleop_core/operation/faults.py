@@ -63,4 +63,7 @@ FAULTS: Mapping[Fault, FaultKind] = {
     Fault.STALL: FaultKind(Reaction.PAUSE, "the slave's own loop stood still", "s"),
 }
 """What there is, with its reaction; those that a session names as ``reported`` only report."""
-NAMES = tuple(fault.word for fault in Fault if fault is not Fault.NONE)
+ALWAYS = (Fault.STOP, Fault.HEARTBEAT)
+"""Faults that no session can have told only: an emergency stop stops."""
+NAMES = tuple(fault.word for fault in Fault if fault and fault not in ALWAYS)
+"""Those that a session can name as ``reported``."""
