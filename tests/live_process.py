@@ -1,6 +1,7 @@
 """The command ``teleop live`` as a process, with all that it starts."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -19,12 +20,13 @@ QUICK = ("operator.approach_time=1.0", "haptic_master.patience=0.0")
 class LiveProcess:
     """A session started from the command line, recorded in ``folder``/bag.
 
-    Its temporary files go to ``folder``/tmp.
+    Its temporary files go to ``folder``/tmp. It ignores some signals from the start, as a process
+    does that a shell starts in the background.
     """
 
     def __init__(
         self, folder: Path, *arguments: str, duration: float = 60.0,
-        env: Mapping[str, str] | None = None,
+        env: Mapping[str, str] | None = None, ignores: tuple[int, ...] = (),
     ) -> None:  # fmt: skip
         self.bag, self.temporary, self._log = folder / "bag", folder / "tmp", folder / "live.log"
         self.temporary.mkdir()
@@ -35,6 +37,7 @@ class LiveProcess:
             self.process = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
                 env=os.environ | {"TMPDIR": str(self.temporary)} | dict(env or {}),
+                preexec_fn=lambda: [signal.signal(n, signal.SIG_IGN) for n in ignores],
             )  # fmt: skip
 
     @property

@@ -4,6 +4,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 import yaml
@@ -201,3 +202,13 @@ def test_sessions_start_and_end_again_and_again(start, tmp_path, composed_option
         session = LiveProcess(folder, *composed_option, duration=0.1 + 0.3 * number)
         assert session.wait(120) == 0, session.text
         session.recorded()
+
+
+@pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
+def test_a_session_that_a_shell_started_in_the_background_ends_like_any(start, composed_option):
+    session = start(*composed_option, duration=1.0, ignores=(signal.SIGINT, signal.SIGQUIT))
+    session.wait_text("haptic_master is ready")
+    begun = time.monotonic()
+    assert session.wait(120) == 0, session.text
+    assert time.monotonic() - begun < 25.0  # one unheeded signal alone costs 30 s
+    session.recorded()

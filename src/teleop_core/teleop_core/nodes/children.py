@@ -18,8 +18,9 @@ from teleop_core.errors import SessionError
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.parent import VARIABLE
 
-_PATIENCE = ((signal.SIGINT, 30.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
-_STILL_PATIENCE = ((signal.SIGINT, 2.0), (signal.SIGKILL, 5.0))  # of a process that stands still
+# Not by SIGINT, which a process that a shell started in the background ignores, and its children.
+_PATIENCE = ((signal.SIGTERM, 30.0), (signal.SIGKILL, 5.0))
+_STILL_PATIENCE = ((signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))  # of one that stands still
 _TROUBLE = ("[ERROR]", "[FATAL]", "Traceback")
 _STILL = 3.0  # a thread of its own speaks ten times a second, whatever the process is doing
 _STILL_STARTING = 60.0  # the interpreter loads, perhaps from a cold disk
@@ -153,12 +154,12 @@ class Child:
         """Ask it to end, without waiting."""
         if self._process.poll() is None and not self._is_asked:
             self._is_asked = True  # a second time would only disturb its end
-            self._process.send_signal(signal.SIGINT)
+            self._process.send_signal(signal.SIGTERM)
 
     def end(self) -> int:
         """End it, more and more firmly; returns its exit code."""
         for number, patience in _STILL_PATIENCE if self._silence() else _PATIENCE:
-            if number == signal.SIGINT:
+            if number == signal.SIGTERM:
                 self.ask()
             elif self._process.poll() is None:
                 self._process.send_signal(number)
