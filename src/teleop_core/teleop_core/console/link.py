@@ -1,0 +1,169 @@
+"""Link: what the page sees of a session, and what it asks of it; live or recorded alike."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from teleop_core.geometry import Array
+from teleop_core.robots.robot import Robot
+from teleop_core.topics import STREAMS, Kind, Topic
+
+Setting = (
+    bool
+    | int
+    | float
+    | str
+    | tuple[bool, ...]
+    | tuple[int, ...]
+    | tuple[float, ...]
+    | tuple[str, ...]
+)
+"""Value of a parameter."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """An arm of the session: its namespace, empty for the default one, and its robot."""
+
+    name: str
+    robot: Robot
+
+
+@dataclass
+class ArmView:
+    """What is known of one arm now.
+
+    Attributes:
+        streams: Newest values of each stream by its name without the arm, such as
+            ``slave/measured_cp``; columns as of :class:`~teleop_core.topics.Kind`. Topics that have
+            not spoken are missing.
+        stamp_ns: Their stamps [ns].
+        state: Numbers of ``teleop/state`` by name; empty before the first.
+        operation: Numbers of ``slave/operation`` by name; empty before the first.
+        operation_text: The same in words.
+    """
+
+    streams: dict[str, Array] = field(default_factory=dict)
+    stamp_ns: dict[str, int] = field(default_factory=dict)
+    state: dict[str, float] = field(default_factory=dict)
+    operation: dict[str, float] = field(default_factory=dict)
+    operation_text: str = ""
+
+    def get(self, topic: Topic) -> Array | None:
+        """Newest values of a stream; None before the first."""
+        return self.streams.get(topic.name)
+
+
+@dataclass
+class View:
+    """What is known of a session at one time.
+
+    Attributes:
+        time: Time since the beginning of the session [s].
+        arms: By namespace.
+        is_fresh: Whether streams come; false when the session is silent or gone.
+        news: Warnings of the nodes, a line each.
+        delay: Median and 99th percentile from master sample to slave command [s]; NaN if unknown.
+        recording: Where it is being recorded; None if it is not.
+        run: Number of recordings that were saved in this session.
+    """
+
+    time: float = 0.0
+    arms: dict[str, ArmView] = field(default_factory=dict)
+    is_fresh: bool = False
+    news: tuple[str, ...] = ()
+    delay: tuple[float, float] = (float("nan"), float("nan"))
+    recording: Path | None = None
+    run: int = 0
+
+
+@dataclass(frozen=True)
+class ParameterInfo:
+    """A parameter of a node: what it is now, and what it may be.
+
+    Attributes:
+        node: Name of the node with its namespace, such as ``left/slave_sim``.
+        name: Dotted name.
+        value: Present value.
+        doc: Meaning, with its unit.
+        lower: Smallest value; None without a bound.
+        upper: Largest value; None without a bound.
+        choices: Values that a text may have; empty for any.
+        is_fixed: Whether only a new session can change it.
+    """
+
+    node: str
+    name: str
+    value: Setting
+    doc: str = ""
+    lower: float | None = None
+    upper: float | None = None
+    choices: tuple[str, ...] = ()
+    is_fixed: bool = False
+
+
+class Link(Protocol):
+    """A session as the page sees it. All methods may be called from any thread.
+
+    Attributes:
+        arms: The arms, the default one first.
+        title: What the session is called: scenario or recording.
+        is_live: Whether it can be commanded; false for a recording.
+    """
+
+    arms: tuple[Arm, ...]
+    title: str
+    is_live: bool
+
+    def view(self) -> View:
+        """What is known now; cheap, called at the rate of the page."""
+
+    def command(self, word: str, arm: str = "") -> tuple[bool, str]:
+        """Send one of :data:`~teleop_core.topics.STATE_COMMANDS`; whether it was taken, and why."""
+
+    def press(self, *, is_pressed: bool) -> None:
+        """Press or release the emergency stop of all arms."""
+
+    def parameters(self) -> Mapping[tuple[str, str], ParameterInfo]:
+        """All parameters of all nodes by node and name, as they were when last asked for."""
+
+    def change(self, node: str, name: str, value: Setting) -> str:
+        """Set a parameter; returns why it was refused, empty if it was taken."""
+
+    def hold(self, arm: str, pose: Array) -> None:
+        """Want the stylus at a pose (7,) in the master's base; silence after it lets go."""
+
+    def let_go(self, arm: str) -> None:
+        """Let go of the stylus: the slave holds until it is taken again."""
+
+    def press_button(self, arm: str, name: str) -> None:
+        """Press and release the ``fixture`` or ``mode`` button of the stylus."""
+
+    def save(self, name: str) -> Path:
+        """Close the recording under a name and go on recording; returns where it is.
+
+        Raises:
+            TeleopError: The name cannot be used, or the recorder refuses.
+        """
+
+
+def empty_view(arms: tuple[Arm, ...]) -> View:
+    """A view of arms that have not spoken yet."""
+    return View(arms={arm.name: ArmView() for arm in arms})
+
+
+def widths(robot: Robot) -> dict[str, int]:
+    """Number of columns of each stream of an arm, by name."""
+    return {topic.name: topic.width(robot.n) for topic in STREAMS if topic.kind is not Kind.REPORT}
+
+
+def box_of(state: Mapping[str, float]) -> tuple[Array, Array] | None:
+    """Centre and size [m] of the fixture that is on, in master_base; None if none is."""
+    if not state.get("is_fixture_on"):
+        return None
+    place = [[state[f"fixture_{what}_{axis}"] for axis in "xyz"] for what in ("center", "size")]
+    center, size = np.array(place)
+    return center, size
