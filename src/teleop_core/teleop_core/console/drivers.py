@@ -1,0 +1,114 @@
+"""Drivers: of all pages that are open, one drives at a time; the others watch."""
+
+import threading
+from collections.abc import Callable
+
+PATIENCE = 5.0
+"""Time [s] after which a page that holds the stylus and gives no sign of life loses control."""
+
+
+class Drivers:
+    """Who of the open pages may command the session.
+
+    The first page drives. Others watch until they take control, which always succeeds: two people
+    at one arm talk to each other. A page that comes while nobody drives gets control, so that one
+    which is loaded again goes on; a page that is already open never gets it without asking. Control
+    is lost by leaving, and by silence while the stylus is held: a page that stands still then would
+    hold it for ever. Silence with an idle stylus harms nobody, and browsers slow hidden pages down.
+
+    Methods may be called from any thread. Times are of one monotonic clock [s].
+
+    Args:
+        patience: Time without a sign of life after which a held stylus is lost [s].
+    """
+
+    def __init__(self, patience: float = PATIENCE) -> None:
+        self._patience = patience
+        self._lock = threading.RLock()
+        self._heard: dict[int, float] = {}
+        self._driver: int | None = None
+        self._holds = False
+        self._listeners: list[Callable[[int | None], None]] = []
+
+    @property
+    def driver(self) -> int | None:
+        """The page that drives; None if none does."""
+        return self._driver
+
+    @property
+    def pages(self) -> tuple[int, ...]:
+        """All open pages, in the order in which they came."""
+        with self._lock:
+            return tuple(self._heard)
+
+    def may_drive(self, page: int) -> bool:
+        """Whether commands of a page count."""
+        return page == self._driver
+
+    def role(self, page: int) -> str:
+        """What to tell the people at a page about it."""
+        if self.may_drive(page):
+            return "you drive"
+        return "you watch" if self._driver is not None else "you watch, nobody drives"
+
+    def on_change(self, listener: Callable[[int | None], None]) -> None:
+        """Call a function with the new driver, or None, at every change; it must not block.
+
+        Whoever drove before holds nothing any more: the listener lets go of the stylus.
+        """
+        self._listeners.append(listener)
+
+    def join(self, page: int, now: float) -> None:
+        """A page has opened; it drives if nobody does."""
+        with self._lock:
+            self._heard[page] = now
+            self._give(page if self._driver is None else self._driver)
+
+    def leave(self, page: int) -> None:
+        """A page has closed, or its connection is lost."""
+        with self._lock:
+            self._heard.pop(page, None)
+            self._give(None if page == self._driver else self._driver)
+
+    def take(self, page: int, now: float) -> bool:
+        """Give control to a page; false if it is not open."""
+        with self._lock:
+            if page not in self._heard:
+                return False
+            self._heard[page] = now
+            self._give(page)
+            return True
+
+    def heard(self, page: int, now: float) -> None:
+        """A page has given a sign of life."""
+        with self._lock:
+            if page in self._heard:
+                self._heard[page] = now
+
+    def hold(self, page: int, now: float) -> bool:
+        """A page takes the stylus or moves it; false if it may not."""
+        with self._lock:
+            self.heard(page, now)
+            self._holds = self._holds or self.may_drive(page)
+            return self.may_drive(page)
+
+    def let_go(self, page: int) -> None:
+        """A page lets go of the stylus."""
+        with self._lock:
+            self._holds = self._holds and not self.may_drive(page)
+
+    def expire(self, now: float) -> None:
+        """Take control from a driver who holds the stylus and has been silent for too long."""
+        with self._lock:
+            if self._driver is None or not self._holds:
+                return
+            if now - self._heard[self._driver] > self._patience:
+                self._give(None)
+
+    def _give(self, page: int | None) -> None:
+        """Change the driver; the listeners hear of it in the order of the changes."""
+        if page == self._driver:
+            return
+        self._driver, self._holds = page, False
+        for listener in tuple(self._listeners):
+            listener(page)

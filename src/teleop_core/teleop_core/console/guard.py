@@ -1,0 +1,126 @@
+"""Guard: which requests the page's server answers; no page from elsewhere may drive an arm.
+
+Three things protect it. *Host*: a name that leads here but is not one of ours was made to (DNS
+rebinding). *Origin*: browsers tell which page opens a WebSocket; only our own may. *Token*: where
+others can reach the port, a secret in the address which the browser then keeps as a cookie.
+"""
+
+import ipaddress
+import secrets
+import socket
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs, urlsplit
+
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval'; connect-src 'self' data: "
+        "blob: {socket}; frame-ancestors 'none'; form-action 'none'; base-uri 'none'"
+    ),
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+"""Sent with every page: it can ask no other host for anything, and no other page can frame it."""
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches an address."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def is_wildcard(host: str) -> bool:
+    """Whether an address stands for all of this machine."""
+    try:
+        return ipaddress.ip_address(host).is_unspecified
+    except ValueError:
+        return host == ""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What counts of a request.
+
+    Attributes:
+        path: Path with its query.
+        is_socket: Whether it asks for a WebSocket.
+        header: All values of a header by its name.
+    """
+
+    path: str
+    is_socket: bool
+    header: Callable[[str], Sequence[str]]
+
+
+class Guard:
+    """Decides about requests.
+
+    Ports are compared between Host and Origin only, not with our own: the page may be seen through
+    a forwarded port, and a browser cannot be made to send a Host that it did not connect to.
+
+    Args:
+        host: Address that the server is bound to.
+        port: Its port; names the cookie, since cookies are shared by all ports of a host.
+        token: Secret that requests must have; empty for none.
+    """
+
+    def __init__(self, host: str, port: int, token: str = "") -> None:
+        self._host, self._token = host, token
+        self._cookie = f"teleop_console_{port}"
+
+    def refusal(self, request: Request) -> str:
+        """Why a request is refused; empty if it is answered."""
+        hosts, origins = request.header("Host"), request.header("Origin")
+        if len(hosts) != 1 or not self._is_ours(hosts[0]):
+            return "this page is not known by that name"
+        if (request.is_socket or origins) and not _is_same(origins, hosts[0]):
+            return "only the console's own page may do this"
+        if not self._has_token(request):
+            return "the token is missing or wrong: open the address that was printed at the start"
+        return ""
+
+    def cookie(self) -> str:
+        """Value of Set-Cookie that lets the page go on without the token in its address."""
+        if not self._token:
+            return ""
+        return f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict"
+
+    def _is_ours(self, host: str) -> bool:
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+        except ValueError:
+            return False
+        if name in (*LOOPBACK, self._host.lower()):
+            return True
+        return is_wildcard(self._host) and (_is_address(name) or name == socket.gethostname())
+
+    def _has_token(self, request: Request) -> bool:
+        if not self._token:
+            return True
+        given = parse_qs(urlsplit(request.path).query).get("token", [])
+        for header in request.header("Cookie"):
+            try:
+                found = SimpleCookie(header).get(self._cookie)
+            except CookieError:
+                continue
+            given += [found.value] if found else []
+        return any(secrets.compare_digest(g.encode(), self._token.encode()) for g in given)
+
+
+def _is_same(origins: Sequence[str], host: str) -> bool:
+    return len(origins) == 1 and origins[0].lower() == f"http://{host.lower()}"
+
+
+def _is_address(name: str) -> bool:
+    """Whether a name is a number, which nobody can make lead elsewhere."""
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,99 @@
+"""ConsoleServer: serves the page to browsers of this machine, and knows which page drives."""
+
+import secrets
+import threading
+import time
+from types import TracebackType
+
+import viser
+
+from teleop_core.console.drivers import Drivers
+from teleop_core.console.guard import Guard, is_loopback, is_wildcard
+from teleop_core.console.hooks import Server
+from teleop_core.console.port import listen
+
+PORT = 8080
+"""Where the page is if nothing else is asked."""
+_LOOK = 0.5  # s, between looks at the driver
+_FORGET = 20  # looks between clearing up
+
+
+class ConsoleServer:
+    """Server of the page, running from its making to :meth:`close`.
+
+    Without a token it serves this machine alone; other addresses always have one. Pages of other
+    origins, names that were made to lead here, and requests without the token get 403.
+
+    Attributes:
+        viser: The server to which scene and panel are added.
+        drivers: Which page drives.
+        token: Secret that the address must carry; empty for none.
+
+    Args:
+        port: Port; 0 for any free one.
+        host: Address of this machine to serve at; the loopback by default.
+        token: Secret; made if the address is not the loopback and none is given.
+        label: Heading of the panel.
+
+    Raises:
+        SessionError: The port is taken; the text says by what, and names a free one.
+        ParameterError: The address is none of this machine.
+    """
+
+    def __init__(
+        self, port: int = PORT, host: str = "127.0.0.1", token: str = "", label: str = ""
+    ) -> None:
+        opened = listen(host, port)
+        self.port = int(opened.getsockname()[1])
+        self.host = host
+        self.token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
+        self.drivers = Drivers()
+        self.viser = Server(opened, Guard(host, self.port, self.token), self._alive, label)
+        self.viser.on_client_connect(self._come)
+        self.viser.on_client_disconnect(self._go)
+        self._ends = threading.Event()
+        self._watch = threading.Thread(target=self._look, name="console pages", daemon=True)
+        self._watch.start()
+
+    @property
+    def url(self) -> str:
+        """Address of the page, token included, as people of this machine open it."""
+        host = "localhost" if is_wildcard(self.host) else self.host
+        host = f"[{host}]" if ":" in host else host
+        return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
+
+    def close(self) -> None:
+        """End the server; pages that are open show that they have lost it."""
+        self._ends.set()
+        self._watch.join()
+        self.viser.stop()
+
+    def __enter__(self) -> "ConsoleServer":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    # Coroutines, since viser runs these in the order of events; functions it runs side by side.
+    async def _come(self, client: viser.ClientHandle) -> None:
+        self.viser.begin_heartbeat(client)
+        self.drivers.join(client.client_id, time.monotonic())
+
+    async def _go(self, client: viser.ClientHandle) -> None:
+        self.drivers.leave(client.client_id)
+
+    def _alive(self, page: int) -> None:
+        self.drivers.heard(page, time.monotonic())
+
+    def _look(self) -> None:
+        looks = 0
+        while not self._ends.wait(_LOOK):
+            self.drivers.expire(time.monotonic())
+            looks += 1
+            if looks % _FORGET == 0:
+                self.viser.forget()
