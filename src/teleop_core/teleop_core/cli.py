@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from teleop_core.commands import (
     calibrate,
     conformance,
+    console,
     drill,
     exchange,
     experiment,
@@ -115,6 +116,7 @@ def _parser() -> argparse.ArgumentParser:
     drill.add(commands)
     operate.add(commands)
     conformance.add(commands)
+    console.add(commands)
     return parser
 
 

@@ -32,6 +32,10 @@ class Interrupt:
         if not self.is_deaf:
             raise KeyboardInterrupt
 
+    def ask(self) -> None:
+        """Interrupt from another thread: what runs ends where it looks next."""
+        self.has_come = True
+
     def check(self) -> None:
         """Interrupt what runs now, if a signal came.
 

@@ -47,8 +47,9 @@ def _crews(graph: Graph, *, is_composed: bool) -> tuple[Crew, ...]:
 
 
 def live(
-    configuration: Configuration, out: Path, console: Console, *, is_composed: bool = False
-) -> None:
+    configuration: Configuration, out: Path, console: Console, *, is_composed: bool = False,
+    interrupt: Interrupt | None = None,
+) -> None:  # fmt: skip
     """Run and record a session as ROS 2 nodes, for the configured duration or until Ctrl-C.
 
     Args:
@@ -56,6 +57,7 @@ def live(
         out: Directory of the recording, made here.
         console: Where the progress is shown.
         is_composed: Whether all nodes share one process, in place of one each.
+        interrupt: What ends it from another thread; None for signals alone.
 
     Raises:
         RecordingError: The directory exists.
@@ -66,7 +68,7 @@ def live(
         raise RecordingError(out, "exists already; choose another --out")
     env = environment()
     remove_leftovers()
-    interrupt = Interrupt()
+    interrupt = interrupt or Interrupt()
     # A file without a name: there is nothing to remove, however this ends.
     with (
         tempfile.TemporaryFile("w+") as parameters,

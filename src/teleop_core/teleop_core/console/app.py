@@ -1,0 +1,97 @@
+"""Console: the page of one session, from its opening to its end."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from teleop_core.console.link import Link
+from teleop_core.console.panel import Panel
+from teleop_core.console.recorded import RecordedLink
+from teleop_core.console.replay import ReplayControls
+from teleop_core.console.scene import Scene
+from teleop_core.console.server import ConsoleServer
+from teleop_core.console.stylus import Stylus
+
+RATE = 30.0
+"""How often the page is drawn [1/s]."""
+
+
+class Console:
+    """A page that shows a session and drives it, to be used with ``with``.
+
+    Args:
+        server: Where it is served.
+        link: The session.
+        renew: Begins a new session with other settings; None where the session is not ours.
+    """
+
+    def __init__(
+        self, server: ConsoleServer, link: Link,
+        renew: Callable[[tuple[str, ...]], None] | None = None,
+    ) -> None:  # fmt: skip
+        self._server, self._link = server, link
+        drivers = server.drivers
+        self.panel = Panel(
+            server.viser, link, drivers.may_drive, drivers.take, lambda: drivers.driver, renew
+        )
+        self.scene = Scene(server.viser, link.arms)
+        self.stylus = Stylus(
+            server.viser, self.scene, on_hold=link.hold, on_let_go=link.let_go,
+            may_drive=drivers.may_drive,
+        )  # fmt: skip
+
+    def draw(self) -> None:
+        """Show what is known now."""
+        view = self._link.view()
+        with self._server.viser.atomic():
+            self.scene.draw(view)
+            self.stylus.draw(view)
+        self.panel.draw(view)
+
+    def run(self, is_over: Callable[[], bool]) -> None:
+        """Draw until something is over; time that was lost is not made up for."""
+        threading.Thread(target=self.panel.settings.refresh, daemon=True).start()
+        due = time.monotonic()
+        while not is_over():
+            self.draw()
+            due = max(due + 1.0 / RATE, time.monotonic())
+            time.sleep(max(0.0, due - time.monotonic()))
+
+
+@contextmanager
+def splash(server: ConsoleServer) -> Iterator[Callable[[str], None]]:
+    """Show on an empty page what is going on, line by line, until there is something to show."""
+    gui = server.viser.gui
+    gui.reset()
+    server.viser.scene.reset()
+    lines: list[str] = []
+    text = gui.add_markdown("**starting …**")
+
+    def say(line: str) -> None:
+        lines.append(line)
+        with suppress(Exception):  # the page is showing something else by now
+            text.content = "**starting …**\n\n" + "\n\n".join(lines[-8:])
+
+    yield say
+    gui.reset()
+
+
+def replay(server: ConsoleServer, path: Path) -> None:
+    """Show a recording until Ctrl-C.
+
+    Raises:
+        RecordingError: It cannot be read, or is one of another system.
+    """
+    link = RecordedLink(path)
+    console = Console(server, link)
+    controls = ReplayControls(server.viser, link)
+    before = time.monotonic()
+    while True:
+        now = time.monotonic()
+        link.advance(now - before)
+        before = now
+        controls.draw()
+        console.draw()
+        time.sleep(max(0.0, now + 1.0 / RATE - time.monotonic()))

@@ -1,0 +1,246 @@
+"""Panel: what an operator's console has: state, commands, stop, save, settings, plots, scores."""
+
+import html
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import viser
+
+from teleop_core.console.history import History, LiveScores
+from teleop_core.console.link import Link, View
+from teleop_core.console.plots import Plots
+from teleop_core.console.settings import SettingsPanel
+from teleop_core.errors import TeleopError
+from teleop_core.operation import State
+
+_PERIOD = 0.2  # between two drawings of the texts [s]
+_WATCHING = "You watch. Take control first."
+_COLORS = {
+    State.ENABLED: "#2f9e44", State.PAUSED: "#e8a100", State.DISABLED: "#868e96",
+    State.FAULT: "#e03131",
+}  # fmt: skip
+_ACTIONS = (
+    ("Initialize", "release, reset, enable and home", ("reset", "enable", "home")),
+    ("Start", "follow the stylus", ("enable",)),
+    ("Stop", "pause: hold still until Start", ("pause",)),
+    ("Home", "move smoothly to the home posture", ("home",)),
+)
+
+
+class Panel:
+    """Everything beside the scene.
+
+    Args:
+        server: The page.
+        link: The session.
+        may_drive: Whether a browser may command the arm.
+        take: Makes a browser the one that drives.
+        driver: Says who drives: the number of a browser, or None.
+        renew: Begins a new session with other settings; None where the session is not ours.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, link: Link, may_drive: Callable[[int], bool],
+        take: Callable[[int], None], driver: Callable[[], int | None],
+        renew: Callable[[tuple[str, ...]], None] | None = None,
+    ) -> None:  # fmt: skip
+        self._server, self._gui, self._link = server, server.gui, link
+        self._may_drive, self._take, self._driver = may_drive, take, driver
+        self._drawn, self._is_saving = 0.0, False
+        self.histories = {arm.name: History(arm) for arm in link.arms}
+        self.scores = {arm.name: LiveScores() for arm in link.arms}
+        self._plots: list[Plots] = []
+        self._add_stop()
+        self._status = self._gui.add_html("")
+        tabs = self._gui.add_tab_group()
+        with tabs.add_tab("Drive"):
+            self._add_drive()
+        with tabs.add_tab("Plots"):
+            self._add_plots()
+        with tabs.add_tab("Settings"):
+            self.settings = SettingsPanel(server, link, self._guard, renew)
+        with tabs.add_tab("Scores"):
+            self._add_scores()
+        self.view_tab = tabs.add_tab("View")
+
+    # -- parts -----------------------------------------------------------------------------------
+
+    def _add_stop(self) -> None:
+        """Emergency stop: in a window of its own, so that it is seen whatever else is shown."""
+        window = self._gui.add_panel(order=-1.0)
+        with window.add_tab("Emergency stop"):
+            stop = self._gui.add_button(
+                "EMERGENCY STOP", color="red", hint="stops all arms at once; the space key too"
+            )
+            release = self._gui.add_button("release", hint="then Initialize")
+        window.float(x=15, y=-15, width=230)
+        # Anybody who watches may stop; letting the arm go again is the driver's.
+        stop.on_click(lambda _: self._link.press(is_pressed=True))
+        release.on_click(lambda event: self._guarded(event.client_id, self._release))
+        command = self._gui.add_command(
+            "Emergency stop", description="stops all arms at once", hotkey="space"
+        )
+        command.on_trigger(lambda _: self._link.press(is_pressed=True))
+
+    def _release(self) -> None:
+        self._link.press(is_pressed=False)
+
+    def _add_drive(self) -> None:
+        take = self._gui.add_button("Take control", hint="one browser drives, the others watch")
+        take.on_click(lambda event: self._take(-1 if event.client_id is None else event.client_id))
+        for label, hint, words in _ACTIONS:
+            button = self._gui.add_button(label, hint=hint)
+            button.on_click(
+                lambda event, words=words: self._guarded(
+                    event.client_id, lambda: self._command(event.client, words)
+                )
+            )
+        with self._gui.add_folder("stylus"):
+            mode = self._gui.add_button("coarse ↔ fine", hint="the mode button of the stylus")
+            fixture = self._gui.add_button("box on ↔ off", hint="the fixture button of the stylus")
+        for button, name in ((mode, "mode"), (fixture, "fixture")):
+            button.on_click(
+                lambda event, name=name: self._guarded(event.client_id, lambda: self._press(name))
+            )
+        with self._gui.add_folder("recording"):
+            self._name = self._gui.add_text("name", "run_1", hint="letters, digits, . _ -")
+            save = self._gui.add_button("Save as", hint="closes the recording under this name")
+            self._saved = self._gui.add_markdown("")
+        save.on_click(lambda event: self._guarded(event.client_id, self._save))
+        self._told = self._gui.add_markdown("")
+
+    def _add_plots(self) -> None:
+        for name, history in self.histories.items():
+            if len(self.histories) > 1:
+                with self._gui.add_folder(name or "first arm"):
+                    self._plots.append(Plots(self._gui, history))
+            else:
+                self._plots.append(Plots(self._gui, history))
+
+    def _add_scores(self) -> None:
+        self._live = self._gui.add_markdown("")
+        again = self._gui.add_button("begin anew", hint="the figures, not the recording")
+        again.on_click(lambda _: self._begin_scores())
+        self._score = self._gui.add_button(
+            "Score the last saved recording", disabled=True, hint="teleop evaluate"
+        )
+        self._scored = self._gui.add_markdown("")
+        self._score.on_click(lambda _: self._evaluate())
+
+    # -- actions ---------------------------------------------------------------------------------
+
+    def _guard(self, client: int | None) -> bool:
+        return client is not None and self._may_drive(client)
+
+    def _guarded(self, client: int | None, action: Callable[[], None]) -> None:
+        """Do something for the browser that drives; tell others why not."""
+        if self._guard(client):
+            action()
+        elif (
+            handle := self._server.get_clients().get(-1 if client is None else client)
+        ) is not None:
+            handle.add_notification("Not done", _WATCHING, auto_close_seconds=4.0, color="yellow")
+
+    def _command(self, client: viser.ClientHandle | None, words: tuple[str, ...]) -> None:
+        """Send commands to every arm; what is refused is told."""
+        if words[0] == "reset":
+            self._link.press(is_pressed=False)
+        told = []
+        for arm in self._link.arms:
+            for word in words:
+                is_taken, text = self._link.command(word, arm.name)
+                told.append(
+                    f"{'✓' if is_taken else '⚠'} {arm.name} {word}: {text}".replace("  ", " ")
+                )
+                if word == "home" and not is_taken and client is not None:
+                    client.add_notification("home", text, auto_close_seconds=6.0, color="yellow")
+        self._told.content = "\n".join(f"- {line}" for line in told)
+
+    def _press(self, name: str) -> None:
+        for arm in self._link.arms:
+            self._link.press_button(arm.name, name)
+
+    def _save(self) -> None:
+        if self._is_saving:
+            return
+        self._is_saving = True
+        try:
+            self._last = self._link.save(self._name.value.strip())
+            self._saved.content = f"saved: `{self._last}`"
+            self._score.disabled = False
+            self._name.value = _next_name(self._name.value)
+        except TeleopError as error:
+            self._saved.content = f"⚠ {html.escape(str(error))}"
+        finally:
+            self._is_saving = False
+
+    def _begin_scores(self) -> None:
+        for name in self.scores:
+            self.scores[name] = LiveScores()
+
+    def _evaluate(self) -> None:
+        """Score in a process of its own, with what the session leaves of the processors."""
+        self._scored.content = "scoring …"
+        command = ["nice", "-n", "15", sys.executable, "-m", "teleop_core.cli", "evaluate"]
+        done = subprocess.run(
+            [*command, str(self._last)], capture_output=True, text=True, check=False
+        )
+        self._scored.content = f"```\n{done.stdout or done.stderr}\n```"
+
+    # -- drawing ---------------------------------------------------------------------------------
+
+    def draw(self, view: View) -> None:
+        """Take note of what is known now, and show it a few times a second."""
+        for name, arm in view.arms.items():
+            self.histories[name].add(view.time, arm, view.delay[0])
+            self.scores[name].add(view.time, arm)
+        for plots in self._plots:
+            plots.draw()
+        now = time.monotonic()
+        if now - self._drawn < _PERIOD:
+            return
+        self._drawn = now
+        self._set(self._status, _status_html(view, self._link.title, self._driver()))
+        tables = [
+            (f"**{name}**\n\n" if len(self.scores) > 1 else "") + scores.text()
+            for name, scores in self.scores.items()
+        ]
+        if self._live.content != (text := "\n\n".join(tables)):
+            self._live.content = text
+
+    @staticmethod
+    def _set(handle: viser.GuiHtmlHandle, text: str) -> None:
+        if handle.content != text:
+            handle.content = text
+
+
+def _next_name(name: str) -> str:
+    """``run_2`` after ``run_1``."""
+    head, digits = name.rstrip("0123456789"), name[len(name.rstrip("0123456789")) :]
+    return f"{head}{int(digits) + 1}" if digits else f"{name}_2"
+
+
+def _status_html(view: View, title: str, driver: int | None) -> str:
+    """State of every arm, mode, recording, run and warnings."""
+    lines = []
+    for name, arm in view.arms.items():
+        state = State(int(arm.operation["state"])) if arm.operation else None
+        color = _COLORS[state] if state is not None else "#868e96"
+        text = html.escape(arm.operation_text or "waits for the arm")
+        if not view.is_fresh:
+            text, color = "nothing comes from the session", "#e03131"
+        badge = f'<b style="color:{color}">●</b> <b>{html.escape(name)}</b> {text}'
+        lines.append(badge)
+        if arm.state:
+            is_fine = "fine" if arm.state["is_fine"] else "coarse"
+            hand = "clutched" if arm.state["is_clutched"] else "follows"
+            box = "box on" if arm.state["is_fixture_on"] else "no box"
+            lines.append(f"{is_fine} × {arm.state['gain']:g} · {hand} · {box}")
+    where = html.escape(view.recording.name) if view.recording else "not recording"
+    who = "nobody drives" if driver is None else f"browser {driver + 1} drives"
+    lines.append(f"{html.escape(title)} · run {view.run + 1} · {where} · {who} · {view.time:.0f} s")
+    lines += [f'<span style="color:#e8a100">⚠ {html.escape(text)}</span>' for text in view.news[:4]]
+    body = "<br>".join(lines)
+    return f'<div style="padding:0 0.9em 0.4em;font-size:0.8em;line-height:1.5">{body}</div>'

@@ -1,0 +1,191 @@
+"""Settings: every parameter of the session as a control, with its unit, bounds and meaning."""
+
+import ast
+from collections.abc import Callable, Mapping
+
+import viser
+
+from teleop_core.console.link import Link, ParameterInfo, Setting
+from teleop_core.errors import TeleopError
+
+QUICK = (
+    ("motion_scaling", "mode"), ("motion_scaling", "coarse_gain"), ("motion_scaling", "fine_gain"),
+    ("motion_scaling", "fixture.kind"), ("motion_scaling", "fixture.box.size"),
+    ("motion_scaling", "fixture.sphere.diameter"), ("slave_sim", "reference_filter.is_on"),
+    ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"),
+)  # fmt: skip
+"""What people change most, by stage and name."""
+Guard = Callable[[int | None], bool]
+"""Whether a browser may change something; tells it why not."""
+
+
+class SettingsPanel:
+    """Controls of all parameters in the present container of the page.
+
+    Args:
+        server: The page.
+        link: The session.
+        may_drive: Asked before anything is changed.
+        renew: Begins a new session with other texts ``node.name=value``, for what is fixed while
+            one runs; None where the session is not ours.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, link: Link, may_drive: Guard,
+        renew: Callable[[tuple[str, ...]], None] | None = None,
+    ) -> None:  # fmt: skip
+        self._gui, self._link, self._may, self._renew = server.gui, link, may_drive, renew
+        self._known: Mapping[tuple[str, str], ParameterInfo] = {}
+        self._wanted: dict[tuple[str, str], Setting] = {}
+        self._told = self._gui.add_markdown("parameters are being asked for …")
+        self._choice = self._gui.add_dropdown("show", ("most used",), hint="stage and group")
+        self._folder = self._gui.add_folder("values")
+        self._controls: list[viser.GuiInputHandle | viser.GuiMarkdownHandle] = []  # type: ignore[type-arg]
+        with self._gui.add_folder("fixed while it runs", visible=False) as self._pending:
+            self._list = self._gui.add_markdown("")
+            begin = self._gui.add_button("New session with these", color="blue")
+        self._choice.on_update(lambda _: self._show())
+        begin.on_click(lambda event: self._begin(event.client_id))
+
+    def refresh(self) -> None:
+        """Ask the nodes anew, and show what they say; takes a moment."""
+        try:
+            self._known = self._link.parameters()
+        except TeleopError as error:
+            self._told.content = f"**{error}**"
+            return
+        groups = sorted({_group(*key) for key in self._known})
+        self._choice.options = ("most used", *groups)
+        self._told.content = f"{len(self._known)} parameters; hover over a name for its meaning"
+        self._show()
+
+    def _show(self) -> None:
+        chosen = self._choice.value
+        keys = [key for key in self._known if chosen == _group(*key)]
+        if chosen == "most used":
+            stages = {key: (key[0].rpartition("/")[2], key[1]) for key in self._known}
+            keys = [key for wanted in QUICK for key, known in stages.items() if known == wanted]
+        for control in self._controls:
+            control.remove()
+        self._controls.clear()
+        self._folder.label = chosen
+        with self._folder:
+            for key in keys:
+                self._add(self._known[key], with_node=chosen == "most used")
+
+    def _add(self, info: ParameterInfo, *, with_node: bool) -> None:
+        """Control of one parameter, and under it, when needed, why a value was refused."""
+        label = info.name.rpartition(".")[2] if not with_node else info.name
+        arm = info.node.rpartition("/")[0]
+        control = _control(self._gui, f"{arm} {label}".strip(), info)
+        why = self._gui.add_markdown("", visible=False)
+        self._controls += [control, why]
+        shown = info.value
+
+        @control.on_update
+        def _(event: viser.GuiEvent) -> None:  # type: ignore[type-arg]
+            nonlocal shown
+            if event.client_id is None or control.value == _shown(shown):
+                return
+            value = _parsed(control.value, info)
+            refusal = "" if value is not None else f"{control.value!r} is no {_form(info)}"
+            if not refusal and not self._may(event.client_id):
+                refusal = "you watch; take control first"
+            if not refusal and value is not None:
+                refusal = self._set(info, value)
+            why.content, why.visible = f"⚠ {refusal}", bool(refusal)
+            if refusal:
+                control.value = _shown(shown)
+            elif value is not None:
+                shown = value
+
+    def _set(self, info: ParameterInfo, value: Setting) -> str:
+        if not info.is_fixed:
+            return self._link.change(info.node, info.name, value)
+        if self._renew is None:
+            return f"fixed while it runs: start it with --set {info.name}={_text(value)}"
+        self._wanted[info.node, info.name] = value
+        lines = [f"- `{n}.{p}` = {_text(v)}" for (n, p), v in self._wanted.items()]
+        self._list.content, self._pending.visible = "\n".join(lines), True
+        return ""
+
+    def _begin(self, client: int | None) -> None:
+        if self._renew is not None and self._may(client):
+            self._renew(tuple(f"{n}.{p}={_text(v)}" for (n, p), v in self._wanted.items()))
+
+
+def _group(node: str, name: str) -> str:
+    """Stage and group of a parameter, as the choice shows it."""
+    return " · ".join(filter(None, (node, name.rpartition(".")[0])))
+
+
+def _shown(value: Setting) -> bool | int | float | str:
+    """Value as a control shows it: lists as text."""
+    if not isinstance(value, tuple):
+        return value
+    return (
+        "[" + ", ".join(f"{one:g}" if isinstance(one, float) else str(one) for one in value) + "]"
+    )
+
+
+def _text(value: Setting) -> str:
+    """Value as ``--set`` takes it."""
+    return "[" + ",".join(map(str, value)) + "]" if isinstance(value, tuple) else str(value)
+
+
+def _form(info: ParameterInfo) -> str:
+    if isinstance(info.value, tuple):
+        return "list such as [0.1, 0.2]"
+    return {bool: "yes or no", int: "whole number", float: "number"}.get(type(info.value), "text")
+
+
+def _parsed(shown: object, info: ParameterInfo) -> Setting | None:
+    """Value that a control shows, of the parameter's type; None if it is none."""
+    if isinstance(info.value, bool):
+        return bool(shown)
+    if isinstance(info.value, tuple):
+        return _list(str(shown), info.value)
+    if isinstance(info.value, int | float):
+        assert isinstance(shown, int | float)
+        return int(shown) if isinstance(info.value, int) else float(shown)
+    return str(shown)
+
+
+def _list(text: str, like: tuple[object, ...]) -> Setting | None:
+    """Tuple of a text ``[1, 2]`` or ``[a, b]``; of numbers where the present one has numbers."""
+    try:
+        found = ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        words = text.strip().strip("[]()").split(",")
+        found = tuple(word.strip() for word in words if word.strip())
+    if not isinstance(found, list | tuple):
+        found = (found,)
+    if like and isinstance(like[0], float):
+        numbers = [float(one) for one in found if isinstance(one, int | float)]
+        return tuple(numbers) if len(numbers) == len(found) else None
+    return tuple(found)
+
+
+def _control(gui: viser.GuiApi, label: str, info: ParameterInfo) -> viser.GuiInputHandle:  # type: ignore[type-arg]
+    bounds = ""
+    if info.lower is not None or info.upper is not None:
+        low = "−∞" if info.lower is None else f"{info.lower:g}"
+        bounds = f" ({low} to {'∞' if info.upper is None else f'{info.upper:g}'})"
+    hint = f"{info.doc}{bounds}" + (" — takes effect in a new session" if info.is_fixed else "")
+    value = _shown(info.value)
+    if isinstance(value, bool):
+        return gui.add_checkbox(label, value, hint=hint)
+    if info.choices and not isinstance(info.value, tuple):
+        options = info.choices if value in info.choices else (str(value), *info.choices)
+        return gui.add_dropdown(label, options, initial_value=str(value), hint=hint)
+    if isinstance(value, int | float):
+        step = 1 if isinstance(value, int) else _step(value)
+        return gui.add_number(label, value, step=step, hint=hint)
+    return gui.add_text(label, str(value), hint=hint)
+
+
+def _step(value: float) -> float:
+    """A twentieth of a value, in a round number."""
+    if value == 0.0:
+        return 0.001
+    return float(f"{abs(value) / 20.0:.0e}")

@@ -1,0 +1,343 @@
+"""Console link: a live session as the page sees it, over its topics and services alone.
+
+Streams are read best effort and one deep: the page looks some thirty times a second and takes the
+newest sample of each, so that a slow page costs the session nothing.
+"""
+
+import math
+import re
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from teleop_core.bags.messages import Layout, layout, read_any, read_numbers, read_reports
+from teleop_core.console.link import Arm, ArmView, ParameterInfo, Setting, View
+from teleop_core.errors import ParameterError, SessionError
+from teleop_core.geometry import Array
+from teleop_core.nodes.observer import WARNING, Status
+from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.parameter_client import ParameterClient, call
+from teleop_core.nodes.streams import Subscription, message_type
+from teleop_core.operation import operation_text
+from teleop_core.robots import load_robot_set
+from teleop_core.topics import (
+    DIAGNOSTICS,
+    HAND_BUTTONS,
+    HAND_SERVO_CP,
+    MASTER_MEASURED_CF,
+    MASTER_MEASURED_CP,
+    OPERATION,
+    SLAVE_MEASURED_CP,
+    SLAVE_MEASURED_JS,
+    SLAVE_OPERATION,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_JS,
+    TELEOP_STATE,
+    Topic,
+)
+
+SEEN = (
+    MASTER_MEASURED_CP, MASTER_MEASURED_CF, SLAVE_SERVO_CP, SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS,
+    SLAVE_MEASURED_CP,
+)  # fmt: skip
+"""Streams that the page draws; others cost the session a message a tick for nothing."""
+PATIENCE = 5.0
+"""Time in which an arm must be found, and answer [s]."""
+_SILENCE = 1.0  # after which nothing is fresh [s]
+_PRESS = 0.12  # of a button [s]
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+
+
+class _Seen:
+    """Newest sample of one stream of one arm."""
+
+    def __init__(self, node: Node, topic: Topic, arm: Arm) -> None:
+        self.topic, self._joints = topic, arm.robot.joint_names
+        self._layout: Layout = layout(topic, self._joints)
+        name = f"/{topic.of_arm(arm.name).name}"
+        self._subscription = Subscription(node, topic.of_arm(arm.name), name, 1)
+
+    def take(self, view: ArmView) -> bool:
+        """Write the newest sample into a view; whether there was one."""
+        newest = None
+        while (taken := self._subscription.take()) is not None:
+            newest = taken[0]
+        if newest is None:
+            return False
+        found: Any = self._layout.decode_one(newest) or read_any(
+            self.topic.kind, newest, self._joints
+        )
+        if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
+            return False  # refused and counted by the nodes that need it
+        view.stamp_ns[self.topic.name], view.streams[self.topic.name] = found[0], found[1].copy()
+        return True
+
+
+class LiveLink:
+    """A :class:`~teleop_core.console.link.Link` to a running session, to be used with ``with``.
+
+    Args:
+        domain: ROS domain of the session.
+        title: What it is called.
+        patience: Time in which an arm must be found [s].
+
+    Raises:
+        SessionError: There is no arm on this domain.
+    """
+
+    is_live = True
+
+    def __init__(self, domain: int, title: str = "", patience: float = PATIENCE) -> None:
+        self.domain = domain
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain)
+        self._node = Node(
+            "teleop_console", context=self._context, use_global_arguments=False,
+            enable_rosout=False, start_parameter_services=False,
+        )  # fmt: skip
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name="console link", daemon=True)
+        self._thread.start()
+        self._lock = threading.Lock()
+        self._button = self._node.create_publisher(Bool, STOP_TOPIC, QoSProfile(depth=10))
+        self._clients: dict[str, Any] = {}
+        self._client = ParameterClient(self._node)
+        self._known: dict[tuple[str, str], ParameterInfo] = {}
+        self._statuses: dict[str, Status] = {}
+        self._reports = Subscription(self._node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
+        self._runs = 0
+        try:
+            self._find(patience)
+        except BaseException:
+            self.close()
+            raise
+        self.title = title or str(self._value("recorder", "scenario") or "session")
+
+    def __enter__(self) -> "LiveLink":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the session as it is."""
+        self._executor.shutdown()
+        self._context.try_shutdown()
+        self._thread.join(PATIENCE)
+        with suppress(Exception):  # the middleware may have let go already
+            self._node.destroy_node()
+
+    def _spin(self) -> None:
+        with suppress(ExternalShutdownException):
+            while self._context.ok():
+                self._executor.spin_once(timeout_sec=0.1)
+
+    # -- finding ---------------------------------------------------------------------------------
+
+    def _find(self, patience: float) -> None:
+        """Find arms and their robots."""
+        end, suffix, names = time.monotonic() + patience, f"/{SLAVE_OPERATION.name}", set[str]()
+        while not names:
+            topics = self._node.get_topic_names_and_types()
+            names = {name.removesuffix(suffix).strip("/") for name, _ in topics
+                     if name.endswith(suffix)}  # fmt: skip
+            if not names and time.monotonic() > end:
+                raise SessionError(
+                    f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its "
+                    "own, --domain N names another"
+                )
+            time.sleep(0.02)
+        self.arms = tuple(Arm(name, self._robot(name)) for name in sorted(names))
+        self._seen = {arm.name: [_Seen(self._node, t, arm) for t in SEEN] for arm in self.arms}
+        self._told = {
+            arm.name: [
+                Subscription(self._node, topic.of_arm(arm.name), f"/{topic.of_arm(arm.name).name}")
+                for topic in (SLAVE_OPERATION, TELEOP_STATE)
+            ]
+            for arm in self.arms
+        }  # fmt: skip
+        self._hands = {arm.name: _Hand(self._node, arm.name) for arm in self.arms}
+        self._view = View(arms={arm.name: ArmView() for arm in self.arms})
+        self._begun = self._heard = time.monotonic()
+
+    def _robot(self, arm: str) -> Any:
+        slave = "/".join(filter(None, (arm, "slave_sim")))
+        name = str(self._value(slave, "robot") or "rcrt1")
+        geometry = self._value(slave, "geometry")
+        return load_robot_set(name, geometry if isinstance(geometry, tuple) else ())  # type: ignore[arg-type]
+
+    def _value(self, node: str, name: str) -> Setting | None:
+        try:
+            return self._client.values(node, [name]).get(name)
+        except SessionError:
+            return None
+
+    # -- seeing ----------------------------------------------------------------------------------
+
+    def view(self) -> View:
+        """What is known now."""
+        with self._lock:
+            view, now = self._view, time.monotonic()
+            for arm in self.arms:
+                taken = [seen.take(view.arms[arm.name]) for seen in self._seen[arm.name]]
+                if any(taken):
+                    self._heard = now
+                self._hear(arm, view.arms[arm.name])
+            self._hear_nodes(view)
+            view.time, view.is_fresh = now - self._begun, now - self._heard < _SILENCE
+            return view
+
+    def _hear(self, arm: Arm, view: ArmView) -> None:
+        operation, state = self._told[arm.name]
+        while (taken := operation.take()) is not None:
+            found = read_numbers(taken[0], OPERATION)
+            if isinstance(found, tuple):
+                view.operation = dict(zip(OPERATION, map(float, found[1]), strict=True))
+                view.operation_text = operation_text(view.operation, arm.robot.joint_names)
+        while (taken := state.take()) is not None:
+            found = read_numbers(taken[0], TELEOP_STATE.columns)
+            if isinstance(found, tuple):
+                view.state = dict(zip(TELEOP_STATE.columns, map(float, found[1]), strict=True))
+
+    def _hear_nodes(self, view: View) -> None:
+        is_new = False
+        while (taken := self._reports.take()) is not None:
+            with suppress(ValueError):  # bytes of anybody, that are no report
+                for one in read_reports(taken[0]):
+                    status = Status(one.level, one.message, one.values, time.monotonic())
+                    self._statuses[one.name] = status
+                    is_new = True
+        if not is_new:
+            return
+        recorder = self._statuses.get("recorder")
+        if recorder is not None and recorder.values.get("out"):
+            is_recording = recorder.number("is_recording") > 0
+            view.recording = Path(recorder.values["out"]) if is_recording else None
+        view.news = tuple(
+            f"{name}: {s.message}" for name, s in self._statuses.items() if s.level >= WARNING
+        )
+        slave = self._statuses.get("/".join(filter(None, (self.arms[0].name, "slave_sim"))))
+        if slave is not None:
+            unknown = "delay_ms.median" not in slave.values
+            median, worst = (slave.number(f"delay_ms.{w}") * 1e-3 for w in ("median", "p99"))
+            view.delay = (math.nan, math.nan) if unknown else (median, worst)
+
+    # -- commanding ------------------------------------------------------------------------------
+
+    def command(self, word: str, arm: str = "") -> tuple[bool, str]:
+        """Send a state command; whether it was taken, and the arm's answer."""
+        return self._trigger("/" + "/".join(filter(None, (arm, "slave", word))))
+
+    def _trigger(self, name: str) -> tuple[bool, str]:
+        with self._lock:
+            if name not in self._clients:
+                self._clients[name] = self._node.create_client(Trigger, name)
+        try:
+            answer = call(self._clients[name], Trigger.Request(), PATIENCE)
+        except SessionError as error:
+            return False, str(error)
+        return bool(answer.success), str(answer.message)
+
+    def press(self, *, is_pressed: bool) -> None:
+        """Press or release the emergency stop of all arms; a release is said several times."""
+        for _ in range(1 if is_pressed else 3):
+            self._button.publish(Bool(data=is_pressed))
+
+    def parameters(self) -> Mapping[tuple[str, str], ParameterInfo]:
+        """All parameters of all nodes, asked for anew."""
+        found: dict[tuple[str, str], ParameterInfo] = {}
+        for node in sorted(self._statuses):
+            with suppress(SessionError):  # it may be leaving
+                found |= {(node, name): info for name, info in self._client.read(node).items()}
+        self._known = found
+        return MappingProxyType(found)
+
+    def change(self, node: str, name: str, value: Setting) -> str:
+        """Set a parameter; returns why it was refused, empty if it was taken."""
+        return self._client.change(node, name, value)
+
+    def hold(self, arm: str, pose: Array) -> None:
+        """Want the stylus at a pose (7,) in the master's base."""
+        self._hands[arm].hold(pose)
+
+    def let_go(self, arm: str) -> None:
+        """Let go of the stylus: what is not held is let go, so there is nothing to say."""
+
+    def press_button(self, arm: str, name: str) -> None:
+        """Press and release the ``fixture`` or ``mode`` button of the stylus."""
+        self._hands[arm].press(name)
+
+    def save(self, name: str) -> Path:
+        """Close the recording under a name and go on recording; returns where it is.
+
+        Raises:
+            ParameterError: The name is no plain one, or is taken.
+            SessionError: The recorder refuses, or does not answer.
+        """
+        recording = self._view.recording
+        if recording is None:
+            raise SessionError("nothing is being recorded")
+        if not _NAME.fullmatch(name):
+            raise ParameterError(
+                "name", name, "letters, digits, '.', '_' and '-', no more than 100"
+            )
+        wanted = recording.with_name(name)
+        if wanted.exists():
+            raise ParameterError("name", name, f"a new one; {wanted} exists already")
+        is_done, text = self._trigger("/recorder/split")
+        if not is_done:
+            raise SessionError(text)
+        closed = Path(text.split(" is closed; ")[0])
+        try:
+            closed.rename(wanted)
+        except OSError as error:
+            raise SessionError(f"{closed} is closed, but not called {name}: {error}") from error
+        self._runs += 1
+        with self._lock:
+            self._view.run = self._runs
+        return wanted
+
+
+class _Hand:
+    """Publishers of a person's hand on one arm."""
+
+    def __init__(self, node: Node, arm: str) -> None:
+        self._layout, self._pressed = layout(HAND_SERVO_CP, ()), layout(HAND_BUTTONS, ())
+        self._lock = threading.Lock()
+        self._publishers = [
+            node.create_publisher(
+                message_type(topic.kind.ros_type),
+                f"/{topic.of_arm(arm).name}",
+                QoSProfile(depth=10),
+            )
+            for topic in (HAND_SERVO_CP, HAND_BUTTONS)
+        ]
+
+    def hold(self, pose: Array) -> None:
+        """Want the stylus somewhere."""
+        with self._lock:
+            data = self._layout.encode_one(time.time_ns(), np.asarray(pose, np.float64))
+            self._publishers[0].publish(data)
+
+    def press(self, name: str) -> None:
+        """Press a button, and release it a moment later."""
+        pressed = np.array([0.0, name == "fixture", name == "mode"])
+        self._say(pressed)
+        threading.Timer(_PRESS, self._say, (np.zeros(3),)).start()
+
+    def _say(self, pressed: Array) -> None:
+        with self._lock:
+            self._publishers[1].publish(self._pressed.encode_one(time.time_ns(), pressed))

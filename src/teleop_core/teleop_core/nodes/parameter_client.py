@@ -1,0 +1,113 @@
+"""Parameter client: what the parameters of other nodes are, what they may be, and setting them."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+
+from teleop_core.console.link import ParameterInfo, Setting
+from teleop_core.errors import SessionError
+
+PATIENCE = 3.0
+"""Time that a node has for an answer [s]."""
+_LARGEST = 1e18
+_ONE_OF = "one of "
+_HIDDEN = ("use_sim_time", "qos_overrides", "start_type_description_service", "configuration")
+
+
+class ParameterClient:
+    """Asks nodes for their parameters; an executor of the caller's must be spinning.
+
+    Args:
+        node: Whose clients they are.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._clients: dict[tuple[type, str], Any] = {}
+
+    def read(self, name: str) -> dict[str, ParameterInfo]:
+        """All parameters of a node, by their names.
+
+        Raises:
+            SessionError: It does not answer.
+        """
+        listed = self._ask(ListParameters, name, "list_parameters", ListParameters.Request())
+        names = sorted(n for n in listed.result.names if not n.startswith(_HIDDEN))
+        about = self._ask(
+            DescribeParameters, name, "describe_parameters", DescribeParameters.Request(names=names)
+        )
+        values = self.values(name, names)
+        return {
+            described.name: _info(name, described, values[described.name])
+            for described in about.descriptors
+            if described.name in values
+        }
+
+    def values(self, name: str, names: list[str]) -> dict[str, Setting]:
+        """Present values of some parameters; those that are not set are left out."""
+        request = GetParameters.Request(names=names)
+        answer = self._ask(GetParameters, name, "get_parameters", request)
+        found = zip(names, answer.values, strict=True)
+        return {
+            one: _plain(parameter_value_to_python(value))
+            for one, value in found
+            if value.type != ParameterType.PARAMETER_NOT_SET
+        }
+
+    def change(self, name: str, parameter: str, value: Setting) -> str:
+        """Set a parameter of a node; returns why it was refused, empty if it was taken."""
+        given: Any = list(value) if isinstance(value, tuple) else value
+        message = Parameter(parameter, value=given).to_parameter_msg()
+        request = SetParameters.Request(parameters=[message])
+        try:
+            (result,) = self._ask(SetParameters, name, "set_parameters", request).results
+        except SessionError as error:
+            return str(error)
+        return "" if result.successful else (result.reason or "refused")
+
+    def _ask(self, kind: type, name: str, service: str, request: object) -> Any:
+        key = (kind, f"/{name}/{service}")
+        if key not in self._clients:
+            self._clients[key] = self._node.create_client(kind, key[1])
+        return call(self._clients[key], request, PATIENCE)
+
+
+def call(client: Any, request: object, patience: float) -> Any:
+    """Answer of a service, asked from another thread than the executor's.
+
+    Raises:
+        SessionError: There is no such service, or it did not answer in time.
+    """
+    if not client.wait_for_service(timeout_sec=patience):
+        raise SessionError(f"{client.srv_name} is not there")
+    done: Future[Any] = Future()
+    asked = client.call_async(request)
+    asked.add_done_callback(lambda answered: done.set_result(answered.result()))
+    try:
+        return done.result(patience)
+    except TimeoutError as error:
+        client.remove_pending_request(asked)
+        raise SessionError(f"{client.srv_name} does not answer") from error
+
+
+def _plain(value: Any) -> Setting:
+    return value if isinstance(value, bool | int | float | str) else tuple(value or ())
+
+
+def _info(node: str, described: ParameterDescriptor, value: Setting) -> ParameterInfo:
+    ranges = [*described.floating_point_range, *described.integer_range]
+    bound: Callable[[float], float | None] = lambda v: v if abs(v) < _LARGEST else None  # noqa: E731
+    lower, upper = (
+        (bound(ranges[0].from_value), bound(ranges[0].to_value)) if ranges else (None, None)
+    )
+    constraints = described.additional_constraints.split("; ")
+    choices = [text.removeprefix(_ONE_OF) for text in constraints if text.startswith(_ONE_OF)]
+    return ParameterInfo(
+        node, described.name, value, described.description, lower, upper,
+        tuple(choices[0].split(", ")) if choices else (), described.read_only,
+    )  # fmt: skip
