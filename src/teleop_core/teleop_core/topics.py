@@ -259,6 +259,12 @@ TELEOP_STATE = Topic(
         "fixture_size_x", "fixture_size_y", "fixture_size_z", "limit", "limited_joint",
     ),
 )  # fmt: skip
+HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
+"""Where a person wants the stylus, who is the hand of ``operator=remote``; silence lets go of it.
+
+As ``hand/buttons`` it comes from outside: no stage writes it, and it is not recorded."""
+HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base")
+"""Buttons that this person presses and releases."""
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (

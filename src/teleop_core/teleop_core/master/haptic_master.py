@@ -30,6 +30,7 @@ from teleop_core.master.rendering import RENDERING_PARAMETERS, RENDERING_STATE, 
 from teleop_core.operation.states import State
 from teleop_core.operators import OPERATORS, Setting
 from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.operators.remote import RemoteHand
 from teleop_core.operators.shapes import PHASES
 from teleop_core.parameters import parameter
 from teleop_core.signals import DT, STATE, assign
@@ -260,6 +261,14 @@ class HapticMaster(RunningStage):
         """Whether the operator moves the hand yet."""
         return bool(self.state["has_begun"])
 
+    @property
+    def hand(self) -> RemoteHand | None:
+        """Hand of a person, to be told where the stylus shall be; None if the operator has none.
+
+        After :meth:`reset` it is another one.
+        """
+        return self._motion if isinstance(self._motion, RemoteHand) else None
+
     def prepare(self, ticks: int) -> None:
         """Draw what the operator wants in the next ticks, as far ahead as he can be asked."""
         self._prepare_noise(ticks)
@@ -312,6 +321,8 @@ class HapticMaster(RunningStage):
         if not np.isfinite(moves).all():
             bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]
             raise PartError("operator", name, f"one who answers finite numbers; at {bad:g} s not")
+        if moves.shape[1] == 12:
+            return moves
         return np.pad(moves, ((0, 0), (0, 12 - moves.shape[1])))
 
     def _asked(self, question: Callable[..., Any], *arguments: Any) -> Any:

@@ -133,6 +133,7 @@ OPERATORS: Registry[Operator] = Registry(
            for kind in ("random", "line", "circle", "points", "hold")},
         "tour": "teleop_core.operators.tour:TOUR",
         "human": "teleop_core.operators.human:HUMAN",
+        "remote": "teleop_core.operators.remote:REMOTE",
         "bag": "teleop_core.operators.recorded:BAG",
         "file": "teleop_core.operators.recorded:FILE",
     },
