@@ -1,6 +1,7 @@
 """Drivers: of all pages that are open, one drives at a time; the others watch."""
 
 import threading
+import time
 from collections.abc import Callable
 
 PATIENCE = 5.0
@@ -16,14 +17,17 @@ class Drivers:
     is lost by leaving, and by silence while the stylus is held: a page that stands still then would
     hold it for ever. Silence with an idle stylus harms nobody, and browsers slow hidden pages down.
 
-    Methods may be called from any thread. Times are of one monotonic clock [s].
+    Methods may be called from any thread.
 
     Args:
         patience: Time without a sign of life after which a held stylus is lost [s].
+        clock: Monotonic time [s].
     """
 
-    def __init__(self, patience: float = PATIENCE) -> None:
-        self._patience = patience
+    def __init__(
+        self, patience: float = PATIENCE, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._patience, self._clock = patience, clock
         self._lock = threading.RLock()
         self._heard: dict[int, float] = {}
         self._driver: int | None = None
@@ -58,10 +62,10 @@ class Drivers:
         """
         self._listeners.append(listener)
 
-    def join(self, page: int, now: float) -> None:
+    def join(self, page: int) -> None:
         """A page has opened; it drives if nobody does."""
         with self._lock:
-            self._heard[page] = now
+            self._heard[page] = self._clock()
             self._give(page if self._driver is None else self._driver)
 
     def leave(self, page: int) -> None:
@@ -70,25 +74,23 @@ class Drivers:
             self._heard.pop(page, None)
             self._give(None if page == self._driver else self._driver)
 
-    def take(self, page: int, now: float) -> bool:
-        """Give control to a page; false if it is not open."""
+    def take(self, page: int) -> None:
+        """Give control to a page; nothing happens if it has closed meanwhile."""
         with self._lock:
-            if page not in self._heard:
-                return False
-            self._heard[page] = now
-            self._give(page)
-            return True
+            if page in self._heard:
+                self._heard[page] = self._clock()
+                self._give(page)
 
-    def heard(self, page: int, now: float) -> None:
+    def heard(self, page: int) -> None:
         """A page has given a sign of life."""
         with self._lock:
             if page in self._heard:
-                self._heard[page] = now
+                self._heard[page] = self._clock()
 
-    def hold(self, page: int, now: float) -> bool:
+    def hold(self, page: int) -> bool:
         """A page takes the stylus or moves it; false if it may not."""
         with self._lock:
-            self.heard(page, now)
+            self.heard(page)
             self._holds = self._holds or self.may_drive(page)
             return self.may_drive(page)
 
@@ -97,12 +99,12 @@ class Drivers:
         with self._lock:
             self._holds = self._holds and not self.may_drive(page)
 
-    def expire(self, now: float) -> None:
+    def expire(self) -> None:
         """Take control from a driver who holds the stylus and has been silent for too long."""
         with self._lock:
             if self._driver is None or not self._holds:
                 return
-            if now - self._heard[self._driver] > self._patience:
+            if self._clock() - self._heard[self._driver] > self._patience:
                 self._give(None)
 
     def _give(self, page: int | None) -> None:

@@ -27,6 +27,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 from websockets.typing import DataLike, Subprotocol
 
+from teleop_core.console.drivers import Drivers
 from teleop_core.console.guard import HEADERS, Guard
 from teleop_core.console.guard import Request as Asked
 from teleop_core.errors import SessionError
@@ -42,7 +43,6 @@ _HEARTBEAT = (
 )
 _STARTING = threading.Lock()
 
-Alive = Callable[[int], None]
 Answer = Callable[[ws.ServerConnection, Request], Response | None]
 
 
@@ -99,26 +99,42 @@ class Server(viser.ViserServer):
     Args:
         opened: Listening socket; it is closed with the server.
         guard: Decides about requests.
-        alive: Called from the server's loop with the number of each page that is alive.
+        drivers: Hears which pages are open and alive, and which hold a gizmo.
         label: Heading of the panel.
     """
 
-    def __init__(self, opened: socket, guard: Guard, alive: Alive, label: str) -> None:
+    def __init__(self, opened: socket, guard: Guard, drivers: Drivers, label: str) -> None:
         host, port = opened.getsockname()[:2]
         rich.get_console().quiet = True  # which viser alone writes to here
-        with _STARTING, _opening(_server_at(opened, guard, alive)):
+        with _STARTING, _opening(_server_at(opened, guard, drivers)):
             super().__init__(host=host, port=port, label=label, verbose=False)
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             self._websock_server.unregister_handler(message)
+        self._tell(drivers)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Never: it would lead whoever knows the address around the guard."""
         raise SessionError("the console is not led out of this machine by others")
 
-    def begin_heartbeat(self, client: viser.ClientHandle) -> None:
-        """Let a page say every second that it is alive; one whose scripts stand still does not."""
-        script = _HEARTBEAT.format(page=client.client_id)
-        client._websock_connection.queue_message(_messages.RunJavascriptMessage(script))
+    def _tell(self, drivers: Drivers) -> None:
+        """Let the drivers hear of pages: in the order of events, hence on the server's loop."""
+
+        async def come(client: viser.ClientHandle) -> None:
+            script = _HEARTBEAT.format(page=client.client_id)
+            client._websock_connection.queue_message(_messages.RunJavascriptMessage(script))
+            drivers.join(client.client_id)
+
+        async def go(client: viser.ClientHandle) -> None:
+            drivers.leave(client.client_id)
+
+        self.on_client_connect(come)
+        self.on_client_disconnect(go)
+        for message, tell in (
+            (_messages.TransformControlsDragStartMessage, drivers.hold),
+            (_messages.TransformControlsUpdateMessage, drivers.heard),
+            (_messages.TransformControlsDragEndMessage, drivers.let_go),
+        ):
+            self._websock_server.register_handler(message, _telling(tell))
 
     def forget(self) -> None:
         """Drop what is kept of removed elements; viser does so only when a page comes."""
@@ -134,7 +150,16 @@ class Server(viser.ViserServer):
         return list(self._websock_server._client_state_from_id.values())
 
 
-def _server_at(opened: socket, guard: Guard, alive: Alive) -> Callable[..., ws.serve]:
+def _telling(tell: Callable[[int], object]) -> Callable[[int, _messages.Message], None]:
+    """Tells which page a message is from."""
+
+    def handler(page: int, message: _messages.Message) -> None:
+        tell(page)
+
+    return handler
+
+
+def _server_at(opened: socket, guard: Guard, drivers: Drivers) -> Callable[..., ws.serve]:
     """A function that opens a server at the socket, whatever address it is told."""
 
     def serve(
@@ -149,7 +174,7 @@ def _server_at(opened: socket, guard: Guard, alive: Alive) -> Callable[..., ws.s
         return ws.serve(
             handler,
             sock=opened,
-            process_request=_guarded(process_request, guard, alive),
+            process_request=_guarded(process_request, guard, drivers),
             create_connection=Connection,
             logger=_logger(),
             **options,
@@ -158,7 +183,7 @@ def _server_at(opened: socket, guard: Guard, alive: Alive) -> Callable[..., ws.s
     return serve
 
 
-def _guarded(answer: Answer, guard: Guard, alive: Alive) -> Answer:
+def _guarded(answer: Answer, guard: Guard, drivers: Drivers) -> Answer:
     """Answer of viser to a request, or a refusal."""
 
     def guarded(connection: ws.ServerConnection, request: Request) -> Response | None:
@@ -167,7 +192,7 @@ def _guarded(answer: Answer, guard: Guard, alive: Alive) -> Answer:
         if reason := guard.refusal(Asked(request.path, is_socket, headers.get_all)):
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
         if urlsplit(request.path).path == _ALIVE:
-            _tell(request.path, alive)
+            _hear(request.path, drivers)
             return Response(http.HTTPStatus.NO_CONTENT, "No Content", Headers())
         response = answer(connection, request)
         if response is not None:
@@ -177,10 +202,10 @@ def _guarded(answer: Answer, guard: Guard, alive: Alive) -> Answer:
     return guarded
 
 
-def _tell(path: str, alive: Alive) -> None:
+def _hear(path: str, drivers: Drivers) -> None:
     page = parse_qs(urlsplit(path).query).get("page", [""])[0]
     if page.isascii() and page.isdecimal():
-        alive(int(page[:9]))
+        drivers.heard(int(page[:9]))
 
 
 def _harden(headers: Headers, host: str, guard: Guard) -> None:

@@ -2,10 +2,7 @@
 
 import secrets
 import threading
-import time
 from types import TracebackType
-
-import viser
 
 from teleop_core.console.drivers import Drivers
 from teleop_core.console.guard import Guard, is_loopback, is_wildcard
@@ -48,9 +45,7 @@ class ConsoleServer:
         self.host = host
         self.token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
         self.drivers = Drivers()
-        self.viser = Server(opened, Guard(host, self.port, self.token), self._alive, label)
-        self.viser.on_client_connect(self._come)
-        self.viser.on_client_disconnect(self._go)
+        self.viser = Server(opened, Guard(host, self.port, self.token), self.drivers, label)
         self._ends = threading.Event()
         self._watch = threading.Thread(target=self._look, name="console pages", daemon=True)
         self._watch.start()
@@ -79,21 +74,10 @@ class ConsoleServer:
     ) -> None:
         self.close()
 
-    # Coroutines, since viser runs these in the order of events; functions it runs side by side.
-    async def _come(self, client: viser.ClientHandle) -> None:
-        self.viser.begin_heartbeat(client)
-        self.drivers.join(client.client_id, time.monotonic())
-
-    async def _go(self, client: viser.ClientHandle) -> None:
-        self.drivers.leave(client.client_id)
-
-    def _alive(self, page: int) -> None:
-        self.drivers.heard(page, time.monotonic())
-
     def _look(self) -> None:
         looks = 0
         while not self._ends.wait(_LOOK):
-            self.drivers.expire(time.monotonic())
+            self.drivers.expire()
             looks += 1
             if looks % _FORGET == 0:
                 self.viser.forget()
