@@ -1,0 +1,111 @@
+"""Body nodes: the bodies of an arm on the page, of which only the frames move."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+import viser
+
+from teleop_core.bodies import Bodies, Role, Solid
+from teleop_core.console.meshes import merged, mesh_of
+from teleop_core.geometry import Array, rotations_from_quaternions
+
+Color = tuple[int, int, int]
+ROLES: Mapping[Role, Color] = MappingProxyType({
+    "base": (96, 108, 122), "link": (196, 204, 212), "joint": (52, 112, 176),
+    "leg": (150, 162, 176), "platform": (120, 140, 160), "tool": (214, 130, 40),
+})  # fmt: skip
+"""Colours of solids, readable on light and on dark ground."""
+GHOST: Color = (66, 133, 244)
+AT_LIMIT: Color = (224, 49, 49)
+_STILL = 2e-5
+"""Change of a pose [m, parts of a turn] below which nothing is sent."""
+
+
+class BodyNodes:
+    """Bodies of a robot, one frame each with its solids as meshes that are sent once.
+
+    Args:
+        server: The page.
+        path: Path of the node that they are below.
+        bodies: The robot's bodies.
+        is_ghost: Whether they are drawn through and through in one colour, without axes.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, path: str, bodies: Bodies, *, is_ghost: bool = False
+    ) -> None:
+        axis = 0.08 * bodies.size
+        self._bodies = bodies
+        self.frames = {
+            body.name: server.scene.add_frame(
+                f"{path}/{body.name}", show_axes=False, axes_length=axis, axes_radius=0.04 * axis
+            )
+            for body in bodies.bodies
+        }  # fmt: skip
+        self._list = list(self.frames.values())
+        self._meshes: list[dict[Role, viser.MeshHandle]] = []
+        for body in bodies.bodies:
+            place = f"{path}/{body.name}"
+            self._meshes.append(add_solids(server, place, body.solids, is_ghost=is_ghost))
+        self._drawn = np.tile(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), (len(self._list), 1))
+        self._marked: frozenset[int] = frozenset()
+
+    def move(self, joints: Array) -> Array:
+        """Draw them where joints (n,) [rad, m] bring them; returns their poses (B, 7).
+
+        Bodies whose place is not finite stay where they are.
+        """
+        poses = self._bodies.poses(joints)
+        change = np.abs(poses - self._drawn).max(axis=1)
+        for body in np.flatnonzero(change > _STILL).tolist():
+            frame, pose = self._list[body], poses[body]
+            frame.position, frame.wxyz = pose[:3], pose[3:]
+            self._drawn[body] = pose
+        return poses
+
+    def mark(self, joints: frozenset[int]) -> None:
+        """Draw the bodies that these joints move first in another colour, and no others."""
+        bodies = frozenset(self._bodies.joint_body[joint] for joint in joints)
+        for body in bodies ^ self._marked:
+            for role, mesh in self._meshes[body].items():
+                mesh.color = AT_LIMIT if body in bodies else ROLES[role]
+        self._marked = bodies
+
+    def show_axes(self, *, is_shown: bool) -> None:
+        """Show the axes of every body's frame, or hide them."""
+        for frame in self._list:
+            frame.show_axes = is_shown
+
+
+def add_solids(
+    server: viser.ViserServer, path: str, solids: tuple[Solid, ...], *, is_ghost: bool = False
+) -> dict[Role, viser.MeshHandle]:
+    """Add solids below a node: one mesh for each role among them."""
+    meshes = {}
+    for role in dict.fromkeys(solid.role for solid in solids):
+        parts = [mesh_of(solid) for solid in solids if solid.role == role]
+        vertices, faces = merged(parts)
+        meshes[role] = server.scene.add_mesh_simple(
+            f"{path}/{role}", vertices.astype(np.float32), faces.astype(np.uint32),
+            color=GHOST if is_ghost else ROLES[role], opacity=0.3 if is_ghost else None,
+            cast_shadow=not is_ghost, receive_shadow=False,
+        )  # fmt: skip
+    return meshes
+
+
+def extent(bodies: Bodies, joints: Array) -> tuple[Array, Array]:
+    """Lowest and highest corner (3,) [m] of what the bodies take, in slave_base."""
+    points = [np.zeros((1, 3))]
+    for body, pose in zip(bodies.bodies, bodies.poses(joints), strict=True):
+        if np.isfinite(pose).all():
+            points.append(pose[None, :3])
+            points += [_placed(solid, pose) for solid in body.solids]
+    every = np.concatenate(points)
+    return every.min(axis=0), every.max(axis=0)
+
+
+def _placed(solid: Solid, pose: Array) -> Array:
+    """Vertices (V, 3) [m] of a solid of a body with this pose (7,)."""
+    placed: Array = mesh_of(solid)[0] @ rotations_from_quaternions(pose[None, 3:])[0].T + pose[:3]
+    return placed

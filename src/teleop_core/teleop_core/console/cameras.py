@@ -1,0 +1,72 @@
+"""Cameras: places from which a session is seen, for the browser of one person."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from teleop_core.geometry import Array, quaternion_from_rotation, rotations_from_quaternions
+
+FIELD = np.radians(45.0)
+"""Vertical field of view of all cameras [rad]."""
+_FROM = np.array([-0.80, -0.42, 0.48])
+"""Direction from what is seen to the first camera: behind the arm, over its right shoulder."""
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A place to look from, in the axes of the page.
+
+    Attributes:
+        position: Where it is (3,) [m].
+        look_at: What it looks at (3,) [m].
+        up: What is up on the screen (3,).
+    """
+
+    position: Array
+    look_at: Array
+    up: Array
+
+    @property
+    def quaternion(self) -> Array:
+        """Its turn (4,): x to the right, y downwards, z into the picture."""
+        z = self.look_at - self.position
+        z = z / np.linalg.norm(z)
+        x = np.cross(z, self.up)
+        x = x / np.linalg.norm(x)
+        out = np.empty(4)
+        quaternion_from_rotation(np.stack((x, np.cross(z, x), z), axis=1), out)
+        return out
+
+    def give(self, client: viser.ClientHandle) -> None:
+        """Let the browser of one person see from here."""
+        with client.atomic():
+            client.camera.up_direction = self.up
+            client.camera.position = self.position
+            client.camera.look_at = self.look_at
+
+
+def around(low: Array, high: Array) -> Camera:
+    """Camera that sees a box, given by its lowest and highest corner (3,) [m], as a whole."""
+    middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    direction = _FROM / np.linalg.norm(_FROM)
+    distance = 0.85 * radius / np.sin(0.5 * FIELD)
+    return Camera(middle + distance * direction, middle, np.array([0.0, 0.0, 1.0]))
+
+
+def from_tool(pose: Array, size: float) -> Camera:
+    """Camera on the tool that looks along its z.
+
+    Args:
+        pose: Of the tip (7,), in the axes of the page.
+        size: Length [m] to which the robot reaches.
+    """
+    turn = rotations_from_quaternions(pose[None, 3:])[0]
+    back = pose[:3] - turn @ np.array([0.10 * size, 0.0, 0.25 * size])
+    return Camera(back, pose[:3] + 0.05 * size * turn[:, 2], turn[:, 0])
+
+
+def microscope(place: Array, size: float) -> Camera:
+    """Fixed camera above a place (3,) [m], steep from above, as a microscope over the task."""
+    position = place + size * np.array([-0.08, -0.05, 0.35])
+    return Camera(position, place.copy(), np.array([1.0, 0.0, 0.0]))

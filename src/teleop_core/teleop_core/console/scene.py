@@ -1,0 +1,149 @@
+"""Scene: the arms of a session on the page, with their masters, paths, fixtures and forces."""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import viser
+
+from teleop_core.console.arm_nodes import ArmNodes
+from teleop_core.console.cameras import FIELD, Camera, around, from_tool, microscope
+from teleop_core.console.link import Arm, ParameterInfo, View
+from teleop_core.console.stand import PUBLISHED_AXES
+from teleop_core.errors import TeleopError
+from teleop_core.geometry import Array
+from teleop_core.mapping.parameters import axis_map
+
+LIGHT, DARK = (255, 255, 255), (20, 20, 20)
+"""Ground of the page, light and dark."""
+
+
+class Scene:
+    """What is seen of a session; the axes of the page are those of the first arm's base, z up.
+
+    Args:
+        server: The page.
+        arms: Arms of the session, at least one.
+        is_dark: Whether its ground is dark.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, arms: Iterable[Arm], *, is_dark: bool = False
+    ) -> None:
+        self._server = server
+        self.arms: dict[str, ArmNodes] = {}
+        side = 0.0
+        with server.atomic():
+            for arm in arms:
+                nodes = ArmNodes(server, arm)
+                low, high = nodes.low, nodes.high
+                if self.arms:  # beside the one before, to its right
+                    side -= float(high[1])
+                nodes.place(side)
+                side += float(low[1]) - 0.1 * nodes.bodies.size
+                self.arms[arm.name] = nodes
+            self._ground()
+            self.set_dark(is_dark=is_dark)
+            self._begin()
+
+    # -- drawing ---------------------------------------------------------------------------------
+
+    def draw(self, view: View) -> None:
+        """Draw what is known now; sends only what has changed."""
+        with self._server.atomic():
+            for name, nodes in self.arms.items():
+                if (seen := view.arms.get(name)) is not None:
+                    nodes.draw(view.time, seen)
+
+    def retune(self, parameters: Mapping[tuple[str, str], ParameterInfo]) -> None:
+        """Take what parameters of the session say of the picture: axes, and kind of fixture.
+
+        Args:
+            parameters: As :meth:`~teleop_core.console.link.Link.parameters` gives them; what they
+                lack stays as it is.
+        """
+        with self._server.atomic():
+            for name, nodes in self.arms.items():
+                node = f"{name}/motion_scaling" if name else "motion_scaling"
+                if (axes := parameters.get((node, "axes"))) is not None:
+                    nodes.turn_master(_map(axes.value))
+                if (kind := parameters.get((node, "fixture.kind"))) is not None:
+                    nodes.fixture_kind = str(kind.value)
+
+    # -- what is shown ---------------------------------------------------------------------------
+
+    def show_frames(self, is_shown: bool) -> None:
+        """Show the axes of all bodies and devices, or hide them."""
+        with self._server.atomic():
+            for nodes in self.arms.values():
+                nodes.show_axes(is_shown=is_shown)
+
+    def show_ghost(self, is_shown: bool) -> None:
+        """Show the reference posture as a ghost, or hide it."""
+        for nodes in self.arms.values():
+            nodes.show_ghost(is_shown=is_shown)
+
+    def show_tails(self, is_shown: bool) -> None:
+        """Show the paths of the last seconds, or hide them."""
+        for nodes in self.arms.values():
+            nodes.show_tails(is_shown=is_shown)
+
+    def set_dark(self, *, is_dark: bool) -> None:
+        """Take the colours for a dark page, or a light one."""
+        for nodes in self.arms.values():
+            nodes.set_background(DARK if is_dark else LIGHT)
+
+    # -- cameras ---------------------------------------------------------------------------------
+
+    def whole(self) -> Camera:
+        """Camera that sees all arms and their masters."""
+        boxes = [nodes.room() for nodes in self.arms.values()]
+        low = np.min([low for low, _ in boxes], axis=0)
+        high = np.max([high for _, high in boxes], axis=0)
+        return around(low, high)
+
+    def tool(self, arm: str = "") -> Camera:
+        """Camera on the tool of an arm, as it is now; of the first arm if there is no such arm."""
+        nodes = self._arm(arm)
+        return from_tool(nodes.tip(), nodes.bodies.size)
+
+    def microscope(self, arm: str = "") -> Camera:
+        """Fixed camera over where the tip of an arm starts; of the first if there is no such."""
+        nodes = self._arm(arm)
+        return microscope(nodes.begin(), nodes.bodies.size)
+
+    def _arm(self, name: str) -> ArmNodes:
+        return self.arms.get(name) or next(iter(self.arms.values()))
+
+    @property
+    def masters(self) -> dict[str, str]:
+        """Path of each arm's node in master_base, by namespace, as a Stylus takes them."""
+        return {name: nodes.master.path for name, nodes in self.arms.items()}
+
+    # -- the begin -------------------------------------------------------------------------------
+
+    def _ground(self) -> None:
+        boxes = [nodes.room() for nodes in self.arms.values()]
+        low = np.min([low for low, _ in boxes], axis=0)
+        high = np.max([high for _, high in boxes], axis=0)
+        wide = 2.5 * float((high - low)[:2].max())
+        cell = 10.0 ** np.floor(np.log10(wide / 5.0))
+        middle = 0.5 * (low + high)
+        self._server.scene.add_grid(
+            "/ground", wide, wide, cell_size=cell, section_size=5.0 * cell,
+            cell_color=(150, 150, 150), section_color=(125, 125, 125), cell_thickness=0.6,
+            section_thickness=1.0, fade_distance=2.5 * wide, shadow_opacity=0.2,
+            position=(middle[0], middle[1], low[2] - 1e-3),
+        )  # fmt: skip
+
+    def _begin(self) -> None:
+        first, camera = self.whole(), self._server.initial_camera
+        camera.fov, camera.up = FIELD, first.up
+        camera.position, camera.look_at = first.position, first.look_at
+
+
+def _map(axes: object) -> Array:
+    """Rotation (3, 3) of axes as a parameter gives them; the published one of what is none."""
+    try:
+        return axis_map("axes", tuple(axes))  # type: ignore[arg-type]
+    except (TeleopError, TypeError, ValueError):
+        return PUBLISHED_AXES

@@ -1,0 +1,72 @@
+"""Stand: where the master's device stands beside its slave, so that both move alike on the page."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from teleop_core.bodies.solids import Solid
+from teleop_core.console.meshes import mesh_of
+from teleop_core.geometry import Array, quaternion_from_rotation
+from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
+
+PUBLISHED_AXES = axis_map("axes", MotionScalingParameters.axes)
+"""Rotation (3, 3) from the master's base to the slave's axes, of a session that says no other."""
+REST = np.array([0.0, -0.0655, -0.0881, 0.97918, -0.20300, 0.0, 0.0])
+"""Pose (7,) of the stylus in the inkwell, in master_base."""
+_UPRIGHT = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)  # brings z of a solid to the device's y, upwards
+
+
+def _solid(kind: str, size: tuple[float, ...], at: tuple[float, ...], turn: tuple[float, ...],
+           role: str) -> Solid:  # fmt: skip
+    return Solid(kind, size, np.array((*at, *turn)), role)  # type: ignore[arg-type]
+
+
+_LEVEL = (1.0, 0.0, 0.0, 0.0)
+DEVICE = (
+    _solid("cylinder", (0.085, 0.02), (0.0, -0.195, -0.20), _UPRIGHT, "base"),
+    _solid("cylinder", (0.05, 0.08), (0.0, -0.145, -0.21), _UPRIGHT, "base"),
+    _solid("sphere", (0.05,), (0.0, -0.10, -0.21), _LEVEL, "link"),
+    _solid("box", (0.045, 0.025, 0.06), (0.0, -0.185, -0.105), _LEVEL, "base"),
+    _solid("cylinder", (0.012, 0.10), (0.0, -0.13, -0.105), _UPRIGHT, "base"),
+)
+"""Solids of the device in master_base: foot, body, shoulder, and the inkwell before it."""
+STYLUS = (
+    _solid("cylinder", (0.003, 0.03), (0.0, 0.0, 0.015), _LEVEL, "tool"),
+    _solid("capsule", (0.008, 0.10), (0.0, 0.0, 0.085), _LEVEL, "link"),
+)
+"""Solids of the stylus in its frame: its tip is the origin, its back along z."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stand:
+    """Place of master_base in slave_base.
+
+    Attributes:
+        axes: Rotation (3, 3) from the master's base to the slave's axes.
+        origin: Place of its origin (3,) [m].
+    """
+
+    axes: Array = field(default_factory=PUBLISHED_AXES.copy)
+    origin: Array = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def quaternion(self) -> Array:
+        """Its turn (4,): w, x, y, z."""
+        out = np.empty(4)
+        quaternion_from_rotation(np.ascontiguousarray(self.axes), out)
+        return out
+
+
+def stand_beside(low: Array, high: Array, axes: Array) -> Stand:
+    """Stand to the right of a robot, as seen from where its x points away; on the same ground.
+
+    Args:
+        low: Lowest corner (3,) [m] of what the robot takes, in slave_base.
+        high: Highest corner (3,) [m].
+        axes: Rotation (3, 3) from the master's base to the slave's axes.
+    """
+    vertices = np.concatenate([mesh_of(solid)[0] for solid in DEVICE]) @ axes.T
+    own_low, own_high = vertices.min(axis=0), vertices.max(axis=0)
+    gap = 0.1 + 0.05 * float((high - low).max())
+    middle = 0.5 * (low + high)[0] - 0.5 * (own_low + own_high)[0]
+    return Stand(axes, np.array([middle, low[1] - gap - own_high[1], low[2] - own_low[2]]))
