@@ -4,6 +4,7 @@ from typing import Any
 
 from teleop_core.master.haptic_master import HAPTIC_MASTER, HapticMasterParameters
 from teleop_core.nodes.crtk_master import CrtkMaster
+from teleop_core.nodes.hand import HandInput
 from teleop_core.nodes.operation import StopInput
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.stage import Stage
@@ -25,10 +26,14 @@ class HapticMasterNode(TickingNode):
         self.stage.reset()
         self._stop, self._crtk = StopInput(self), CrtkMaster(self)
         self._force = self.stage.signals[MASTER_SERVO_CF.field]
+        hand = self.stage.hand
+        self._hand = HandInput(self, hand, has_poses=True) if hand is not None else None
 
     def stop(self) -> None:
-        """Forget the force: the next activation starts without one."""
+        """Forget the force and let go: the next activation starts without either."""
         self._force[:] = 0.0
+        if self.stage.hand is not None:
+            self.stage.hand.let_go()
 
     def teardown(self) -> None:
         """Close what :meth:`setup` opened."""
@@ -45,19 +50,22 @@ class HapticMasterNode(TickingNode):
             self.stage.press(is_pressed=pressed)
             self._crtk.press(is_pressed=pressed)
         super().read_ports(trigger)
+        if self._hand is not None:
+            self._hand.read()
         if not self._crtk.is_enabled:
             self._force[:] = 0.0
 
     def concerns(self) -> list[str]:
-        """An operator who waits for the slave; motors that are too warm for the peak force."""
+        """An operator who waits for the slave, a hand for its person; motors that are too warm."""
         found = []
         if not self.stage.has_begun:
             found.append("waits until teleop/state says that the slave follows")
         most = float(self.stage.signals[MASTER_CONTACT.field][_MOST])
         if 0.0 < most < self.parameters.device.peak_force:
             found.append(f"its motors are warm: {most:.2f} N at most")
-        return found
+        return found + (self._hand.concerns() if self._hand is not None else [])
 
     def values(self) -> dict[str, str]:
-        """Whether the operator moves yet."""
-        return {"has_begun": str(int(self.stage.has_begun))}
+        """Whether the operator moves yet, and whose hand it is."""
+        begun = {"has_begun": str(int(self.stage.has_begun))}
+        return begun | (self._hand.values() if self._hand is not None else {})

@@ -1,0 +1,149 @@
+"""A person as the hand over real topics: what they send moves the slave, silence holds it."""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import yaml
+
+from teleop_core.nodes.children import environment
+from teleop_core.operators.remote import rest_pose
+from teleop_core.robots import load_robot
+from teleop_core.stage import STAGES
+from teleop_core.topics import (
+    HAND_BUTTONS,
+    HAND_SERVO_CP,
+    MASTER_BUTTONS,
+    MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CP,
+)
+
+pytestmark = pytest.mark.ros
+# A device without friction and noise goes where the hand is.
+EXACT = {"device__friction": 0.0, "device__gimbal_noise": 0.0}
+GAIN = 0.5
+
+
+class Person:
+    """Sends poses at 50 Hz, as a page does."""
+
+    def __init__(self, peer):
+        self.peer = peer
+        peer.publisher(HAND_SERVO_CP)
+
+    def hold(self, place, until, what):
+        """Want the stylus at a place from the inkwell [m] until something is so."""
+        pose = rest_pose()
+        pose[:3] += place
+
+        def turn():
+            self.peer.send(HAND_SERVO_CP, time.time_ns(), pose)
+            time.sleep(0.02)  # the rate of poses, not a wait
+            return until()
+
+        self.peer.wait(turn, what)
+
+    def drag(self, begin, end, poses=25):
+        """Want it along a straight line, over half a second."""
+        for share in np.linspace(0.0, 1.0, poses):
+            self.hold((1.0 - share) * np.array(begin) + share * np.array(end), lambda: True, "")
+
+
+@pytest.fixture
+def session(peer, tmp_path):
+    """Composed session whose hand is a person's."""
+    parameters = {
+        "recorder": {"out": str(tmp_path / "bag")},
+        "haptic_master": {"operator": {"kind": "remote"}}
+        | {"device": {"friction": 0.0, "gimbal_noise": 0.0}},
+        "slave_sim": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
+        "motion_scaling": {"reach_force": {"is_on": False}, "coarse_gain": GAIN},
+    }
+    file = tmp_path / "session.yaml"
+    file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))
+    command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session", "--ros-args"]
+    process = subprocess.Popen(
+        [*command, "--params-file", str(file)], env=environment() | {"ROS_DOMAIN_ID": peer.domain}
+    )
+    try:
+        for name in STAGES:
+            peer.wait_state(name, "active")
+        yield process
+    finally:
+        process.terminate()
+        process.wait(60)
+
+
+def is_held(peer):
+    return lambda: peer.status("haptic_master").values.get("hand.is_held") == "1"
+
+
+def at_rest(listener, count=1000):
+    """Whether the tip has been at rest for so many samples, but for steps of its encoders."""
+
+    def is_at_rest():
+        listener.take()
+        last = np.array(listener.values[-count:])[:, :3]
+        return len(last) == count and np.ptp(last, axis=0).max() < 1e-4
+
+    return is_at_rest
+
+
+def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(peer, session):
+    peer.wait(lambda: "nobody holds" in peer.status("haptic_master").message, "a hand that waits")
+    peer.wait_value("haptic_master", "has_begun", lambda n: n == 1)
+    tips, person = peer.listen(SLAVE_MEASURED_CP), Person(peer)
+    person.hold([0.0, 0.0, 0.0], is_held(peer), "a grip")
+    person.hold([0.0, 0.0, 0.0], at_rest(tips), "rest")
+    begin = tips.values[-1][:3]
+
+    person.drag([0.0, 0.0, 0.0], [0.010, 0.0, 0.008])
+    person.hold([0.010, 0.0, 0.008], at_rest(tips), "rest after the way")
+    # The slave's x, y, z are -z, -x, y of the master.
+    way = tips.values[-1][:3] - begin
+    np.testing.assert_allclose(way, GAIN * np.array([-0.008, -0.010, 0.0]), atol=3e-4)
+
+    peer.wait(lambda: not is_held(peer)(), "silence lets go")
+    there = tips.values[-1][:3]
+    peer.wait(at_rest(tips), "rest in silence")
+    assert np.abs(tips.values[-1][:3] - there).max() < 1e-4
+
+    tips.forget()
+    elsewhere = np.array([-0.05, 0.03, 0.02])
+    person.hold(elsewhere, is_held(peer), "a second grip")
+    person.hold(elsewhere, at_rest(tips), "rest in the second grip")
+    assert np.abs(np.array(tips.values)[:, :3] - there).max() < 2e-4
+    end = np.add(elsewhere, [0.004, 0.0, 0.0])
+    person.drag(elsewhere, end)
+    person.hold(end, at_rest(tips), "rest at the end")
+    np.testing.assert_allclose(tips.values[-1][:3] - there, [0.0, -GAIN * 0.004, 0.0], atol=3e-4)
+
+
+def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
+    poses, buttons = peer.listen(MASTER_MEASURED_CP), peer.listen(MASTER_BUTTONS)
+    peer.start("haptic_master", operator__kind="remote", patience=0.0, **EXACT)
+    peer.wait(lambda: buttons.take() and buttons.values[-1][0] == 1.0, "a pressed clutch")
+    person = Person(peer)
+
+    def follows():
+        poses.take()
+        return np.abs(poses.values[-1][:3] - rest_pose()[:3] - [0.01, 0.0, 0.0]).max() < 1e-4
+
+    person.drag([0.0, 0.0, 0.0], [0.01, 0.0, 0.0])
+    person.hold([0.01, 0.0, 0.0], follows, "the stylus where it is wanted")
+    buttons.take()
+    assert buttons.values[-1][0] == 0.0
+    person.hold([np.nan, 0.0, 0.0], lambda: not is_held(peer)(), "NaN to be no hand")
+    peer.wait_value("haptic_master", "refused.hand/servo_cp.not_finite", lambda n: n > 0)
+
+    buttons.forget()
+    for pressed in ([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]):
+        peer.send(HAND_BUTTONS, time.time_ns(), pressed)
+
+    def presses():
+        buttons.take()
+        return (np.diff(np.array(buttons.values)[:, 1]) > 0.0).sum() == 2
+
+    peer.wait(presses, "two presses of the fixture button")
