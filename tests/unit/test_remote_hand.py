@@ -1,0 +1,296 @@
+"""Remote hand: smooth, late by what is stated, bounded; a grip is relative, silence lets go."""
+
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from teleop_core.errors import ShapeError, UnknownNameError
+from teleop_core.mapping.plausibility import PlausibilityParameters
+from teleop_core.master.haptic_master import HapticMaster
+from teleop_core.operators.remote import AHEAD, RemoteHand, RemoteParameters, rest_pose
+from teleop_core.parameters import specs
+from teleop_core.session.configuration import configure
+
+DT = 1e-3
+REST = rest_pose()
+LARGE = np.array([-1.0, -1.0, -1.0]), np.array([1.0, 1.0, 1.0])
+coordinate = st.floats(-0.3, 0.3)
+place = st.tuples(coordinate, coordinate, coordinate)
+
+
+def pose(way=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
+    """Pose that is a way [m] and a turn in the base [rad] from the rest."""
+    x, y, z, w = (Rotation.from_rotvec(turn) * Rotation.from_quat(REST[[4, 5, 6, 3]])).as_quat()
+    return np.array([*(REST[:3] + way), w, x, y, z])
+
+
+class Run:
+    """A hand that is asked as the haptic master asks it, some ticks at a time."""
+
+    def __init__(self, hand=None, **parameters):
+        self.hand = hand or RemoteHand(RemoteParameters(**parameters))
+        self.rows, self.last = np.zeros((0, 12)), 0.0
+
+    def for_time(self, duration, wanted=None, period=0.02):
+        """Go on; ``wanted(time)`` says what pose comes every so often, or None for silence."""
+        due = 0.0
+        for _ in range(round(duration / DT / AHEAD)):
+            if wanted is not None and self.time >= due:
+                given = wanted(self.time)
+                if given is not None:
+                    self.hand.want(given)
+                    self.last = self.time
+                due = self.time + period
+            times = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
+            self.rows = np.vstack((self.rows, self.hand.motion(times)))
+        return self.rows
+
+    @property
+    def time(self):
+        return len(self.rows) * DT
+
+    @property
+    def way(self):
+        return self.rows[:, :3]
+
+
+def test_before_the_first_pose_the_stylus_rests_and_the_clutch_is_pressed():
+    rows = Run().for_time(0.1)
+    assert (rows[:, :6] == 0.0).all()
+    assert (rows[:, 6] == 1.0).all()
+    assert (rows[:, 7:] == 0.0).all()
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.045, 0.2])
+def test_the_stylus_is_behind_a_steady_motion_by_the_stated_delay(delay):
+    speed, run = 0.1, Run(delay=delay)
+    run.for_time(1.0 + 10 * delay, lambda t: pose([speed * t, 0.0, 0.0]), period=0.0)
+    behind = np.arange(1, len(run.way) + 1) * DT - run.way[:, 0] / speed
+    # A pose is taken for all ticks of a question, and counts from its first one on.
+    assert np.abs(behind[-200:] - delay).max() <= AHEAD * DT + 1e-9
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.045, 0.2])
+def test_the_stylus_turns_behind_a_steady_turn_by_the_stated_delay(delay):
+    speed, run = 1.0, Run(delay=delay)
+    run.for_time(0.4 + 10 * delay, lambda t: pose(turn=[0.0, 0.0, speed * t]), period=0.0)
+    w, x, y, z = run.hand.pose[3:]
+    start = Rotation.from_quat(REST[[4, 5, 6, 3]])
+    turned = (Rotation.from_quat([x, y, z, w]) * start.inv()).as_rotvec()
+    assert run.time - turned[2] / speed == pytest.approx(delay, abs=AHEAD * DT)
+    np.testing.assert_allclose(turned[:2], 0.0, atol=1e-9)
+
+
+@given(place, place, st.floats(0.0, 3.0))
+@example((0.3, 0.3, 0.3), (-0.3, -0.3, -0.3), 3.0)
+def test_no_jump_of_what_is_wanted_ever_passes(first, second, angle):
+    p = RemoteParameters()
+    run = Run()
+    run.for_time(0.04, lambda t: pose())
+    run.for_time(0.3, lambda t: pose(first, [angle, 0.0, 0.0]))
+    run.for_time(1.7, lambda t: pose(second, [0.0, 0.0, -angle]))
+    velocity = np.diff(run.way, axis=0) / DT
+    change = np.diff(velocity, axis=0) / DT
+    assert np.linalg.norm(velocity, axis=1).max() <= p.speed * (1.0 + 1e-9)
+    assert np.linalg.norm(change, axis=1).max() <= p.acceleration * (1.0 + 1e-6)
+    turns = Rotation.from_rotvec(run.rows[:, 3:6])
+    turning = (turns[:-1].inv() * turns[1:]).magnitude() / DT
+    assert turning.max() <= p.turn_speed * (1.0 + 1e-6)
+    assert np.abs(np.diff(turning)).max() / DT <= p.turn_acceleration * (1.0 + 1e-6)
+    np.testing.assert_allclose(run.way[-1], second, atol=1e-3)
+
+
+@given(
+    place, st.floats(0.01, 0.2), st.floats(0.05, 2.5), st.floats(2.0, 500.0),
+)  # fmt: skip
+def test_the_stylus_never_goes_beyond_a_place_that_it_is_sent_to(way, delay, speed, acceleration):
+    run = Run(delay=delay, speed=speed, acceleration=acceleration)
+    run.for_time(0.04, lambda t: pose())
+    run.for_time(1.0, lambda t: pose(way))
+    far = np.linalg.norm(way)
+    along = run.way @ np.array(way) / far if far > 0.0 else run.way[:, 0]
+    assert along.max() <= far * (1.0 + 1e-3) + 1e-9
+    assert np.diff(along).min() >= -1e-9
+
+
+def test_the_bounds_are_such_that_every_sample_is_plausible():
+    upper = {spec.name: spec.upper for spec in specs(RemoteParameters)}
+    hand = PlausibilityParameters()
+    assert upper["speed"] < hand.speed
+    assert upper["acceleration"] < hand.acceleration
+    assert upper["turn_speed"] < hand.turn
+
+
+@given(place)
+def test_a_grip_takes_its_first_pose_as_where_the_stylus_is(where):
+    run = Run()
+    run.for_time(0.1, lambda t: pose(where, [0.3, 0.0, 0.0]))
+    assert np.abs(run.rows[:, :6]).max() < 1e-12
+    moved = np.add(where, [0.01, 0.0, -0.02])
+    turn = Rotation.from_rotvec([0.0, 0.0, 0.2]) * Rotation.from_rotvec([0.3, 0.0, 0.0])
+    run.for_time(1.0, lambda t: pose(moved, turn.as_rotvec()))
+    np.testing.assert_allclose(run.way[-1], [0.01, 0.0, -0.02], atol=1e-6)
+    np.testing.assert_allclose(run.hand.pose, pose([0.01, 0.0, -0.02], [0.0, 0.0, 0.2]), atol=1e-6)
+
+
+def test_silence_presses_the_clutch_in_time_and_brings_the_stylus_to_rest():
+    run = Run(timeout=0.1)
+    run.for_time(0.5, lambda t: pose([0.2 * t, 0.0, 0.0]))
+    run.for_time(1.0)
+    clutch = run.rows[:, 6]
+    pressed = (np.flatnonzero(np.diff(clutch) > 0.0) + 2) * DT
+    assert len(pressed) == 1
+    assert pressed[0] - run.last == pytest.approx(0.1, abs=2.5 * DT)
+    assert np.diff(run.way[:, 0]).min() > -1e-9  # it does not come back
+    assert np.ptp(run.way[-100:], axis=0).max() < 1e-6
+    velocity = np.diff(run.way[:, 0]) / DT
+    assert np.abs(np.diff(velocity)).max() / DT <= RemoteParameters().acceleration * (1.0 + 1e-6)
+
+
+def test_the_next_pose_is_a_new_grip_that_releases_the_clutch_and_does_not_move():
+    run = Run()
+    run.for_time(0.5, lambda t: pose([0.02 * t, 0.0, 0.0]))
+    run.for_time(1.0)
+    there, count = run.way[-1].copy(), len(run.way)
+    run.for_time(0.2, lambda t: pose([-0.1, 0.1, 0.05], [0.0, 1.0, 0.0]))
+    assert np.abs(run.way[count:] - there).max() < 1e-9
+    assert (run.rows[count:, 6] == 0.0).all()
+
+
+def test_letting_go_is_at_once_and_the_next_pose_is_a_new_grip_however_soon_it_comes():
+    run = Run()
+    run.for_time(0.5, lambda t: pose())
+    run.hand.let_go()
+    run.for_time(0.04)
+    assert run.rows[-40:, 6].min() == 1.0
+    run.for_time(0.1, lambda t: pose())
+    run.hand.let_go()
+    run.hand.want(pose([0.1, 0.0, 0.0]))
+    run.for_time(0.1)
+    assert np.abs(run.rows[:, :6]).max() < 1e-12
+
+
+def test_a_pose_that_is_older_than_the_timeout_is_no_grip():
+    run = Run()
+    run.for_time(0.5)
+    run.hand.want(pose(), time=0.1)
+    run.for_time(0.1)
+    assert not run.hand.is_held
+    run.hand.want(pose(), time=run.time - 0.1)
+    run.for_time(0.05)
+    assert run.hand.is_held
+    run.for_time(0.1)
+    assert not run.hand.is_held
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        [np.nan, 0, 0, 1, 0, 0, 0], [0, np.inf, 0, 1, 0, 0, 0], [0, 0, 0, np.nan, 0, 0, 0],
+        [0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0.9, 0, 0, 0], [0, 0, 1e6, 1, 0, 0, 0],
+        [1e308, -1e308, 1e308, 1, 0, 0, 0],
+    ],
+)  # fmt: skip
+def test_what_is_no_pose_is_refused_counted_and_counts_as_silence(bad):
+    run = Run()
+    run.for_time(0.1, lambda t: pose())
+    assert run.hand.want(np.array(bad)) is False
+    run.for_time(0.4, lambda t: np.array(bad))
+    assert run.hand.refused > 10
+    assert not run.hand.is_held
+    assert np.isfinite(run.rows).all()
+    assert np.abs(run.rows[:, :6]).max() < 1e-12
+
+
+def test_a_pose_of_another_shape_is_an_error():
+    with pytest.raises(ShapeError, match=r"pose must have shape \(7,\), has \(2, 7\)"):
+        RemoteHand().want(np.zeros((2, 7)))
+
+
+def test_what_a_caller_does_with_a_pose_later_changes_nothing():
+    run, mine = Run(), pose()
+    run.hand.want(mine)
+    mine[:] = np.nan
+    run.for_time(0.1)
+    assert np.isfinite(run.rows).all()
+    run.hand.pose[:] = np.nan
+    assert np.isfinite(run.for_time(0.1)).all()
+
+
+@given(st.integers(1, 4), st.booleans())
+def test_every_tap_is_seen_as_one_press(taps, is_held):
+    run = Run()
+    for _ in range(taps):
+        run.hand.tap("fixture")
+    run.hand.press("mode", is_pressed=is_held)
+    rows = run.for_time(1.0)
+    assert (np.diff(rows[:, 7], prepend=0.0) > 0.0).sum() == taps
+    assert rows[-1, 7] == 0.0
+    assert rows[-1, 8] == float(is_held)
+
+
+def test_a_pressed_clutch_leaves_the_stylus_to_the_hand():
+    run = Run()
+    run.hand.press("clutch")
+    run.for_time(0.5, lambda t: pose([0.02 * t, 0.0, 0.0]))
+    assert (run.rows[:, 6] == 1.0).all()
+    assert run.way[-1, 0] > 5e-3
+    run.hand.press("clutch", is_pressed=False)
+    assert run.for_time(0.02)[-1, 6] == 0.0
+
+
+def test_a_button_that_there_is_not_is_named_with_those_there_are():
+    with pytest.raises(UnknownNameError, match="clutch, fixture, mode"):
+        RemoteHand().press("gripper")
+
+
+def test_a_hand_that_wants_too_far_waits_at_the_end_of_the_workspace_and_comes_back():
+    low, high = REST[:3] - 0.05, REST[:3] + 0.01
+    run = Run(RemoteHand(RemoteParameters(), room=(low, high)))
+    run.for_time(0.1, lambda t: pose())
+    run.for_time(1.0, lambda t: pose([0.2, -0.2, 0.0]))
+    np.testing.assert_allclose(run.way[-1], [0.01, -0.05, 0.0], atol=1e-6)
+    run.for_time(1.0, lambda t: pose([0.005, 0.0, 0.0]))
+    np.testing.assert_allclose(run.way[-1], [0.005, 0.0, 0.0], atol=1e-6)
+
+
+def test_poses_may_come_from_another_thread():
+    run, is_over = Run(), threading.Event()
+
+    def feed():
+        while not is_over.is_set():
+            run.hand.want(pose([0.01, 0.0, 0.0], [0.1, 0.0, 0.0]))
+            run.hand.want(pose())
+
+    thread = threading.Thread(target=feed)
+    thread.start()
+    try:
+        run.for_time(4.0)
+    finally:
+        is_over.set()
+        thread.join()
+    # One of the two was first; every pose is whole, so the stylus is on the way between them.
+    assert np.abs(run.way[:, 1:]).max() < 1e-9
+    assert np.abs(run.way[:, 0]).max() <= 0.01 + 1e-9
+    assert run.hand.refused == 0
+
+
+def test_the_haptic_master_gives_the_hand_within_the_workspace_of_its_device():
+    master = HapticMaster(configure(settings=["operator=remote"]).groups["haptic_master"])
+    assert master.ahead == AHEAD
+    hand, device = master.hand, master._fixed.device
+    assert isinstance(hand, RemoteHand)
+    times = np.arange(1, 5) * DT
+    for k in range(500):
+        hand.want(pose([5.0 * (k > 0), 0.0, 0.0]))
+        hand.motion(times + 4 * k * DT)
+    middle = REST[:3] - device.start
+    assert hand.pose[0] == pytest.approx(middle[0] + 0.5 * device.workspace[0], abs=1e-6)
+
+
+def test_an_operator_that_is_no_person_has_no_hand():
+    assert HapticMaster(configure(settings=["operator=hold"]).groups["haptic_master"]).hand is None
