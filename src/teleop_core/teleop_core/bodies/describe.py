@@ -10,7 +10,16 @@ from teleop_core.bodies.unknown import unknown_bodies
 from teleop_core.robots.robot import Robot
 
 # Robots whose joints are no chain, by the module of their kernels, with what describes them.
-_LOOPS: dict[str, str] = {}
+_LOOPS = {
+    "teleop_core.robots.stewart": "parallel:stewart_bodies",
+    "teleop_core.robots.rps3": "parallel:rps3_bodies",
+    "teleop_core.robots.scara_stewart": "hybrid:scara_stewart_bodies",
+    "teleop_core.robots.four_bar": "planar:four_bar_bodies",
+    "teleop_core.robots.parallelogram": "planar:parallelogram_bodies",
+    "teleop_core.robots.mma": "mma:mma_bodies",
+    "teleop_core.robots.mma_forward": "mma:mma_bodies",
+    "teleop_core.robots.three_finger_hand": "hand:hand_bodies",
+}
 _KNOWN: "WeakKeyDictionary[Robot, Bodies]" = WeakKeyDictionary()
 
 
