@@ -9,17 +9,17 @@ from pathlib import Path
 from teleop_core.console.link import Link
 from teleop_core.console.panel import Panel
 from teleop_core.console.recorded import RecordedLink
-from teleop_core.console.replay import ReplayControls
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
 from teleop_core.console.stylus import Stylus
+from teleop_core.console.view_tab import ViewTab, theme
 
 RATE = 30.0
 """How often the page is drawn [1/s]."""
 
 
 class Console:
-    """A page that shows a session and drives it, to be used with ``with``.
+    """A page that shows a session and drives it.
 
     Args:
         server: Where it is served.
@@ -31,33 +31,45 @@ class Console:
         self, server: ConsoleServer, link: Link,
         renew: Callable[[tuple[str, ...]], None] | None = None,
     ) -> None:  # fmt: skip
-        self._server, self._link = server, link
-        drivers = server.drivers
+        self._server, self._link, drivers = server, link, server.drivers
+        theme(server.viser, is_dark=False)
+        self.scene = Scene(server.viser, link.arms)
+        self.stylus = Stylus(
+            server.viser, self.scene, on_hold=link.hold, on_let_go=self._let_go,
+            may_drive=drivers.hold,
+        )  # fmt: skip
         self.panel = Panel(
             server.viser, link, drivers.may_drive, drivers.take, lambda: drivers.driver, renew
         )
-        self.scene = Scene(server.viser, link.arms)
-        self.stylus = Stylus(
-            server.viser, self.scene, on_hold=link.hold, on_let_go=link.let_go,
-            may_drive=drivers.may_drive,
-        )  # fmt: skip
+        with self.panel.view_tab:
+            ViewTab(server.viser, self.scene)
+
+    def _let_go(self, arm: str) -> None:
+        drivers = self._server.drivers
+        if drivers.driver is not None:
+            drivers.let_go(drivers.driver)
+        self._link.let_go(arm)
 
     def draw(self) -> None:
         """Show what is known now."""
         view = self._link.view()
-        with self._server.viser.atomic():
-            self.scene.draw(view)
-            self.stylus.draw(view)
+        self.scene.draw(view)
+        self.stylus.draw(view)
         self.panel.draw(view)
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Draw until something is over; time that was lost is not made up for."""
-        threading.Thread(target=self.panel.settings.refresh, daemon=True).start()
+        threading.Thread(target=self._refresh, daemon=True).start()
         due = time.monotonic()
         while not is_over():
             self.draw()
             due = max(due + 1.0 / RATE, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
+
+    def _refresh(self) -> None:
+        """Ask for the parameters, which takes a moment."""
+        self.panel.settings.refresh()
+        self.scene.retune(self.panel.settings.known)
 
 
 @contextmanager
@@ -84,6 +96,8 @@ def replay(server: ConsoleServer, path: Path) -> None:
     Raises:
         RecordingError: It cannot be read, or is one of another system.
     """
+    from teleop_core.console.replay import ReplayControls
+
     link = RecordedLink(path)
     console = Console(server, link)
     controls = ReplayControls(server.viser, link)

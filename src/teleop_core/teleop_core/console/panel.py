@@ -5,6 +5,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
+from typing import Literal
 
 import viser
 
@@ -20,6 +22,9 @@ _WATCHING = "You watch. Take control first."
 _COLORS = {
     State.ENABLED: "#2f9e44", State.PAUSED: "#e8a100", State.DISABLED: "#868e96",
     State.FAULT: "#e03131",
+}  # fmt: skip
+_BUTTONS: dict[str, Literal["blue", "teal", "green", "orange"]] = {
+    "Take control": "blue", "Initialize": "teal", "Start": "green", "Stop": "orange",
 }  # fmt: skip
 _ACTIONS = (
     ("Initialize", "release, reset, enable and home", ("reset", "enable", "home")),
@@ -74,42 +79,54 @@ class Panel:
             stop = self._gui.add_button(
                 "EMERGENCY STOP", color="red", hint="stops all arms at once; the space key too"
             )
-            release = self._gui.add_button("release", hint="then Initialize")
+            self._button("release", "then Initialize", self._release)
         window.float(x=15, y=-15, width=230)
         # Anybody who watches may stop; letting the arm go again is the driver's.
-        stop.on_click(lambda _: self._link.press(is_pressed=True))
-        release.on_click(lambda event: self._guarded(event.client_id, self._release))
+        stop.on_click(self._stop)
         command = self._gui.add_command(
             "Emergency stop", description="stops all arms at once", hotkey="space"
         )
-        command.on_trigger(lambda _: self._link.press(is_pressed=True))
+        command.on_trigger(self._stop)
 
-    def _release(self) -> None:
+    def _stop(self, _: object) -> None:
+        self._link.press(is_pressed=True)
+
+    def _release(self, client: int) -> None:
         self._link.press(is_pressed=False)
 
     def _add_drive(self) -> None:
-        take = self._gui.add_button("Take control", hint="one browser drives, the others watch")
-        take.on_click(lambda event: self._take(-1 if event.client_id is None else event.client_id))
+        self._button("Take control", "one browser drives, the others watch", self._take)
         for label, hint, words in _ACTIONS:
-            button = self._gui.add_button(label, hint=hint)
-            button.on_click(
-                lambda event, words=words: self._guarded(
-                    event.client_id, lambda: self._command(event.client, words)
-                )
-            )
+            self._button(label, hint, partial(self._command, words))
         with self._gui.add_folder("stylus"):
-            mode = self._gui.add_button("coarse ↔ fine", hint="the mode button of the stylus")
-            fixture = self._gui.add_button("box on ↔ off", hint="the fixture button of the stylus")
-        for button, name in ((mode, "mode"), (fixture, "fixture")):
-            button.on_click(
-                lambda event, name=name: self._guarded(event.client_id, lambda: self._press(name))
-            )
+            for name, label in (("mode", "coarse ↔ fine"), ("fixture", "box on ↔ off")):
+                self._button(label, f"the {name} button of the stylus", partial(self._press, name))
         with self._gui.add_folder("recording"):
             self._name = self._gui.add_text("name", "run_1", hint="letters, digits, . _ -")
-            save = self._gui.add_button("Save as", hint="closes the recording under this name")
+            self._button("Save as", "closes the recording under this name", self._save)
             self._saved = self._gui.add_markdown("")
-        save.on_click(lambda event: self._guarded(event.client_id, self._save))
         self._told = self._gui.add_markdown("")
+
+    def _button(
+        self, label: str, hint: str, action: Callable[[int], None]
+    ) -> viser.GuiButtonHandle:
+        """Button that acts for the browser that drives, and tells others why it does not."""
+        button = self._gui.add_button(label, hint=hint, color=_BUTTONS.get(label, "gray"))
+
+        @button.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            client = -1 if event.client_id is None else event.client_id
+            if action == self._take or self._may_drive(client):
+                action(client)
+            else:
+                self._tell(client, _WATCHING)
+
+        return button
+
+    def _tell(self, client: int, text: str) -> None:
+        handle = self._server.get_clients().get(client)
+        if handle is not None:
+            handle.add_notification("Not done", text, auto_close_seconds=5.0, color="yellow")
 
     def _add_plots(self) -> None:
         for name, history in self.histories.items():
@@ -123,27 +140,16 @@ class Panel:
         self._live = self._gui.add_markdown("")
         again = self._gui.add_button("begin anew", hint="the figures, not the recording")
         again.on_click(lambda _: self._begin_scores())
-        self._score = self._gui.add_button(
-            "Score the last saved recording", disabled=True, hint="teleop evaluate"
-        )
+        self._score = self._button("Score the last saved recording", "evaluate", self._evaluate)
+        self._score.disabled = True
         self._scored = self._gui.add_markdown("")
-        self._score.on_click(lambda _: self._evaluate())
 
     # -- actions ---------------------------------------------------------------------------------
 
     def _guard(self, client: int | None) -> bool:
         return client is not None and self._may_drive(client)
 
-    def _guarded(self, client: int | None, action: Callable[[], None]) -> None:
-        """Do something for the browser that drives; tell others why not."""
-        if self._guard(client):
-            action()
-        elif (
-            handle := self._server.get_clients().get(-1 if client is None else client)
-        ) is not None:
-            handle.add_notification("Not done", _WATCHING, auto_close_seconds=4.0, color="yellow")
-
-    def _command(self, client: viser.ClientHandle | None, words: tuple[str, ...]) -> None:
+    def _command(self, words: tuple[str, ...], client: int) -> None:
         """Send commands to every arm; what is refused is told."""
         if words[0] == "reset":
             self._link.press(is_pressed=False)
@@ -151,18 +157,16 @@ class Panel:
         for arm in self._link.arms:
             for word in words:
                 is_taken, text = self._link.command(word, arm.name)
-                told.append(
-                    f"{'✓' if is_taken else '⚠'} {arm.name} {word}: {text}".replace("  ", " ")
-                )
-                if word == "home" and not is_taken and client is not None:
-                    client.add_notification("home", text, auto_close_seconds=6.0, color="yellow")
-        self._told.content = "\n".join(f"- {line}" for line in told)
+                told.append(f"- {'✓' if is_taken else '⚠'} {text}")
+                if not is_taken and len(words) == 1:
+                    self._tell(client, text)
+        self._told.content = "\n".join(told)
 
-    def _press(self, name: str) -> None:
+    def _press(self, name: str, client: int) -> None:
         for arm in self._link.arms:
             self._link.press_button(arm.name, name)
 
-    def _save(self) -> None:
+    def _save(self, client: int) -> None:
         if self._is_saving:
             return
         self._is_saving = True
@@ -170,7 +174,7 @@ class Panel:
             self._last = self._link.save(self._name.value.strip())
             self._saved.content = f"saved: `{self._last}`"
             self._score.disabled = False
-            self._name.value = _next_name(self._name.value)
+            self._name.value = _next_name(self._name.value)  # type: ignore[misc]
         except TeleopError as error:
             self._saved.content = f"⚠ {html.escape(str(error))}"
         finally:
@@ -180,7 +184,7 @@ class Panel:
         for name in self.scores:
             self.scores[name] = LiveScores()
 
-    def _evaluate(self) -> None:
+    def _evaluate(self, client: int) -> None:
         """Score in a process of its own, with what the session leaves of the processors."""
         self._scored.content = "scoring …"
         command = ["nice", "-n", "15", sys.executable, "-m", "teleop_core.cli", "evaluate"]
@@ -243,4 +247,6 @@ def _status_html(view: View, title: str, driver: int | None) -> str:
     lines.append(f"{html.escape(title)} · run {view.run + 1} · {where} · {who} · {view.time:.0f} s")
     lines += [f'<span style="color:#e8a100">⚠ {html.escape(text)}</span>' for text in view.news[:4]]
     body = "<br>".join(lines)
-    return f'<div style="padding:0 0.9em 0.4em;font-size:0.8em;line-height:1.5">{body}</div>'
+    # Of one height, so that what is below stays where it is when there is more to say.
+    style = "padding:0 0.9em;font-size:0.8em;line-height:1.5;height:9em;overflow-y:auto"
+    return f'<div style="{style}">{body}</div>'

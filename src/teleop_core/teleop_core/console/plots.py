@@ -62,7 +62,7 @@ class Plots:
             series += [
                 uplot.Series(
                     label=f"{label} wanted" if dashed else label, stroke=_COLORS[i], width=1.5,
-                    **({"dash": [6, 4]} if dashed else {}),  # type: ignore[arg-type]
+                    dash=(6.0, 4.0) if dashed else (),
                 )
                 for i, label in enumerate(labels[:count])
             ]  # fmt: skip
@@ -72,7 +72,7 @@ class Plots:
             tuple(np.zeros(1) for _ in series), tuple(series), title=title, height=170,
             scales={"x": uplot.Scale(time=False, auto=False, range=(-SPAN, 0.0)),
                     "y": uplot.Scale(auto=True)},
-            axes=(axis, axis), legend=uplot.Legend(show=count > 1 or is_pair),
+            axes=(axis, axis), legend=uplot.Legend(show=count > 1, live=False),
         )  # fmt: skip
 
     def draw(self) -> None:

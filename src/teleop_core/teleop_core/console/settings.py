@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import viser
 
@@ -28,6 +29,9 @@ class SettingsPanel:
         may_drive: Asked before anything is changed.
         renew: Begins a new session with other texts ``node.name=value``, for what is fixed while
             one runs; None where the session is not ours.
+
+    Attributes:
+        known: All parameters, as they were when they were last asked for.
     """
 
     def __init__(
@@ -35,7 +39,7 @@ class SettingsPanel:
         renew: Callable[[tuple[str, ...]], None] | None = None,
     ) -> None:  # fmt: skip
         self._gui, self._link, self._may, self._renew = server.gui, link, may_drive, renew
-        self._known: Mapping[tuple[str, str], ParameterInfo] = {}
+        self.known: Mapping[tuple[str, str], ParameterInfo] = {}
         self._wanted: dict[tuple[str, str], Setting] = {}
         self._told = self._gui.add_markdown("parameters are being asked for …")
         self._choice = self._gui.add_dropdown("show", ("most used",), hint="stage and group")
@@ -50,20 +54,20 @@ class SettingsPanel:
     def refresh(self) -> None:
         """Ask the nodes anew, and show what they say; takes a moment."""
         try:
-            self._known = self._link.parameters()
+            self.known = self._link.parameters()
         except TeleopError as error:
             self._told.content = f"**{error}**"
             return
-        groups = sorted({_group(*key) for key in self._known})
+        groups = sorted({_group(*key) for key in self.known})
         self._choice.options = ("most used", *groups)
-        self._told.content = f"{len(self._known)} parameters; hover over a name for its meaning"
+        self._told.content = f"{len(self.known)} parameters; hover over a name for its meaning"
         self._show()
 
     def _show(self) -> None:
         chosen = self._choice.value
-        keys = [key for key in self._known if chosen == _group(*key)]
+        keys = [key for key in self.known if chosen == _group(*key)]
         if chosen == "most used":
-            stages = {key: (key[0].rpartition("/")[2], key[1]) for key in self._known}
+            stages = {key: (key[0].rpartition("/")[2], key[1]) for key in self.known}
             keys = [key for wanted in QUICK for key, known in stages.items() if known == wanted]
         for control in self._controls:
             control.remove()
@@ -71,7 +75,7 @@ class SettingsPanel:
         self._folder.label = chosen
         with self._folder:
             for key in keys:
-                self._add(self._known[key], with_node=chosen == "most used")
+                self._add(self.known[key], with_node=chosen == "most used")
 
     def _add(self, info: ParameterInfo, *, with_node: bool) -> None:
         """Control of one parameter, and under it, when needed, why a value was refused."""
@@ -166,7 +170,7 @@ def _list(text: str, like: tuple[object, ...]) -> Setting | None:
     return tuple(found)
 
 
-def _control(gui: viser.GuiApi, label: str, info: ParameterInfo) -> viser.GuiInputHandle:  # type: ignore[type-arg]
+def _control(gui: viser.GuiApi, label: str, info: ParameterInfo) -> Any:
     bounds = ""
     if info.lower is not None or info.upper is not None:
         low = "−∞" if info.lower is None else f"{info.lower:g}"
