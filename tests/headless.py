@@ -20,7 +20,7 @@ SILENCE = 200.0
 class Headless:
     """One tab; everything it says on the console is in ``said``."""
 
-    def __init__(self, browser, folder, width=1200, height=900):
+    def __init__(self, browser, folder, width=1200, height=900, flags=FLAGS):
         (read_here, write_there), (read_there, write_here) = os.pipe(), os.pipe()
 
         def connect():  # Chromium reads descriptor 3 and writes descriptor 4
@@ -28,7 +28,7 @@ class Headless:
             os.dup2(one, 3)
             os.dup2(other, 4)
 
-        command = [browser, *FLAGS, f"--user-data-dir={folder / 'profile'}", "about:blank"]
+        command = [browser, *flags, f"--user-data-dir={folder / 'profile'}", "about:blank"]
         self._process = subprocess.Popen(  # its two descriptors have fixed numbers
             command,
             preexec_fn=connect,  # noqa: PLW1509

@@ -110,6 +110,7 @@ class Server(viser.ViserServer):
             super().__init__(host=host, port=port, label=label, verbose=False)
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             self._websock_server.unregister_handler(message)
+        self.gui.configure_theme(show_logo=False, show_share_button=False)
         self._tell(drivers)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
@@ -139,6 +140,10 @@ class Server(viser.ViserServer):
     def forget(self) -> None:
         """Drop what is kept of removed elements; viser does so only when a page comes."""
         self._run_garbage_collector()
+
+    def connections(self) -> int:
+        """Number of pages that are connected, those that have not come up yet included."""
+        return len(self._states())
 
     def kept(self) -> int:
         """Number of messages that are kept for pages: what may grow if something is wrong."""

@@ -4,7 +4,7 @@ import secrets
 import threading
 from types import TracebackType
 
-from teleop_core.console.drivers import Drivers
+from teleop_core.console.drivers import PATIENCE, Drivers
 from teleop_core.console.guard import Guard, is_loopback, is_wildcard
 from teleop_core.console.hooks import Server
 from teleop_core.console.port import listen
@@ -31,6 +31,7 @@ class ConsoleServer:
         host: Address of this machine to serve at; the loopback by default.
         token: Secret; made if the address is not the loopback and none is given.
         label: Heading of the panel.
+        patience: Time without a sign of life after which a page loses a held stylus [s].
 
     Raises:
         SessionError: The port is taken; the text says by what, and names a free one.
@@ -38,13 +39,19 @@ class ConsoleServer:
     """
 
     def __init__(
-        self, port: int = PORT, host: str = "127.0.0.1", token: str = "", label: str = ""
+        self,
+        port: int = PORT,
+        host: str = "127.0.0.1",
+        token: str = "",
+        *,
+        label: str = "",
+        patience: float = PATIENCE,
     ) -> None:
         opened = listen(host, port)
         self.port = int(opened.getsockname()[1])
         self.host = host
         self.token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
-        self.drivers = Drivers()
+        self.drivers = Drivers(patience)
         self.viser = Server(opened, Guard(host, self.port, self.token), self.drivers, label)
         self._ends = threading.Event()
         self._watch = threading.Thread(target=self._look, name="console pages", daemon=True)

@@ -1,0 +1,168 @@
+"""Tab: a page with a 3-D scene in a real Chromium, used as people use it: by mouse and keys."""
+
+import json
+import os
+import shutil
+import socket
+import time
+
+import pytest
+
+from headless import Headless
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = (
+    "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--disable-extensions", "--hide-scrollbars",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE localhost",
+    "--remote-debugging-pipe",
+)  # fmt: skip
+# What Chromium says about the speed of software rendering; nothing is wrong then.
+ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback", "THREE.Clock")
+KEYS = {" ": ("Space", 32), "Escape": ("Escape", 27), "Enter": ("Enter", 13)}
+
+
+def chromium():
+    """Path of a browser; the test is skipped without one, in CI it fails."""
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        reason = f"no browser to open the page with; install one of {', '.join(BROWSERS)}"
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
+    return found
+
+
+class Tab(Headless):
+    """One tab of a browser of its own.
+
+    ``errors`` are the errors on its console, ``asked`` the addresses it asked for anything,
+    ``answers`` the status of each answer.
+    """
+
+    def __init__(self, folder, width=1400, height=900):
+        self.errors, self.asked, self.answers = [], [], {}
+        super().__init__(chromium(), folder, width, height, FLAGS)
+        for domain in ("Network", "Log"):
+            self.call(f"{domain}.enable")
+
+    def visit(self, url):
+        """Open a page of a server and wait until its scene is there."""
+        self.call("Page.navigate", url=url)
+        self.until("document.querySelector('canvas')")
+
+    def reload(self):
+        """Load the page again."""
+        self.value("window.isOld = true")
+        self.call("Page.reload")
+        self.until("!window.isOld && document.querySelector('canvas')")
+
+    def shows(self, text, seconds=20):
+        """Wait until a text can be read on the page."""
+        self.until(f"document.body.innerText.includes({json.dumps(text)})", seconds)
+
+    def click(self, text):
+        """Click what has this text: a button, a tab, a label."""
+        self.shows(text)
+        x, y = self.place(text)
+        for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+            self.mouse(kind, x, y)
+
+    def place(self, text):
+        """Middle of the last visible element with a text, once it rests and nothing covers it [px].
+
+        A click there reaches it, or the promise fails.
+        """
+        return self.value(f"""(async () => {{
+            const said = (e) => (e.innerText || e.value || e.ariaLabel || '').trim();
+            const find = () => [...document.querySelectorAll(
+                'button, [role], label, a, input, span, p')].filter(
+                    (e) => said(e) === {json.dumps(text)} && e.getClientRects().length).at(-1);
+            const end = performance.now() + 10000;
+            for (let last = '', rests = 0; performance.now() < end;) {{
+                await new Promise(requestAnimationFrame);
+                const element = find();
+                if (!element) continue;
+                element.scrollIntoView({{block: 'nearest'}});
+                const box = element.getBoundingClientRect();
+                const x = box.x + box.width / 2, y = box.y + box.height / 2;
+                rests = last === x + ' ' + y ? rests + 1 : 0;
+                last = x + ' ' + y;
+                const top = document.elementFromPoint(x, y);
+                if (rests > 3 && top && (element.contains(top) || top.contains(element)))
+                    return [x, y];
+            }}
+            throw new Error('nothing that can be clicked says ' + {json.dumps(text)});
+        }})()""")
+
+    def write(self, text):
+        """Write where the cursor is."""
+        self.call("Input.insertText", text=text)
+
+    def key(self, name):
+        """Press and release a key."""
+        code, number = KEYS.get(name, (f"Key{name.upper()}", ord(name.upper()[0])))
+        text = {"text": name} if len(name) == 1 else {}
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=code,
+                      windowsVirtualKeyCode=number, **text)  # fmt: skip
+            text = {}
+
+    def pull(self, begin, end, steps=20):
+        """Drag slowly, as a hand does, from one point to another [px]; the button stays down."""
+        self.mouse("mouseMoved", *begin)
+        self.mouse("mousePressed", *begin)
+        for step in range(1, steps + 1):
+            share = step / steps
+            point = [a + share * (b - a) for a, b in zip(begin, end, strict=True)]
+            self.mouse("mouseMoved", *point)
+            self.value("new Promise(requestAnimationFrame)")
+
+    def faults(self):
+        """Errors that mean something."""
+        self.value("0")  # what was said before has been heard then
+        return [line for line in self.errors if not any(advice in line for advice in ADVICE)]
+
+    def hosts(self):
+        """All hosts that the page asked for anything."""
+        self.value("0")
+        addresses = [url for url in self.asked if not url.startswith(("data:", "blob:"))]
+        return {url.split("/")[2] for url in addresses}
+
+    def _note(self, event):
+        super()._note(event)
+        method, told = event.get("method"), event.get("params", {})
+        if method == "Runtime.exceptionThrown" or told.get("type") in {"error", "assert"}:
+            self.errors.append(self.said[-1])
+        elif method == "Log.entryAdded" and told["entry"]["level"] == "error":
+            self.errors.append(f"{told['entry']['text']} {told['entry'].get('url', '')}")
+        elif method == "Network.requestWillBeSent":
+            self.asked.append(told["request"]["url"])
+        elif method == "Network.webSocketCreated":
+            self.asked.append(told["url"])
+        elif method == "Network.responseReceived":
+            self.answers[told["response"]["url"]] = told["response"]["status"]
+
+
+def until(condition, what, seconds=20.0):
+    """Result of a condition as soon as it is true; for what happens outside of the browser."""
+    end = time.monotonic() + seconds
+    while not (result := condition()):
+        assert time.monotonic() < end, f"not within {seconds} s: {what}"
+        time.sleep(0.01)
+    return result
+
+
+def handshake(port, path="/", **headers):
+    """First line of the answer to the opening of a WebSocket, and the socket it came on."""
+    opened = socket.create_connection(("127.0.0.1", port), timeout=20)
+    told = {
+        "Host": f"127.0.0.1:{port}", "Upgrade": "websocket", "Connection": "Upgrade",
+        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Version": "13",
+    }  # fmt: skip
+    told |= {name.replace("_", "-"): value for name, value in headers.items()}
+    lines = [f"GET {path} HTTP/1.1", *(f"{n}: {v}" for n, v in told.items() if v), "", ""]
+    opened.sendall("\r\n".join(lines).encode())
+    answer = b""
+    while b"\r\n" not in answer:
+        answer += opened.recv(1)
+    return answer.decode().split("\r\n")[0], opened

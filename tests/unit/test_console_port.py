@@ -1,0 +1,45 @@
+"""Port: a taken one is refused with the process that has it and one that is free."""
+
+import os
+import re
+import socket
+
+import pytest
+
+from teleop_core.console.port import free_port, listen, owner
+from teleop_core.errors import ParameterError, SessionError
+
+
+def test_taken_port_is_refused_with_its_owner_and_one_that_is_free():
+    with listen("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(SessionError) as refused:
+            listen("127.0.0.1", port)
+        assert f"port {port} is taken by" in str(refused.value)
+        assert f"(process {os.getpid()})" in str(refused.value)
+        free = int(re.search(r"(\d+) is free", str(refused.value)).group(1))
+        assert free != port
+        listen("127.0.0.1", free).close()
+
+
+def test_port_that_all_addresses_have_is_taken_on_the_loopback_too():
+    with listen("0.0.0.0", 0) as taken, pytest.raises(SessionError):
+        listen("127.0.0.1", taken.getsockname()[1])
+
+
+def test_port_is_free_again_at_once_when_its_server_has_ended():
+    port = free_port()
+    for _ in range(2):
+        with listen("127.0.0.1", port), socket.create_connection(("127.0.0.1", port)):
+            pass
+
+
+def test_owner_that_cannot_be_known_is_another_process():
+    assert owner(free_port()) == "another process"
+
+
+@pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 65536), ("127.0.0.1", -1),
+                                            ("192.0.2.1", 0), ("no such host", 0)])  # fmt: skip
+def test_address_that_is_none_of_this_machine_is_a_wrong_value(host, port):
+    with pytest.raises(ParameterError):
+        listen(host, port)
