@@ -166,9 +166,9 @@ class ArmNodes:
         room = _AT * (self._robot.upper - self._robot.lower)
         is_at = (joints <= self._robot.lower + room) | (joints >= self._robot.upper - room)
         found = set(np.flatnonzero(is_at).tolist())
-        told = int(state.get("limited_joint", -1.0))
+        told = state.get("limited_joint", -1.0)  # NaN in recordings of early versions
         if state.get("limit") == Limit.JOINT and 0 <= told < self._robot.n:
-            found.add(told)
+            found.add(int(told))
         return frozenset(found)
 
     # -- what is shown ---------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from teleop_core.console.link import View
 from teleop_core.console.scene import Scene
 from teleop_core.errors import UnknownNameError
 from teleop_core.geometry import Array, turn_by
+from teleop_core.topics import MASTER_MEASURED_CP
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 """Directions of a small step: along and about the axes of master_base."""

@@ -1,0 +1,238 @@
+"""Recorded arms: what a recording holds of each arm, as samples that are found by their time."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.bags.arms import arm_names, of_arm, topic_prefix
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.reports import read_reports
+from teleop_core.console.link import Arm, ArmView, ParameterInfo, Setting
+from teleop_core.errors import RecordingError, TeleopError
+from teleop_core.geometry import Array
+from teleop_core.operation.report import operation_text
+from teleop_core.parameters import specs, values_of
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.robot import Robot
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.runner import recorded_configuration
+from teleop_core.topics import (
+    OPERATION,
+    SLAVE_MEASURED_JS,
+    SLAVE_OPERATION,
+    STREAMS,
+    TELEOP_STATE,
+    Topic,
+)
+
+MOST = 200 << 20
+"""Bytes of samples that are kept; of longer recordings every second, third ... sample is."""
+_STAMP_BYTES = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Samples of one stream: times of recording (N,) [ns], stamps (N,) [ns], rows (N, width)."""
+
+    log_ns: NDArray[np.int64]
+    stamp_ns: NDArray[np.int64]
+    rows: Array
+
+    def at(self, time_ns: int) -> int:
+        """Index of the last sample that was recorded by a time [ns]; -1 before the first."""
+        return int(np.searchsorted(self.log_ns, time_ns, side="right")) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedArm:
+    """What is kept of one arm.
+
+    Attributes:
+        arm: The arm.
+        tracks: Streams and reports by their plain names.
+    """
+
+    arm: Arm
+    tracks: Mapping[str, Track]
+
+    def show(self, time_ns: int, view: ArmView) -> None:
+        """Write what was known at a time [ns] into an empty view."""
+        for name, track in self.tracks.items():
+            if (i := track.at(time_ns)) < 0:
+                continue
+            row = track.rows[i]
+            if name == TELEOP_STATE.name:
+                view.state = dict(zip(TELEOP_STATE.columns, row.tolist(), strict=True))
+            elif name == SLAVE_OPERATION.name:
+                view.operation = dict(zip(OPERATION, row.tolist(), strict=True))
+                view.operation_text = _in_words(view.operation, self.arm.robot.joint_names)
+            else:
+                view.streams[name], view.stamp_ns[name] = row, int(track.stamp_ns[i])
+
+
+def recorded_arms(
+    bag: Bag, configuration: Configuration | None, most: int = MOST
+) -> tuple[tuple[RecordedArm, ...], int]:
+    """All arms of a recording, the default one first, and of how many samples one is kept.
+
+    Args:
+        bag: The recording.
+        configuration: What it was made with; None if that is not known.
+        most: Bytes of samples that are kept.
+
+    Raises:
+        RecordingError: It does not say which robot moved, or how its joints did.
+    """
+    bags = {_namespace(bag, name): of_arm(bag, name) for name in arm_names(bag)}
+    arms = [Arm(name, _robot(one, configuration, name)) for name, one in bags.items()]
+    thinning = max(1, -(-sum(_size(bags[arm.name], arm.robot.n) for arm in arms) // most))
+    found = [RecordedArm(arm, _tracks(bags[arm.name], arm, thinning)) for arm in arms]
+    return tuple(found), thinning
+
+
+def _namespace(bag: Bag, name: str) -> str:
+    """Namespace of an arm: empty for the default one, whose topics have plain names."""
+    prefix = topic_prefix(bag, name)
+    return "" if not prefix or not prefix.endswith(f"{name}/") else name
+
+
+def configuration_of(bag: Bag) -> Configuration | None:
+    """What it was made with; None where that is not told, or cannot be built any more."""
+    with suppress(TeleopError):
+        layer, scenario = recorded_configuration(bag)
+        return Configuration.from_layers([layer], scenario) if layer else None
+    return None
+
+
+def _robot(bag: Bag, configuration: Configuration | None, arm: str) -> Robot:
+    """Robot of one arm.
+
+    Raises:
+        RecordingError: It is not told, or its joints were not recorded.
+    """
+    name = bag.metadata.get("robot", "")
+    geometry: tuple[str, ...] = ()
+    if configuration is not None and arm in configuration.graph.namespaces:
+        name = str(configuration.value("robot", arm) or name)
+        geometry = tuple(configuration.value("geometry", arm) or ())
+    if not name:
+        missing = "does not say which robot moved, as recordings of other systems do"
+        cure = "`teleop import` makes a recording of the hand that can be replayed"
+        raise RecordingError(bag.path, f"{missing}; {cure}")
+    try:
+        robot = load_robot_set(name, geometry)
+    except (TeleopError, OSError) as error:
+        raise RecordingError(bag.path, f"its robot cannot be made: {error}") from error
+    bag.require([SLAVE_MEASURED_JS])
+    return robot
+
+
+def _size(bag: Bag, joints: int) -> int:
+    """Bytes of the samples of one arm."""
+    infos = [(topic, bag.topics.get(topic.name)) for topic in STREAMS]
+    widths = {topic.name: topic.width(joints) for topic in STREAMS}
+    return sum(
+        info.count * (8 * widths[topic.name] + _STAMP_BYTES)
+        for topic, info in infos
+        if info is not None
+    )
+
+
+def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Track]:
+    """Streams and reports of one arm by their plain names."""
+    wanted = [
+        topic
+        for topic in STREAMS
+        if (info := bag.topics.get(topic.name)) is not None
+        and info.count
+        and info.type == topic.kind.ros_type
+    ]
+    parts: dict[str, list[Track]] = {topic.name: [] for topic in wanted}
+    joints = {topic.name for topic in wanted if topic.kind.has_joints}
+    seen = dict.fromkeys(parts, 0)
+    for block in bag.blocks(wanted):
+        for name, series in block.items():
+            begin = -seen[name] % thinning
+            seen[name] += len(series)
+            chosen = slice(begin, None, thinning)
+            logs, stamps = series.log_ns[chosen].copy(), series.stamp_ns[chosen].copy()
+            rows = series.values[chosen].copy()
+            if name in joints:
+                rows = rows[:, _order(bag, series.names, rows.shape[1], arm.robot)]
+            parts[name].append(Track(logs, stamps, rows))
+    tracks = {name: _joined(found) for name, found in parts.items() if found}
+    for topic in (TELEOP_STATE, SLAVE_OPERATION):
+        if (found := _reports(bag, topic)) is not None:
+            tracks[topic.name] = found
+    return tracks
+
+
+def _order(bag: Bag, names: tuple[str, ...], width: int, robot: Robot) -> list[int] | slice:
+    """Columns of joints in the robot's order; all columns of what is none of joints.
+
+    Raises:
+        RecordingError: Joints of the robot were not recorded.
+    """
+    if names == robot.joint_names:
+        return slice(None)
+    if missing := [name for name in robot.joint_names if name not in names]:
+        reason = f"lacks joints {', '.join(missing)} of {robot.name}; it has {', '.join(names)}"
+        raise RecordingError(bag.path, reason)
+    chosen = [names.index(name) for name in robot.joint_names]
+    return [part * len(names) + joint for part in range(width // len(names)) for joint in chosen]
+
+
+def _joined(parts: list[Track]) -> Track:
+    log_ns = np.concatenate([part.log_ns for part in parts])
+    stamp_ns = np.concatenate([part.stamp_ns for part in parts])
+    rows = np.concatenate([part.rows for part in parts])
+    if (np.diff(log_ns) < 0).any():
+        order = np.argsort(log_ns, kind="stable")
+        log_ns, stamp_ns, rows = log_ns[order], stamp_ns[order], rows[order]
+    rows.setflags(write=False)
+    return Track(log_ns, stamp_ns, rows)
+
+
+def _reports(bag: Bag, topic: Topic) -> Track | None:
+    """Numbers of a report, whose own are those of its columns that it has; None without any."""
+    info = bag.topics.get(topic.name)
+    if info is None or not info.count or info.type != topic.kind.ros_type:
+        return None
+    logs, stamps, rows = [], [], []
+    for _, _, log_ns, data in bag.raw([topic]):
+        with suppress(ValueError):  # bytes that are no report
+            for report in read_reports(data):
+                rows.append([float(report.values.get(c, "nan")) for c in topic.columns])
+                logs.append(log_ns)
+                stamps.append(report.stamp_ns)
+    if not rows:
+        return None
+    return Track(np.array(logs, np.int64), np.array(stamps, np.int64), np.array(rows))
+
+
+def _in_words(operation: Mapping[str, float], joints: tuple[str, ...]) -> str:
+    """State of the arm in words; empty for numbers that are none of this version's."""
+    with suppress(ValueError, KeyError):
+        return operation_text(operation, joints)
+    return ""
+
+
+def parameters_of(configuration: Configuration | None) -> dict[tuple[str, str], ParameterInfo]:
+    """Parameters of all stages with their declarations, by node and name; all of them fixed."""
+    found = {}
+    groups: dict[str, Any] = {} if configuration is None else configuration.groups
+    for node, group in groups.items():
+        values = values_of(group)
+        for spec in specs(type(group)):
+            if spec.name in values:
+                doc = f"{spec.doc} [{spec.unit}]" if spec.unit else spec.doc
+                value = cast("Setting", values[spec.name])
+                found[node, spec.name] = ParameterInfo(
+                    node, spec.name, value, doc, spec.lower, spec.upper,
+                    spec.choices, is_fixed=True,
+                )  # fmt: skip
+    return found
