@@ -18,7 +18,7 @@ from teleop_core.robots import Robot, load_robot
 from teleop_core.robots.hardware import NUMBERS
 from teleop_core.session.configuration import parameter_rows
 from teleop_core.session.layers import declared_groups
-from teleop_core.topics import DIAGNOSTICS, Kind, Topic
+from teleop_core.topics import DIAGNOSTICS, HAND_BUTTONS, HAND_SERVO_CP, Kind, Topic
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTE = "<!-- Written by docs/generate.py; change the code, not this page. -->"
@@ -62,12 +62,16 @@ def topics_page(graph: Graph) -> str:
         for topic in member.writes:
             rows.append(topic_row(topic, member.name, graph))
     rows.append(topic_row(DIAGNOSTICS, "every node", graph))
+    for topic in (HAND_SERVO_CP, HAND_BUTTONS):
+        row = topic_row(topic, "[a person](hand.md)", graph)
+        rows.append(row.replace("–", "haptic_master, if its operator is `remote`", 1))
     return page([
         "# Topics",
         "CRTK names, standard messages, SI units. Streams are offered reliable with a queue of "
         "one, so that subscribers of both kinds get them, and read best effort, "
         "`teleop/state` is latched, `diagnostics` comes once a second. The recorder takes all of "
-        "them. Those of a further arm stand below its name: `left/slave/servo_cp`.",
+        "them but those of a person's hand. Those of a further arm stand below its name: "
+        "`left/slave/servo_cp`.",
         "\n".join(rows),
         "*Late*: the reader takes what was there at the end of the last tick. *In force*: the "
         "stamp of the command that the slave follows; 0 before the first one.",

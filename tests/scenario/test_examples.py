@@ -278,6 +278,14 @@ def test_a_stopped_arm_stands_still_and_goes_on_when_it_is_enabled(tmp_path):
     assert re.findall(r"s  (\w+)", text)[-1] == "ENABLED"
 
 
+def test_a_person_moves_the_slave_while_they_hold_the_stylus_and_not_else(tmp_path):
+    text = run("remote_hand", tmp_path)
+    stylus, slave = (numbers(rf"{word} ([\d.]+) mm", text) for word in ("stylus", "slave"))
+    assert len(stylus) == len(slave) == 3
+    assert all(18.0 < width < 21.0 for width in (stylus[0], slave[0], stylus[2], slave[2]))
+    assert max(stylus[1], slave[1]) < 0.2
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_example_needs_the_public_api_alone(name):
     tree = ast.parse((EXAMPLES / f"{name}.py").read_text(encoding="utf-8"))

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from teleop_core.graph import Graph, build_graph
     from teleop_core.kernels import kernel
     from teleop_core.operators import Operator, following, register_operator
+    from teleop_core.operators.remote import RemoteHand, remote_operator
     from teleop_core.parameters import NoParameters, parameter
     from teleop_core.planning.reach import Reach, reach
     from teleop_core.plants import Physics, Plant, register_plant
@@ -94,6 +95,7 @@ _PLACES = {
     "graph": ("Graph", "build_graph"),
     "kernels": ("kernel",),
     "operators": ("Operator", "following", "register_operator"),
+    "operators.remote": ("RemoteHand", "remote_operator"),
     "parameters": ("NoParameters", "parameter"),
     "planning.reach": ("Reach", "reach"),
     "plants": ("Physics", "Plant", "register_plant"),
@@ -129,6 +131,7 @@ __all__ = [
     "Reach",
     "Recording",
     "RecordingError",
+    "RemoteHand",
     "Robot",
     "RobotParameters",
     "Score",
@@ -159,6 +162,7 @@ __all__ = [
     "register_plant",
     "register_robot",
     "register_stage",
+    "remote_operator",
     "replay",
     "robot_from_table",
     "run",

@@ -6,6 +6,7 @@ clutch is pressed then, so that the slave holds.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, cast
 
@@ -23,7 +24,7 @@ from teleop_core.operators import Motion, Operator, Setting
 from teleop_core.operators.follower import Follower
 from teleop_core.parameters import parameter
 
-__all__ = ["REMOTE", "RemoteHand", "RemoteParameters"]
+__all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operator"]
 
 AHEAD = 4
 """Ticks for which the hand is asked at once: what is wanted is so much later at most."""
@@ -64,6 +65,10 @@ class RemoteParameters:
         doc="largest acceleration of its turn",
         source="assumed: reaches turn_speed in half of the delay",
     )  # fmt: skip
+
+
+Person = Callable[["RemoteHand", float], None]
+"""Person of a program: tells a hand what is wanted at a time [s] since the hand began to move."""
 
 
 class _Wanted(NamedTuple):
@@ -320,3 +325,26 @@ def make_remote(_: object, setting: Setting) -> Motion:
 
 
 REMOTE = Operator("remote", make_remote, RemoteParameters, ahead=AHEAD, trembles=True)
+
+
+def remote_operator(name: str, person: Person) -> Operator:
+    """Operator whose hand is told by a program what is wanted, as from afar.
+
+    The parameters of the hand are ``operator.remote``.
+
+    Args:
+        name: What it is called.
+        person: Asked once every 4 ticks; calls :meth:`RemoteHand.want`, :meth:`RemoteHand.let_go`
+            or :meth:`RemoteHand.press` as often as it likes, or not at all.
+    """
+
+    def make(_: object, setting: Setting) -> Motion:
+        hand = hand_of(setting)
+
+        def motion(times: Array) -> Array:
+            person(hand, float(times[0]))
+            return hand.motion(times)
+
+        return motion
+
+    return Operator(name, make, ahead=AHEAD, trembles=True)
