@@ -94,8 +94,17 @@ class Tab(Headless):
             throw new Error('nothing that can be clicked says ' + {json.dumps(text)});
         }})()""")
 
-    def write(self, text):
-        """Write where the cursor is."""
+    def fill(self, label, text):
+        """Write a text, in place of what stands there, into the field beside a label."""
+        self.place(label)
+        self.value(f"""(() => {{
+            let near = [...document.querySelectorAll('label, span, p, div')].filter((e) =>
+                e.innerText.trim() === {json.dumps(label)} && e.getClientRects().length).at(-1);
+            const field = (e) => e.querySelector('input:not([type=hidden]), textarea');
+            while (!field(near)) near = near.parentElement;
+            field(near).focus();
+            field(near).select();
+        }})()""")
         self.call("Input.insertText", text=text)
 
     def key(self, name):

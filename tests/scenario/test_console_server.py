@@ -1,0 +1,238 @@
+"""Console's server: used by real browsers, refused to pages from elsewhere."""
+
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser")
+
+import viser
+from viser import _messages
+
+from browser import Tab, handshake, until
+from teleop_core.console import hooks
+from teleop_core.console.server import ConsoleServer
+from teleop_core.errors import SessionError
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+SPOKEN = f"viser-v{viser.__version__}"
+CENTER = (700, 450)
+"""Of the window of a tab [px]; there the scene's origin is."""
+
+
+@pytest.fixture(scope="module")
+def tab(tmp_path_factory):
+    with Tab(tmp_path_factory.mktemp("first")) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory):
+    with Tab(tmp_path_factory.mktemp("second")) as opened:
+        yield opened
+
+
+@pytest.fixture(autouse=True)
+def _clean(request):
+    """Each test has its tabs empty and with no memory of errors."""
+    for name in {"tab", "other"} & set(request.fixturenames):
+        opened = request.getfixturevalue(name)
+        opened.call("Page.navigate", url="about:blank")
+        opened.value("0")
+        for kept in (opened.errors, opened.asked, opened.said):
+            kept.clear()
+
+
+def is_driven(server):
+    return server.drivers.driver is not None
+
+
+def test_page_opens_without_errors_asks_no_other_host_and_is_used(tab, capfd):
+    with ConsoleServer(0, token="secret", label="arm") as server:
+        clicks = []
+        server.viser.gui.add_button("Start").on_click(lambda event: clicks.append(event.client_id))
+        name = server.viser.gui.add_text("name", "")
+        tab.visit(server.url)
+        tab.click("Start")
+        until(lambda: clicks, "the click arrives")
+        assert clicks == [server.drivers.driver]
+        tab.fill("name", "run 1")
+        until(lambda: name.value == "run 1", "what was typed arrives")
+        until(lambda: tab.hosts() and any("/alive" in url for url in tab.asked), "it is alive")
+        assert tab.hosts() == {f"127.0.0.1:{server.port}"}
+        assert not tab.faults()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab):
+    with ConsoleServer(0, token="secret") as server:
+        address = server.url.split("?", maxsplit=1)[0]
+        for wrong in (address, address + "?token=guess"):
+            tab.call("Page.navigate", url=wrong)
+            tab.shows("token is missing or wrong")
+            assert tab.answers[wrong] == 403
+        tab.visit(server.url)
+        until(lambda: is_driven(server), "the page is there")
+        tab.visit(address)  # the browser keeps it
+        until(lambda: server.drivers.driver == 1, "the page is there again")
+        assert tab.value("document.cookie") == ""  # no script can read it
+
+
+def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab):
+    with ConsoleServer(0) as server, elsewhere() as foreign:
+        tab.call("Page.navigate", url=foreign)
+        tab.until("document.body")
+        opened = tab.value(f"""new Promise((done) => {{
+            const socket = new WebSocket('ws://127.0.0.1:{server.port}/', '{SPOKEN}');
+            socket.onopen = () => done('open'); socket.onerror = () => done('refused'); }})""")
+        assert opened == "refused"
+        read = tab.value(f"fetch('{server.url}').then(() => 'read', () => 'refused')")
+        assert read == "refused"
+        tab.value(f"""new Promise((done) => {{ const frame = document.createElement('iframe');
+            frame.onload = done; frame.src = '{server.url}'; document.body.append(frame); }})""")
+        assert tab.value("document.querySelector('iframe').contentDocument") is None
+        tab.visit(server.url)  # its own page is served all the while, as the only one
+        until(lambda: is_driven(server), "the page is there")
+        assert server.drivers.pages == (0,)
+
+
+def elsewhere():
+    """Address of a harmless page that another server of this machine has."""
+    return Elsewhere()
+
+
+class Elsewhere:
+    class Answer(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(b"<body>somewhere else</body>")
+
+        def log_message(self, *told):
+            pass
+
+    def __enter__(self):
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), self.Answer)
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+        return f"http://127.0.0.1:{self._server.server_port}/"
+
+    def __exit__(self, *error):
+        self._server.shutdown()
+        self._server.server_close()
+
+
+def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab, other):
+    with ConsoleServer(0) as server:
+        take = server.viser.gui.add_button("Take control")
+        take.on_click(lambda event: server.drivers.take(event.client_id))
+        tab.visit(server.url)
+        until(lambda: is_driven(server), "the first page is there")
+        other.visit(server.url)
+        until(lambda: len(server.drivers.pages) == 2, "the second page is there")
+        first, second = server.drivers.pages
+        assert server.drivers.driver == first
+        other.click("Take control")
+        until(lambda: server.drivers.driver == second, "the second page drives")
+        other.reload()
+        until(lambda: server.drivers.driver not in {None, first, second}, "it drives again")
+        other.call("Page.navigate", url="about:blank")
+        until(lambda: server.drivers.pages == (first,), "the second page has gone")
+        assert server.drivers.driver is None
+        assert not tab.faults()
+
+
+def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab):
+    with ConsoleServer(0, patience=2.5) as server:
+        held = []
+        gizmo = server.viser.scene.add_transform_controls("/stylus", scale=2.0)
+        gizmo.on_update(lambda _: held.append(gizmo.position))
+        tab.visit(server.url)
+        until(lambda: is_driven(server), "the page is there")
+        page = server.drivers.driver
+        grip = gizmo_tip(tab)
+        tab.pull(grip, (grip[0], grip[1] - 60))
+        until(lambda: held, "the stylus moves")
+        tab.value("new Promise((done) => setTimeout(done, 3000))")  # held still, but alive
+        assert server.drivers.driver == page
+        tab.value("setTimeout(() => { const end = performance.now() + 4500; "
+                  "while (performance.now() < end); }, 0); 0")  # fmt: skip
+        until(lambda: not is_driven(server), "control is lost")
+        tab.mouse("mouseReleased", *grip)
+        assert server.drivers.pages == (page,)  # its connection is well: a worker answers
+
+
+def gizmo_tip(tab):
+    """A point of the upward arrow of a gizmo at the origin [px]: where the cursor grabs it."""
+    tab.value("new Promise((done) => setTimeout(done, 500))")
+    return (CENTER[0], CENTER[1] - 40)
+
+
+def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_served(
+    tab, monkeypatch
+):
+    monkeypatch.setattr(hooks, "STUCK", 1.0)
+    with ConsoleServer(0) as server:
+        scene = server.viser.scene
+        body = scene.add_frame("/body")
+        mesh = scene.add_point_cloud("/cloud", **cloud(0))
+        told, dead = handshake(
+            server.port,
+            Origin=f"http://127.0.0.1:{server.port}",
+            Sec_WebSocket_Protocol=SPOKEN,
+        )
+        assert "101" in told
+        before = server.viser.connections()
+        assert before == 1
+        tab.visit(server.url)
+        until(lambda: is_driven(server), "the page is there")
+        kept = []
+
+        def went():
+            for _ in range(20):
+                body.position = (0.001 * len(kept), 0.0, 0.0)
+                mesh.points = cloud(len(kept))["points"]
+            kept.append(server.viser.kept())
+            return server.viser.connections() == 1 and len(kept) > 100
+
+        until(went, "the one that never reads is dropped")
+        assert max(kept[50:]) <= max(kept[:50]) + 5  # of 40 updates each, the newest are kept
+        assert is_driven(server)
+        assert not tab.faults()
+        dead.close()
+
+
+def cloud(seed):
+    points = np.random.default_rng(seed).normal(size=(20_000, 3)).astype(np.float32)
+    return {"points": points, "colors": np.zeros((20_000, 3), np.uint8)}
+
+
+def test_page_is_led_out_of_the_machine_by_nobody(tab):
+    with ConsoleServer(0) as server:
+        tab.visit(server.url)
+        until(lambda: is_driven(server), "the page is there")
+        assert tab.value("document.querySelectorAll('.tabler-icon-share').length") == 0
+        handlers = server.viser._websock_server._incoming_handlers
+        assert not {_messages.ShareUrlRequest, _messages.ShareUrlDisconnect} & set(handlers)
+        with pytest.raises(SessionError):
+            server.viser.request_share_url()
+
+
+def test_port_of_another_console_is_refused_and_not_counted_up():
+    with ConsoleServer(0) as server, pytest.raises(SessionError, match="taken by"):
+        ConsoleServer(server.port)
+
+
+def test_other_addresses_than_the_loopback_are_served_with_a_token_alone():
+    with ConsoleServer(0, "0.0.0.0") as server:
+        assert len(server.token) >= 32
+        assert server.url == f"http://localhost:{server.port}/?token={server.token}"
+        origin = f"http://127.0.0.1:{server.port}"
+        for path, first in (("/", "403"), (f"/?token={server.token}", "101")):
+            told, opened = handshake(server.port, path, Origin=origin)
+            opened.close()
+            assert first in told
+    with ConsoleServer(0) as server:
+        assert server.token == ""
