@@ -182,6 +182,9 @@ def _add_lookups(commands: Any) -> None:
         "--from", type=Path, dest="table", metavar="TABLE.yaml",
         help="chain from a Denavit-Hartenberg table, as in config/robots",
     )  # fmt: skip
+    robot.add_argument(
+        "--urdf", type=Path, metavar="FILE", help="write its links and joints for other tools"
+    )
     text = "draw where a robot's tip can be"
     space = command(commands, "workspace", _workspace, text)
     space.add_argument("name", metavar="ROBOT", help="one of `teleop robot`")
@@ -305,6 +308,12 @@ def _robot(arguments: argparse.Namespace) -> int:
         robot = load_robot_set(arguments.name, arguments.geometry)
     else:
         print("\n".join(list_robots()))
+        return 0
+    if arguments.urdf is not None:
+        from teleop_core.bodies import urdf_of
+
+        arguments.urdf.write_text(urdf_of(robot), encoding="utf-8")
+        print(f"{arguments.urdf}: {robot.name}")
         return 0
     print(text(robot))
     return 0
