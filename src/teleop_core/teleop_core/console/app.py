@@ -11,6 +11,7 @@ from teleop_core.console.panel import Panel
 from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
+from teleop_core.console.steps import Steps
 from teleop_core.console.stylus import Stylus
 from teleop_core.console.view_tab import ViewTab, theme
 
@@ -41,6 +42,10 @@ class Console:
         self.panel = Panel(
             server.viser, link, drivers.may_drive, drivers.take, lambda: drivers.driver, renew
         )
+        with self.panel.stylus_folder:
+            Steps(
+                server.viser, self.stylus, tuple(arm.name for arm in link.arms), drivers.may_drive
+            )
         with self.panel.view_tab:
             ViewTab(server.viser, self.scene)
 

@@ -90,7 +90,6 @@ class Drivers:
     def hold(self, page: int) -> bool:
         """A page takes the stylus or moves it; false if it may not."""
         with self._lock:
-            self.heard(page)
             self._holds = self._holds or self.may_drive(page)
             return self.may_drive(page)
 

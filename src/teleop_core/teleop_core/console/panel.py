@@ -101,6 +101,7 @@ class Panel:
         with self._gui.add_folder("stylus"):
             for name, label in (("mode", "coarse ↔ fine"), ("fixture", "box on ↔ off")):
                 self._button(label, f"the {name} button of the stylus", partial(self._press, name))
+            self.stylus_folder = self._gui.add_folder("small steps", expand_by_default=False)
         with self._gui.add_folder("recording"):
             self._name = self._gui.add_text("name", "run_1", hint="letters, digits, . _ -")
             self._button("Save as", "closes the recording under this name", self._save)
