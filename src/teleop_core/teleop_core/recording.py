@@ -181,7 +181,7 @@ class Recording:
         names = topics or tuple(
             name
             for name in self.topics
-            if kind_of(name, self._bag.topics[name].type) is not Kind.REPORT
+            if kind_of(name, self._bag.topics[name].type) not in {None, Kind.REPORT}
         )
         frames = []
         for name in names:

@@ -172,6 +172,8 @@ class Topic:
         adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
             another source of force; empty for a topic of its own.
         arm: Namespace; empty for the default arm.
+        message: Name of the ROS message type where it carries no values, such as a robot's model;
+            empty for that of its kind.
     """
 
     name: str
@@ -182,6 +184,12 @@ class Topic:
     columns: tuple[str, ...] = ()
     adds_to: str = ""
     arm: str = ""
+    message: str = ""
+
+    @property
+    def ros_type(self) -> str:
+        """Name of its ROS message type."""
+        return self.message or self.kind.ros_type
 
     def of_arm(self, arm: str) -> "Topic":
         """The same topic of a named arm: in its namespace, with its frames."""

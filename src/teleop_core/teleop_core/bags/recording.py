@@ -27,6 +27,10 @@ class RecordingParameters:
     every_of: tuple[str, ...] = parameter(
         (), doc="exceptions from every, as topic=n, e.g. slave/measured_js=10", fixed=True
     )
+    tf_rate: float = parameter(
+        50.0, unit="1/s", lower=0.0, upper=1000.0, fixed=True,
+        doc="messages of /tf a second, with the robot's model beside them; 0: neither",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Refuse unknown names and entries that are not topic=n."""

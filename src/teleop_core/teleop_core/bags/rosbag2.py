@@ -38,7 +38,7 @@ def offered_qos(quality: Quality) -> list[dict[str, Any]]:
 
 def records_of(topics: list[Topic]) -> tuple[list[Schema], list[Channel]]:
     """MCAP schemas and channels of topics; a topic's channel is its place in the list plus one."""
-    names = list(dict.fromkeys(topic.kind.ros_type for topic in topics))
+    names = list(dict.fromkeys(topic.ros_type for topic in topics))
     schemas = [
         Schema(number, ros_types.definition(name).encode(), "ros2msg", name)
         for number, name in enumerate(names, start=1)
@@ -47,9 +47,9 @@ def records_of(topics: list[Topic]) -> tuple[list[Schema], list[Channel]]:
     for number, topic in enumerate(topics, start=1):
         entries = {
             "offered_qos_profiles": _text(offered_qos(topic.quality)),
-            "topic_type_hash": ros_types.type_hash(topic.kind.ros_type),
+            "topic_type_hash": ros_types.type_hash(topic.ros_type),
         }
-        schema = 1 + names.index(topic.kind.ros_type)
+        schema = 1 + names.index(topic.ros_type)
         channels.append(Channel(number, "/" + topic.name, "cdr", entries, schema))
     return schemas, channels
 

@@ -17,6 +17,7 @@ from teleop_core.operation import operation_level, operation_text
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION, Layer, parse_text
+from teleop_core.session.model import Model, ModelRecords
 from teleop_core.session.replayed_span import in_order, replayed_span, tick_times
 from teleop_core.session.virtual import BLOCK, VirtualTime
 from teleop_core.signals import STATE_FIELDS, TICK_NS
@@ -176,13 +177,14 @@ def record_blocks(
     Raises:
         RecordingError: The directory exists, cannot be written, or there are no ticks.
     """
-    done = 0
-    with open_writer(session, configuration, out) as writer:
-        reports, is_new = StateReports(session), NewSamples()
+    done, model = 0, Model(configuration)
+    with open_writer(session, configuration, out, model.topics) as writer:
+        reports, is_new, models = StateReports(session), NewSamples(), ModelRecords(model)
         for block in blocks:
             log_ns = block["now_ns"]
             writer.write_block({t: is_new.of(t, block, log_ns) for t in session.graph.streams})
             reports.write(writer, block)
+            models.write(writer, block)
             done += len(block)
             progress(done, ticks)
     if not done:
@@ -190,11 +192,13 @@ def record_blocks(
     return done
 
 
-def open_writer(session: VirtualTime, configuration: Configuration, out: Path) -> BagWriter:
-    """Writer of everything that a session's stages write."""
+def open_writer(
+    session: VirtualTime, configuration: Configuration, out: Path, further: tuple[Topic, ...] = ()
+) -> BagWriter:
+    """Writer of everything that a session's stages write, and of further topics."""
     return BagWriter(
         out,
-        session.graph.topics,
+        (*session.graph.topics, *further),
         session.joint_names,
         parameters=configuration.groups[RECORDER_NAME],
         metadata=describe(configuration),

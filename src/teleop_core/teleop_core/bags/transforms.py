@@ -1,0 +1,78 @@
+"""Transforms: messages of ``/tf`` and ``/robot_description`` as bytes, without a ROS installation."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.bags import ros_types
+from teleop_core.bags.cdr import NUMPY_CODES, Template
+from teleop_core.bags.layouts import SECOND_NS, Bytes, Stamps
+from teleop_core.errors import ShapeError
+from teleop_core.geometry import Array
+from teleop_core.topics import Kind, Quality, Stamp, Topic
+
+ROBOT_DESCRIPTION = Topic(
+    "robot_description", Kind.REPORT, Stamp("none"), quality=Quality.LATCHED,
+    message="std_msgs/msg/String",
+)  # fmt: skip
+"""URDF of the slave."""
+TF = Topic("tf", Kind.REPORT, quality=Quality.REPORT, message="tf2_msgs/msg/TFMessage")
+"""Where the frames of all arms are; one topic for all, since frames carry the arm's name."""
+WORLD = "world"
+"""Frame of the picture, in which all bases stand."""
+_MESSAGE_ORDER = [0, 1, 2, 4, 5, 6, 3]  # columns of a pose in a message: x, y, z, qx, qy, qz, qw
+
+
+class TransformMessages:
+    """Messages of ``/tf`` that always tell of the same frames.
+
+    Args:
+        frames: Names of parent and child of each transform.
+    """
+
+    def __init__(self, frames: tuple[tuple[str, str], ...]) -> None:
+        self.frames = frames
+        cdr = Template()
+        cdr.length(len(frames))
+        for index, (parent, child) in enumerate(frames):
+            cdr.gap("i", slice(0, 1))
+            cdr.gap("I", slice(0, 1))
+            cdr.string(parent)
+            cdr.string(child)
+            cdr.gap("d", slice(7 * index, 7 * index + 7))
+        self._template: Bytes = np.frombuffer(bytes(cdr.template), np.uint8)
+        self._dtype = np.dtype(
+            {
+                "names": [f"part{i}" for i in range(len(cdr.gaps))],
+                "formats": [f"<{count}{NUMPY_CODES[code]}" for _, code, count, _ in cdr.gaps],
+                "offsets": [at for at, *_ in cdr.gaps],
+                "itemsize": len(cdr.template),
+            }
+        )
+
+    def encode(self, stamp_ns: Stamps, poses: Array) -> list[bytes]:
+        """Messages of N times.
+
+        Args:
+            stamp_ns: Stamps (N,) [ns].
+            poses: Children in their parents (N, frames, 7): x, y, z [m], quaternion w, x, y, z.
+
+        Raises:
+            ShapeError: The poses have another shape.
+        """
+        if poses.shape != (len(stamp_ns), len(self.frames), 7):
+            raise ShapeError("poses", (len(stamp_ns), len(self.frames), 7), poses.shape)
+        rows = np.empty((len(stamp_ns), len(self._template)), np.uint8)
+        rows[:] = self._template
+        records: NDArray[np.void] = rows.view(self._dtype)[:, 0]
+        seconds, numbers = stamp_ns // SECOND_NS, poses[..., _MESSAGE_ORDER]
+        for index in range(len(self.frames)):
+            records[f"part{3 * index}"][:, 0] = seconds
+            records[f"part{3 * index + 1}"][:, 0] = stamp_ns - seconds * SECOND_NS
+            records[f"part{3 * index + 2}"] = numbers[:, index]
+        return [row.tobytes() for row in rows]
+
+
+def text_message(text: str) -> bytes:
+    """Message of a topic of texts."""
+    kind = ros_types.typestore().types[ROBOT_DESCRIPTION.message]
+    return ros_types.serialise(kind(data=text))

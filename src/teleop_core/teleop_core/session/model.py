@@ -1,0 +1,173 @@
+"""Model: robots and frames of a session as other tools draw them, from the recording alone.
+
+Frames stand in ``world``: each slave's base, its links and its tip, the master's base beside it,
+turned so that stylus and tip move alike, and its stylus. Where bases stand to each other nobody
+measures: it is a picture.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.bags.transforms import (
+    ROBOT_DESCRIPTION,
+    TF,
+    WORLD,
+    TransformMessages,
+    text_message,
+)
+from teleop_core.bodies import bodies_of, urdf_of
+from teleop_core.geometry import Array, quaternion_from_rotation
+from teleop_core.graph import RECORDER_NAME
+from teleop_core.mapping.parameters import axis_map
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.robot import Robot
+from teleop_core.session.configuration import Configuration
+from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_JS, Topic
+
+SLAVE, MASTER = "slave_", "master_"
+"""What stands before the names of frames."""
+_HERE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+_ASIDE = 0.3  # m, from a robot's reach to the middle of its master
+_APART = 2.0  # reaches between two slaves
+
+
+@dataclass(frozen=True, eq=False)
+class ArmModel:
+    """Robot, master and frames of one arm.
+
+    Args:
+        arm: Its namespace.
+        robot: Its robot.
+        base: Pose (7,) of slave_base in the world.
+        master: Pose (7,) of master_base in the world.
+    """
+
+    arm: str
+    robot: Robot
+    base: Array
+    master: Array
+
+    def __post_init__(self) -> None:
+        prefix = f"{self.arm}/" if self.arm else ""
+        slave, master = prefix + SLAVE, prefix + MASTER
+        names = bodies_of(self.robot).names
+        frames = (
+            (WORLD, f"{slave}{names[0]}"),
+            *((f"{slave}{names[0]}", f"{slave}{name}") for name in names[1:]),
+            (WORLD, f"{master}base"),
+            (f"{master}base", f"{master}stylus"),
+        )
+        object.__setattr__(self, "_messages", TransformMessages(frames))
+
+    @property
+    def description(self) -> Topic:
+        """Topic of its URDF."""
+        return ROBOT_DESCRIPTION.of_arm(self.arm)
+
+    def urdf(self) -> bytes:
+        """Message of its URDF."""
+        prefix = f"{self.arm}/" if self.arm else ""
+        return text_message(urdf_of(self.robot, self.robot.name, prefix + SLAVE))
+
+    def transforms(self, stamp_ns: NDArray[np.int64], joints: Array, stylus: Array) -> list[bytes]:
+        """Messages of where all its frames are.
+
+        Args:
+            stamp_ns: Stamps (N,) [ns].
+            joints: Joint vectors (N, n) [rad, m].
+            stylus: Poses (N, 7) in master_base; those that are none count as its origin.
+        """
+        count = len(stamp_ns)
+        poses = np.empty((count, len(self._messages.frames), 7))  # type: ignore[attr-defined]
+        poses[:, :-2] = bodies_of(self.robot).poses(joints)
+        poses[:, 0], poses[:, -2], poses[:, -1] = self.base, self.master, stylus
+        is_none = ~(np.abs((stylus[:, 3:] ** 2).sum(axis=1) - 1.0) < 1e-2)
+        poses[is_none, -1] = _HERE
+        return self._messages.encode(stamp_ns, poses)  # type: ignore[attr-defined,no-any-return]
+
+
+class Model:
+    """Robots of a session that other tools can draw.
+
+    Args:
+        configuration: What runs.
+
+    Attributes:
+        arms: Arms with a robot, the default one first.
+        period_ns: Time from one message of ``/tf`` to the next [ns]; 0 for none at all.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        rate = configuration.groups[RECORDER_NAME].tf_rate
+        self.period_ns = round(1e9 / rate) if rate > 0.0 else 0
+        self.arms: tuple[ArmModel, ...] = ()
+        if self.period_ns:
+            self.arms = _arms(configuration)
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """Topics that it writes."""
+        return (*(arm.description for arm in self.arms), TF) if self.arms else ()
+
+
+def _arms(configuration: Configuration) -> tuple[ArmModel, ...]:
+    arms: list[ArmModel] = []
+    side = 0.0
+    for name in configuration.graph.namespaces:
+        robot = configuration.value("robot", name)
+        if not isinstance(robot, str):
+            continue
+        loaded = load_robot_set(robot, configuration.value("geometry", name) or ())
+        reach = bodies_of(loaded).size
+        side -= _APART * reach if arms else 0.0
+        base = _HERE.copy()
+        base[1] = side
+        axes = configuration.value("axes", name)
+        master = _master(base, reach, np.eye(3) if axes is None else axis_map("axes", axes))
+        arms.append(ArmModel(name, loaded, base, master))
+        side -= _ASIDE
+    return tuple(arms)
+
+
+def _master(base: Array, reach: float, axes: Array) -> Array:
+    """Pose (7,) of a master's base to the right of its slave."""
+    pose = base.copy()
+    pose[1] -= reach * 0.5 + _ASIDE
+    quaternion_from_rotation(np.ascontiguousarray(axes), pose[3:])
+    return pose
+
+
+class ModelRecords:
+    """Recorder of the model of a session in virtual time.
+
+    Args:
+        model: The model.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model, self._slot, self._is_new = model, -1, True
+
+    def write(self, writer: Any, block: Any) -> None:
+        """Record the model before the first block, and the frames of a block."""
+        if not self._model.arms:
+            return
+        now_ns = block["now_ns"]
+        if self._is_new:
+            self._is_new = False
+            for arm in self._model.arms:
+                writer.write(arm.description, int(now_ns[0]), arm.urdf())
+        slots = now_ns // self._model.period_ns
+        rows = np.flatnonzero(np.diff(slots, prepend=self._slot))
+        self._slot = int(slots[-1])
+        messages = [self._of(arm, block, rows) for arm in self._model.arms]
+        for at, row in enumerate(rows.tolist()):
+            for found in messages:
+                writer.write(TF, int(now_ns[row]), found[at])
+
+    def _of(self, arm: ArmModel, block: Any, rows: NDArray[np.int64]) -> list[bytes]:
+        joints = block[SLAVE_MEASURED_JS.of_arm(arm.arm).field][rows, : arm.robot.n]
+        stylus = block[MASTER_MEASURED_CP.of_arm(arm.arm).field][rows]
+        return arm.transforms(block["now_ns"][rows], joints, stylus)
