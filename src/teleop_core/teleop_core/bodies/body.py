@@ -101,11 +101,21 @@ class Bodies:
             raise ShapeError("q", (self.n,), joints.shape)
         rows = joints.reshape(-1, self.n)
         out = np.empty((len(rows), len(self.bodies), 7))
-        coordinates, free = rows, self._no_free
-        if self._coordinates is not None:
-            coordinates, free = self._coordinates(rows)
+        coordinates, free = self.coordinates(rows)
         place(coordinates, free, self._parents, self._kinds, self._places, self._origins, out)
         return out[0] if joints.ndim == 1 else out
+
+    def coordinates(self, q: Array) -> tuple[Array, Array]:
+        """What the poses of all bodies follow from, for who places them elsewhere.
+
+        Args:
+            q: Joint vectors (N, n) [rad, m].
+
+        Returns:
+            Coordinates (N, m) of the tree [rad, m], and poses (N, k, 7) of its free bodies; without
+            any of these (1, 0, 7).
+        """
+        return (q, self._no_free) if self._coordinates is None else self._coordinates(q)
 
     def index(self, name: str) -> int:
         """Index of a body by its name.
