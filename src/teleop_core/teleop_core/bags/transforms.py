@@ -1,4 +1,4 @@
-"""Transforms: messages of ``/tf`` and ``/robot_description`` as bytes, without a ROS installation."""
+"""Transforms: messages of ``/tf`` and ``/robot_description`` as bytes, without ROS."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -254,7 +254,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def open_publisher(self, topic: Topic) -> Any:
         """Publisher that is silent unless the node is active, and closed at cleanup."""
-        kind = message_type(topic.kind.ros_type)
+        kind = message_type(topic.ros_type)
         name = self.resolve_topic_name(topic.name)
         offered = self.overrides.apply(name, "publisher", profile(topic))
         publisher = self.create_lifecycle_publisher(kind, topic.name, offered)

@@ -13,16 +13,18 @@ from teleop_core.bags.arms import NAMESPACE_KEY
 from teleop_core.bags.recording import MARKS, RECORDER, RecordingParameters
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError, SessionError
+from teleop_core.errors import RecordingError, SessionError, TeleopError
 from teleop_core.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.files import graph_of, session_of
+from teleop_core.nodes.model import LiveModel, ModelTopics
 from teleop_core.nodes.recorder_services import serve
 from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Subscription
 from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION, parse_text
+from teleop_core.session.model import Model
 from teleop_core.session.runner import describe
 from teleop_core.stage import Stage
 from teleop_core.topics import DIAGNOSTICS, Quality, Topic
@@ -142,13 +144,15 @@ class RecorderNode(CoreNode):
         )
         self._path = Path(parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S"))
         topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
-        every = parameters.every_nth(topics)
+        self._model = self._model_of(configuration, parameters)
+        self._model_topics = ModelTopics(self, self._model.topics)
+        every = parameters.every_nth((*topics, *self._model.topics))
         self._recorded = [topic for topic in topics if every[topic.name]]
         self._mark_topic, self._part, self._marks = MARKS.of_arm(self.arm), 0, 0
         self._last.clear()
         self._open = partial(
-            BagWriter, topics=(*topics, self._mark_topic), joint_names={}, parameters=parameters,
-            metadata=self._about(configuration), hold_ns=HOLD_NS,
+            BagWriter, topics=(*topics, self._mark_topic, *self._model.topics), joint_names={},
+            parameters=parameters, metadata=self._about(configuration), hold_ns=HOLD_NS,
         )  # fmt: skip
         self._begin_recording(self._path)
         self._is_broken = False
@@ -158,6 +162,7 @@ class RecorderNode(CoreNode):
         now_ns = time.time_ns()
         self._writer = self.stage = self._open(path, start_ns=now_ns)
         self._is_recording = True
+        self._model.forget()
         for topic, data in self._last.items():
             self._writer.write(topic, now_ns, data, now_ns)
 
@@ -171,6 +176,14 @@ class RecorderNode(CoreNode):
             return Configuration(groups, parameters.scenario, self._graph)
         layer = parse_text(parameters.configuration, "recorder.configuration")
         return Configuration.from_layers([layer], parameters.scenario)
+
+    def _model_of(self, configuration: Configuration, parameters: RecorderParameters) -> LiveModel:
+        """Frames to record beside the topics; none of a robot that is not known here."""
+        try:
+            return LiveModel(Model(configuration, parameters.tf_rate, self.arm))
+        except TeleopError as error:
+            self.get_logger().warning(f"records no model of the robot: {error}")
+            return LiveModel(Model(configuration, 0.0))
 
     def _about(self, configuration: Configuration) -> dict[str, str]:
         """What is kept with the recording, and below which namespace all arms are."""
@@ -226,11 +239,16 @@ class RecorderNode(CoreNode):
             channel.drain(came)
         came.sort(key=lambda message: message[0])
         self._last.update({m[1]: m[2] for m in came if m[1].quality is Quality.LATCHED})
+        drawn = self._model.messages(came)
+        for topic, data, _ in drawn:
+            self._model_topics.send(topic, data)
         if not self._is_recording:
             return
         try:
             for received_ns, topic, data, sent_ns in came:
                 self._writer.write(topic, received_ns, data, sent_ns)
+            for topic, data, received_ns in drawn:
+                self._writer.write(topic, received_ns, data)
             self._writer.flush_older(time.time_ns())
         except RecordingError:
             self._is_broken = True  # said once; what is safe has been closed

@@ -39,7 +39,7 @@ class ArmModel:
     """Robot, master and frames of one arm.
 
     Args:
-        arm: Its namespace.
+        arm: Its namespace, empty for that of plain topics.
         robot: Its robot.
         base: Pose (7,) of slave_base in the world.
         master: Pose (7,) of master_base in the world.
@@ -94,18 +94,24 @@ class Model:
 
     Args:
         configuration: What runs.
+        rate: Messages of ``/tf`` a second; 0 for no model at all, None for that of the recorder.
+        namespace: Where all of the session is, without the slash before it; arms are below.
 
     Attributes:
         arms: Arms with a robot, the default one first.
-        period_ns: Time from one message of ``/tf`` to the next [ns]; 0 for none at all.
+        period_ns: Time from one message of ``/tf`` to the next [ns].
+
+    Raises:
+        TeleopError: A robot cannot be loaded.
     """
 
-    def __init__(self, configuration: Configuration) -> None:
-        rate = configuration.groups[RECORDER_NAME].tf_rate
-        self.period_ns = round(1e9 / rate) if rate > 0.0 else 0
-        self.arms: tuple[ArmModel, ...] = ()
-        if self.period_ns:
-            self.arms = _arms(configuration)
+    def __init__(
+        self, configuration: Configuration, rate: float | None = None, namespace: str = ""
+    ) -> None:
+        if rate is None:
+            rate = configuration.groups[RECORDER_NAME].tf_rate
+        self.arms: tuple[ArmModel, ...] = _arms(configuration, namespace) if rate else ()
+        self.period_ns = round(1e9 / rate) if rate else 0
 
     @property
     def topics(self) -> tuple[Topic, ...]:
@@ -113,7 +119,7 @@ class Model:
         return (*(arm.description for arm in self.arms), TF) if self.arms else ()
 
 
-def _arms(configuration: Configuration) -> tuple[ArmModel, ...]:
+def _arms(configuration: Configuration, namespace: str) -> tuple[ArmModel, ...]:
     arms: list[ArmModel] = []
     side = 0.0
     for name in configuration.graph.namespaces:
@@ -127,7 +133,8 @@ def _arms(configuration: Configuration) -> tuple[ArmModel, ...]:
         base[1] = side
         axes = configuration.value("axes", name)
         master = _master(base, reach, np.eye(3) if axes is None else axis_map("axes", axes))
-        arms.append(ArmModel(name, loaded, base, master))
+        where = "/".join(filter(None, (namespace, name)))
+        arms.append(ArmModel(where, loaded, base, master))
         side -= _ASIDE
     return tuple(arms)
 
