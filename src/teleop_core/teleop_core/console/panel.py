@@ -57,6 +57,7 @@ class Panel:
         self.histories = {arm.name: History(arm) for arm in link.arms}
         self.scores = {arm.name: LiveScores() for arm in link.arms}
         self._plots: list[Plots] = []
+        self._gui.main_panel.dock_right()  # beside the scene, not over it
         self._add_stop()
         self._status = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
