@@ -50,7 +50,7 @@ setup(
         "scipy",
     ],
     extras_require={
-        "console": ["viser>=1.1,<1.2", "pygame-ce"],
+        "console": ["viser>=1.1,<1.2", "pygame-ce", "hidapi"],
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "test": [
             "coverage",

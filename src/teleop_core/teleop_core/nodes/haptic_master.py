@@ -2,11 +2,15 @@
 
 from typing import Any
 
+import numpy as np
+
 from teleop_core.master.haptic_master import HAPTIC_MASTER, HapticMasterParameters
 from teleop_core.nodes.crtk_master import CrtkMaster
+from teleop_core.nodes.device_hand import DeviceHand
 from teleop_core.nodes.hand import HandInput
 from teleop_core.nodes.operation import StopInput
 from teleop_core.nodes.ticking import TickingNode
+from teleop_core.operators import OPERATORS
 from teleop_core.stage import Stage
 from teleop_core.topics import MASTER_CONTACT, MASTER_SERVO_CF, Topic
 
@@ -18,6 +22,8 @@ class HapticMasterNode(TickingNode):
 
     def __init__(self, stage: Stage = HAPTIC_MASTER, **options: Any) -> None:
         super().__init__(stage, **options)
+        self._hand: HandInput | None = None
+        self._device: DeviceHand | None = None
 
     def setup(self, parameters: HapticMasterParameters) -> None:
         """Make the device and open its topics."""
@@ -26,8 +32,23 @@ class HapticMasterNode(TickingNode):
         self.stage.reset()
         self._stop, self._crtk = StopInput(self), CrtkMaster(self)
         self._force = self.stage.signals[MASTER_SERVO_CF.field]
-        hand = self.stage.hand
-        self._hand = HandInput(self, hand, has_poses=True) if hand is not None else None
+        self._open_hand(parameters)
+
+    def _open_hand(self, parameters: HapticMasterParameters) -> None:
+        """Open what moves the hand of a person: a device of this machine, or topics."""
+        self._hand, self._device = None, None
+        kind, hand = parameters.operator.kind, self.stage.hand
+        operator = OPERATORS.find(kind.kind)
+        if hand is None:
+            return
+        if operator.opens is not None:
+            self._device = DeviceHand(self, hand, operator.opens, kind.parameters, self._share)
+        self._hand = HandInput(self, hand, has_poses=operator.opens is None)
+
+    def _share(self) -> float:
+        """Force that the person shall feel, as a share of the device's largest."""
+        force, peak = self._force[:3], self.parameters.device.peak_force
+        return float(min(np.linalg.norm(force) / peak, 1.0)) if peak > 0.0 else 0.0
 
     def stop(self) -> None:
         """Forget the force and let go: the next activation starts without either."""
@@ -37,6 +58,8 @@ class HapticMasterNode(TickingNode):
 
     def teardown(self) -> None:
         """Close what :meth:`setup` opened."""
+        if self._device is not None:
+            self._device.close()
         self._stop.close()
         self._crtk.close()
         super().teardown()
@@ -63,9 +86,11 @@ class HapticMasterNode(TickingNode):
         most = float(self.stage.signals[MASTER_CONTACT.field][_MOST])
         if 0.0 < most < self.parameters.device.peak_force:
             found.append(f"its motors are warm: {most:.2f} N at most")
-        return found + (self._hand.concerns() if self._hand is not None else [])
+        people = (self._hand, self._device)
+        return found + [text for one in people if one is not None for text in one.concerns()]
 
     def values(self) -> dict[str, str]:
         """Whether the operator moves yet, and whose hand it is."""
         begun = {"has_begun": str(int(self.stage.has_begun))}
-        return begun | (self._hand.values() if self._hand is not None else {})
+        people = (self._hand, self._device)
+        return begun | {k: v for one in people if one is not None for k, v in one.values().items()}

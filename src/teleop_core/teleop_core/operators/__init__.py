@@ -7,14 +7,17 @@ against its mass, its tremor and the device's force.
 
 from collections.abc import Callable
 from dataclasses import dataclass, is_dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import PartError
+from teleop_core.errors import ParameterError, PartError
 from teleop_core.geometry import Array
 from teleop_core.parameters import NoParameters
 from teleop_core.registry import Registry
+
+if TYPE_CHECKING:
+    from teleop_core.devices import Device
 
 __all__ = ["OPERATORS", "Motion", "Operator", "Setting", "following", "register_operator"]
 
@@ -58,6 +61,8 @@ class Operator:
             ``operator.approach_time``.
         length: ``length(parameters, setting)`` says how long its motion lasts [s], which a session
             then does too if its duration is not given; None for a motion without end.
+        opens: ``opens(parameters)`` opens a device of this machine that moves the hand, which is
+            a :class:`~teleop_core.operators.remote.RemoteHand`; in live sessions alone.
     """
 
     name: str
@@ -67,6 +72,7 @@ class Operator:
     trembles: bool = False
     approaches: bool = False
     length: Callable[[Any, Setting], float] | None = None
+    opens: "Callable[[Any], Device] | None" = None
 
 
 def following(name: str, times: object, rows: object) -> Operator:
@@ -115,6 +121,8 @@ def _checked(name: str, part: object) -> Operator:
             raise PartError("operator", name, "one whose make can be called, asked >= 1 tick ahead")
         if part.length is not None and not callable(part.length):
             raise PartError("operator", name, "one whose length is length(parameters, setting)")
+        if part.opens is not None and not callable(part.opens):
+            raise PartError("operator", name, "one whose opens is opens(parameters)")
         if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
             text = "one whose parameters are a dataclass, not an instance of one"
             raise PartError("operator", name, text)
@@ -134,6 +142,8 @@ OPERATORS: Registry[Operator] = Registry(
         "tour": "teleop_core.operators.tour:TOUR",
         "human": "teleop_core.operators.human:HUMAN",
         "remote": "teleop_core.operators.remote:REMOTE",
+        "gamepad": "teleop_core.devices.gamepad:GAMEPAD",
+        "spacemouse": "teleop_core.devices.spacemouse:SPACEMOUSE",
         "bag": "teleop_core.operators.recorded:BAG",
         "file": "teleop_core.operators.recorded:FILE",
     },
@@ -145,3 +155,21 @@ OPERATORS: Registry[Operator] = Registry(
 def register_operator(name: str, operator: Operator | Motion, *, replace: bool = False) -> Operator:
     """Add an operator, or a motion alone, for the rest of the program; see :meth:`Registry.add`."""
     return OPERATORS.add(name, operator, replace=replace)
+
+
+def insist_on_virtual(stage: str, group: object) -> None:
+    """Make sure that a stage's operator, if it has one, can move the hand in virtual time.
+
+    Args:
+        stage: Name of the stage.
+        group: Its parameters.
+
+    Raises:
+        ParameterError: A person must move its device; the text names who works.
+    """
+    kind = getattr(getattr(getattr(group, "operator", None), "kind", None), "kind", None)
+    if kind is None or OPERATORS.find(kind).opens is None:
+        return
+    others = ", ".join(name for name in OPERATORS.names() if OPERATORS.find(name).opens is None)
+    text = f"one of {others} in virtual time; a person moves a {kind} in teleop live"
+    raise ParameterError(f"{stage}.operator.kind", kind, text)

@@ -97,6 +97,7 @@ class RemoteHand:
         room: Corners low and high (3,) [m] of the box that the stylus stays in; None for no bound.
 
     Attributes:
+        room: Corners low and high (3,) [m] of the box that the stylus stays in.
         refused: Number of poses that were not used.
     """
 
@@ -109,6 +110,7 @@ class RemoteHand:
         p = self._parameters = parameters or RemoteParameters()
         begin = rest_pose() if start is None else _row("start", start)
         corners = (np.full(3, -_FARTHEST), np.full(3, _FARTHEST)) if room is None else room
+        self.room = corners
         self._follower = Follower(
             p.delay, (p.speed, p.turn_speed), (p.acceleration, p.turn_acceleration), begin, corners
         )

@@ -7,6 +7,7 @@ import numpy as np
 from teleop_core.errors import PartError
 from teleop_core.graph import BUILT_IN
 from teleop_core.kernels import records
+from teleop_core.operators import insist_on_virtual
 from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration
 from teleop_core.signals import TICK_NS
@@ -38,6 +39,9 @@ class VirtualTime:
         self.graph, self._tick_ns = configuration.graph, tick_ns
         groups, dt = configuration.groups, tick_ns / 1e9
         self._played = frozenset(m.name for m in self.graph.masters) if is_replay else frozenset()
+        for member in self.graph.members:
+            if member.name not in self._played:
+                insist_on_virtual(member.name, groups[member.name])
         self.stages: dict[str, Runner] = {
             member.name: member.stage.run(groups[member.name], dt)
             for member in self.graph.members

@@ -1,0 +1,129 @@
+"""Device hand: the thread that reads a gamepad or a 3-D mouse and tells a hand where to go."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from teleop_core.devices import Device
+from teleop_core.devices.pilot import Pilot, PilotParameters
+from teleop_core.errors import SessionError, TeleopError
+from teleop_core.nodes.loop import Loop
+from teleop_core.operators.remote import RemoteHand
+
+PERIOD = 0.01
+"""Time from one look at the device to the next [s]."""
+_RUMBLES = 5  # looks from one rumble to the next
+_AGAIN = 1.0  # time from one try to find a lost device to the next [s]
+_OPENING = 20.0  # a device that takes longer to open hangs [s]
+
+
+class DeviceHand:
+    """Reader of a device, in a thread of its own that alone uses the device.
+
+    A device that goes is let go of, and taken again when it comes back.
+
+    Args:
+        node: Node whose log is told.
+        hand: Who follows.
+        opens: Opens the device.
+        parameters: Of the operator.
+        force: Force that the person shall feel, as a share of the largest.
+
+    Raises:
+        TeleopError: The device cannot be opened; the text says what was found.
+    """
+
+    def __init__(
+        self,
+        node: Any,
+        hand: RemoteHand,
+        opens: Callable[[Any], Device],
+        parameters: PilotParameters,
+        force: Callable[[], float],
+    ) -> None:
+        self._log, self._hand, self._force = node.get_logger(), hand, force
+        self._opens, self._parameters = opens, parameters
+        self._pilot = Pilot(hand, parameters)
+        self._device: Device | None = None
+        self._lost, self._looks, self._last, self._felt = "", 0, 0.0, 0.0
+        self._opened: Future[None] = Future()
+        self._loop = Loop("device", self._turn, self._fail, self._open)
+        self._loop.start()
+        try:
+            self._opened.result(_OPENING)
+        except TimeoutError as error:
+            self._loop.stop()
+            raise SessionError(f"the device does not open within {_OPENING:g} s") from error
+
+    def concerns(self) -> list[str]:
+        """A device that is gone; a stylus that nobody holds."""
+        if self._lost:
+            return [f"{self._lost}; waits for it"]
+        return [] if self._hand.is_held else ["waits for a hand: nobody holds the stylus"]
+
+    def values(self) -> dict[str, str]:
+        """The device, and whether the stylus is held."""
+        name = self._device.name if self._device is not None else ""
+        return {"hand": name, "hand.is_held": str(int(self._hand.is_held))}
+
+    def close(self) -> None:
+        """Stop reading and give the device back."""
+        if self._loop.stop() and self._device is not None:
+            self._pilot.let_go()
+            self._device.close()
+            self._device = None
+
+    # -- in the thread of the device -------------------------------------------------------------
+
+    def _open(self) -> None:
+        try:
+            self._device = self._opens(self._parameters)
+        except Exception as error:  # the constructor raises it, in the thread of the node
+            self._opened.set_exception(error)
+            self._loop.is_running = False
+            return
+        self._last = time.monotonic()
+        self._opened.set_result(None)
+
+    def _turn(self) -> None:
+        time.sleep(PERIOD)
+        if self._device is None:
+            self._try_again()
+        else:
+            try:
+                self._read(self._device)
+            except SessionError as error:
+                self._lose(str(error))
+
+    def _read(self, device: Device) -> None:
+        now = time.monotonic()
+        elapsed, self._last = now - self._last, now
+        self._pilot.step(device.read(), elapsed)
+        self._looks += 1
+        share = self._force() * getattr(self._parameters, "rumble", 0.0)
+        if self._looks % _RUMBLES == 0 and (share or self._felt):
+            device.rumble(share)
+            self._felt = share
+
+    def _lose(self, text: str) -> None:
+        self._pilot.let_go()
+        self._lost, self._device = text, None
+        self._last = time.monotonic()
+        self._log.error(text)
+
+    def _try_again(self) -> None:
+        if time.monotonic() - self._last < _AGAIN:
+            return
+        self._last = time.monotonic()
+        try:
+            self._device = self._opens(self._parameters)
+        except TeleopError:
+            return
+        self._lost = ""
+        self._log.info(f"{self._device.name} is back")
+
+    def _fail(self, reason: str, _: bool) -> None:
+        """Tell what nobody expected; the silence that follows lets go of the stylus."""
+        self._lost = "the reader of the device has crashed; see the log"
+        self._log.error(f"{self._lost}:\n{reason}")

@@ -1,0 +1,256 @@
+"""Devices: deflections become rates, rates poses; gamepads of SDL, reports of a 3-D mouse."""
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from teleop_core.devices import NOTHING, Reading
+from teleop_core.devices.pilot import Pilot, PilotParameters, beyond
+from teleop_core.devices.spacemouse import Reports, is_space_mouse
+from teleop_core.errors import ParameterError, SessionError
+from teleop_core.operators import OPERATORS
+from teleop_core.operators.remote import AHEAD, RemoteHand, rest_pose
+from teleop_core.session.configuration import configure
+from teleop_core.session.virtual import VirtualTime
+
+DT = 1e-3
+LIVE = ["gamepad", "spacemouse"]
+rate = st.floats(-1.0, 1.0)
+six = st.lists(rate, min_size=6, max_size=6).map(np.array)
+int16 = st.integers(-(2**15), 2**15 - 1)
+
+
+class Session:
+    """A pilot who looks at 100 Hz, and the hand that it tells, at 1000 Hz."""
+
+    def __init__(self, room=None, **parameters):
+        self.hand = RemoteHand(room=room)
+        self.pilot = Pilot(self.hand, PilotParameters(**parameters))
+        self.rows, self._looks = np.zeros((0, 12)), 0
+
+    def for_time(self, duration, reading):
+        for _ in range(round(duration / DT / AHEAD)):
+            while self._looks * 0.01 <= len(self.rows) * DT:
+                self.pilot.step(reading, 0.01)
+                self._looks += 1
+            times = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
+            self.rows = np.vstack((self.rows, self.hand.motion(times)))
+        return self.rows
+
+
+@given(six, st.floats(0.0, 0.9))
+def test_a_dead_zone_takes_rest_and_gives_all_directions_alike(rates, zone):
+    found = beyond(rates, zone)
+    assert (found[np.abs(rates) <= zone] == 0.0).all()
+    assert (np.abs(found) <= 1.0).all()
+    assert (found * rates >= 0.0).all()
+    np.testing.assert_array_equal(beyond(-rates, zone), -found)
+    assert (np.abs(beyond(np.sign(rates), zone)) == np.abs(np.sign(rates))).all()
+
+
+@given(st.floats(0.0, 0.9), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_more_deflection_is_never_less_speed_and_nothing_jumps(zone, first, second):
+    low, high = beyond(np.sort([first, second]), zone)
+    assert 0.0 <= high - low <= (abs(second - first) + 1e-12) / (1.0 - zone) + 1e-12
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_full_deflection_moves_the_stylus_at_the_stated_speed(axis):
+    run, rates = Session(speed=0.03), np.zeros(6)
+    rates[axis] = -1.0
+    rows = run.for_time(1.0, Reading(rates, is_held=True))
+    speed = (rows[-1, axis] - rows[-201, axis]) / 0.2
+    assert speed == pytest.approx(-0.03, rel=0.02)
+    assert np.abs(np.delete(rows[:, :6], axis, axis=1)).max() < 1e-12
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_full_deflection_turns_the_stylus_about_axes_of_the_base(axis):
+    run, rates = Session(turn_speed=0.5), np.zeros(6)
+    rates[3 + axis] = 1.0
+    run.for_time(1.2, Reading(rates, is_held=True))
+    w, x, y, z = run.hand.pose[3:]
+    start = Rotation.from_quat(rest_pose()[[4, 5, 6, 3]])
+    turned = (Rotation.from_quat([x, y, z, w]) * start.inv()).as_rotvec()
+    assert turned[axis] == pytest.approx(0.5 * (1.2 - 0.045), abs=0.01)
+    assert np.abs(np.delete(turned, axis)).max() < 1e-9
+
+
+@given(six)
+def test_nothing_moves_unless_the_person_holds_on(rates):
+    rows = Session().for_time(0.4, Reading(rates))
+    assert (rows[:, :6] == 0.0).all()
+    assert (rows[:, 6] == 1.0).all()
+
+
+def test_letting_go_presses_the_clutch_within_a_look_and_a_new_grip_does_not_jump():
+    run, away = Session(), Reading(np.array([1.0, 0, 0, 0, 0, 0]), is_held=True)
+    run.for_time(0.5, away)
+    assert run.rows[-1, 6] == 0.0
+    count = len(run.rows)
+    run.for_time(1.0, NOTHING)
+    assert run.rows[count + 20 :, 6].min() == 1.0
+    there, count = run.rows[-1, :3].copy(), len(run.rows)
+    run.for_time(0.3, Reading(np.zeros(6), is_held=True))
+    np.testing.assert_allclose(run.rows[count:, :3], np.tile(there, (300, 1)), atol=1e-9)
+    assert (run.rows[count + 20 :, 6] == 0.0).all()
+
+
+def test_who_steers_into_the_end_of_the_workspace_leaves_it_at_once():
+    rest = rest_pose()[:3]
+    run = Session(room=(rest - 0.01, rest + 0.01), speed=0.1)
+    out, back = np.array([1.0, 0, 0, 0, 0, 0]), np.array([-1.0, 0, 0, 0, 0, 0])
+    run.for_time(2.0, Reading(out, is_held=True))
+    assert run.rows[-1, 0] == pytest.approx(0.01, abs=1e-6)
+    run.for_time(0.15, Reading(back, is_held=True))
+    assert run.rows[-1, 0] < 0.002
+
+
+def test_each_press_of_a_button_is_one_press_of_the_hand():
+    run = Session()
+    for _ in range(3):
+        run.for_time(0.3, Reading(np.zeros(6), fixture=True))
+        run.for_time(0.3, Reading(np.zeros(6), mode=True))
+    for column in (7, 8):
+        assert (np.diff(run.rows[:, column], prepend=0.0) > 0.0).sum() == 3
+
+
+@pytest.mark.parametrize("name", LIVE)
+def test_virtual_time_refuses_a_device_and_says_who_works(name):
+    with pytest.raises(ParameterError, match=rf"'{name}', must be one of random, .*remote.* in virt"):
+        VirtualTime(configure(settings=[f"operator={name}"]))
+
+
+@pytest.mark.parametrize("name", LIVE)
+def test_no_device_is_told_in_one_line_that_lists_what_was_found(name):
+    pytest.importorskip("pygame" if name == "gamepad" else "hid")
+    operator = OPERATORS.find(name)
+    parameters = operator.parameters(device="no such thing")
+    with pytest.raises(SessionError, match=r"^no .*'no such thing' in its name; found: [^\n]+$"):
+        operator.opens(parameters)
+
+
+# -- 3-D mouse -------------------------------------------------------------------------------------
+
+
+@given(st.lists(int16, min_size=6, max_size=6))
+def test_both_forms_of_reports_say_the_same(numbers):
+    long, short = Reports(), Reports()
+    assert long.take(struct.pack("<B6h", 1, *numbers))
+    assert short.take(struct.pack("<B3h", 1, *numbers[:3]))
+    assert short.take(struct.pack("<B3h", 2, *numbers[3:]))
+    np.testing.assert_array_equal(long.deflection, short.deflection)
+    assert np.abs(long.deflection).max() <= 1.0
+    small = np.abs(numbers) <= 350
+    np.testing.assert_allclose(long.deflection[small], np.array(numbers)[small] / 350.0)
+
+
+@given(six, six)
+def test_axes_of_the_mouse_and_of_the_master_are_turned_and_not_mirrored(first, second):
+    assume(np.linalg.norm(np.cross(first[:3], second[:3])) > 1e-3)
+    reports = [Reports(), Reports(), Reports()]
+    deflections = (first[:3], second[:3], np.cross(first[:3], second[:3]))
+    for one, place in zip(reports, deflections, strict=True):
+        one.deflection[:] = np.tile(place, 2)
+    a, b, c = (one.rates()[:3] for one in reports)
+    np.testing.assert_allclose(np.cross(a, b), c, atol=1e-12)
+    for one in reports:
+        np.testing.assert_array_equal(one.rates()[:3], one.rates()[3:])
+
+
+def test_pulling_the_cap_up_and_towards_the_person_moves_the_stylus_so():
+    up, near, right = Reports(), Reports(), Reports()
+    up.take(struct.pack("<B3h", 1, 0, 0, -350))
+    near.take(struct.pack("<B3h", 1, 0, 350, 0))
+    right.take(struct.pack("<B3h", 1, 350, 0, 0))
+    np.testing.assert_array_equal(up.rates()[:3], [0.0, 1.0, 0.0])
+    np.testing.assert_array_equal(near.rates()[:3], [0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(right.rates()[:3], [1.0, 0.0, 0.0])
+
+
+def test_buttons_are_bits():
+    reports = Reports()
+    for bits in (1, 2, 3, 0):
+        assert reports.take(bytes([3, bits, 0]))
+        assert reports.buttons == bits
+
+
+@given(st.binary(max_size=16))
+def test_no_bytes_are_more_than_a_full_deflection(data):
+    reports = Reports()
+    before = reports.deflection.copy(), reports.buttons
+    is_taken = reports.take(data)
+    assert np.isfinite(reports.deflection).all()
+    assert np.abs(reports.rates()).max() <= 1.0
+    if not is_taken:
+        np.testing.assert_array_equal(reports.deflection, before[0])
+        assert reports.buttons == before[1]
+
+
+def test_mice_of_the_maker_and_its_old_ones_of_another_are_known_and_plain_mice_are_not():
+    assert is_space_mouse(0x256F, 0xC635)
+    assert is_space_mouse(0x046D, 0xC626)
+    assert not is_space_mouse(0x046D, 0xC077)
+
+
+# -- gamepad ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def pad():
+    pytest.importorskip("pygame")
+    from virtual_pad import VirtualPad
+
+    made = VirtualPad()
+    yield made
+    made.unplug()
+
+
+@pytest.fixture
+def gamepad(pad):
+    from teleop_core.devices.gamepad import Gamepad
+
+    made = Gamepad("virtual")
+    yield made
+    made.close()
+
+
+def test_a_gamepad_at_rest_says_nothing(gamepad):
+    reading = gamepad.read()
+    assert (beyond(reading.rates, 0.12) == 0.0).all()
+    assert reading[1:] == (False, False, False)
+
+
+@pytest.mark.parametrize(
+    ("axis", "share", "rates"),
+    [
+        ("left x", 1.0, [1, 0, 0, 0, 0, 0]), ("left y", -1.0, [0, 0, -1, 0, 0, 0]),
+        ("right y", -1.0, [0, 1, 0, 0, 0, 0]), ("right x", 1.0, [0, 0, 0, 0, -1, 0]),
+        ("left trigger", 1.0, [0, 0, 0, 0, 0, 1]), ("right trigger", 1.0, [0, 0, 0, 0, 0, -1]),
+    ],
+)  # fmt: skip
+def test_each_stick_of_a_gamepad_moves_or_turns_along_its_axis(pad, gamepad, axis, share, rates):
+    pad.move(axis, share)
+    np.testing.assert_allclose(gamepad.read().rates, rates, atol=1e-4)
+
+
+def test_buttons_of_a_gamepad(pad, gamepad):
+    for button, place in (("left shoulder", 1), ("right shoulder", 1), ("a", 2), ("b", 3)):
+        pad.press(button)
+        pressed = gamepad.read()[1:]
+        assert pressed == tuple(place == k for k in (1, 2, 3))
+        pad.press(button, is_pressed=False)
+        assert not any(gamepad.read()[1:])
+    pad.press("up")
+    assert gamepad.read().rates[3] == -1.0
+
+
+def test_a_gamepad_that_is_unplugged_is_gone(pad, gamepad):
+    assert gamepad.read() is not None
+    pad.unplug()
+    with pytest.raises(SessionError, match="is gone"):
+        gamepad.read()
