@@ -8,6 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from teleop_core.cli import main
 from teleop_core.devices import NOTHING, Reading
 from teleop_core.devices.pilot import Pilot, PilotParameters, beyond
 from teleop_core.devices.spacemouse import Reports, is_space_mouse
@@ -121,7 +122,9 @@ def test_each_press_of_a_button_is_one_press_of_the_hand():
 
 @pytest.mark.parametrize("name", LIVE)
 def test_virtual_time_refuses_a_device_and_says_who_works(name):
-    with pytest.raises(ParameterError, match=rf"'{name}', must be one of random, .*remote.* in virt"):
+    with pytest.raises(
+        ParameterError, match=rf"'{name}', must be one of random, .*remote.* in virt"
+    ):
         VirtualTime(configure(settings=[f"operator={name}"]))
 
 
@@ -254,3 +257,10 @@ def test_a_gamepad_that_is_unplugged_is_gone(pad, gamepad):
     pad.unplug()
     with pytest.raises(SessionError, match="is gone"):
         gamepad.read()
+
+
+def test_the_command_lists_what_is_there(pad, capsys):
+    assert main(["devices"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "gamepad      Virtual Controller" in lines
+    assert lines[-1].startswith("spacemouse")

@@ -13,6 +13,7 @@ from teleop_core.commands import (
     calibrate,
     conformance,
     console,
+    devices,
     drill,
     exchange,
     experiment,
@@ -117,6 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     operate.add(commands)
     conformance.add(commands)
     console.add(commands)
+    devices.add(commands)
     return parser
 
 

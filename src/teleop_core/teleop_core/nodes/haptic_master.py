@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from teleop_core.errors import PartError
 from teleop_core.master.haptic_master import HAPTIC_MASTER, HapticMasterParameters
 from teleop_core.nodes.crtk_master import CrtkMaster
 from teleop_core.nodes.device_hand import DeviceHand
@@ -40,6 +41,9 @@ class HapticMasterNode(TickingNode):
         kind, hand = parameters.operator.kind, self.stage.hand
         operator = OPERATORS.find(kind.kind)
         if hand is None:
+            if operator.opens is not None:
+                text = "one whose make gives a RemoteHand, for it opens a device"
+                raise PartError("operator", kind.kind, text)
             return
         if operator.opens is not None:
             self._device = DeviceHand(self, hand, operator.opens, kind.parameters, self._share)

@@ -1,0 +1,45 @@
+"""``teleop devices``: gamepads and 3-D mice of this machine that can move the stylus."""
+
+import argparse
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from teleop_core.commands.arguments import command
+
+
+def add(commands: Any) -> None:
+    """Add the command's parser."""
+    text = "list gamepads and 3-D mice of this machine, for --set operator=gamepad or spacemouse"
+    command(commands, "devices", _run, text)
+
+
+def _run(_: argparse.Namespace) -> int:
+    from teleop_core.errors import SessionError
+
+    searches: tuple[tuple[str, Callable[[], Iterator[str]]], ...] = (
+        ("gamepad", _gamepads), ("spacemouse", _space_mice),
+    )  # fmt: skip
+    for operator, search in searches:
+        try:
+            names = list(search())
+        except SessionError as error:
+            names = [str(error)]
+        for name in names or ["none found"]:
+            print(f"{operator:12} {name}")
+    return 0
+
+
+def _gamepads() -> Iterator[str]:
+    from teleop_core.devices.gamepad import Sdl
+
+    for _, name, is_known in Sdl().names():
+        yield (
+            name if is_known else f"{name}: of unknown layout, SDL_GAMECONTROLLERCONFIG may say it"
+        )
+
+
+def _space_mice() -> Iterator[str]:
+    from teleop_core.devices.spacemouse import space_mice
+
+    for name, _ in space_mice():
+        yield name
