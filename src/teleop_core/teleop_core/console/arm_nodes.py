@@ -57,6 +57,8 @@ class ArmNodes:
         start = posture(robot)
         self._own_low, self._own_high = extent(self.bodies, start)
         self._root = server.scene.add_frame(self.path, show_axes=False)
+        if arm.name:
+            server.scene.add_label(f"{self.path}/name", arm.name, anchor="top-center")
         self.drawn = BodyNodes(server, f"{self.path}/robot", self.bodies)
         self._ghost: BodyNodes | None = None
         self._is_ghost_shown = False
@@ -69,7 +71,7 @@ class ArmNodes:
         self.outline = OutlineNode(server, f"{self.path}/fixture", self._stand.quaternion)
         self._poses = self.drawn.move(start)
         self._begin: Array | None = None
-        self._side = 0.0
+        self._side, self._count = 0.0, 0
         self.low, self.high = self._room()
 
     # -- places ----------------------------------------------------------------------------------
@@ -124,15 +126,21 @@ class ArmNodes:
             joints = state[: self._robot.n]
             self._poses = self.drawn.move(joints)
             self.drawn.mark(self._at_limit(joints, view.state))
-        reference = view.get(SLAVE_SETPOINT_JS)
-        if self._ghost is not None and reference is not None and self._is_ghost_shown:
-            self._ghost.move(reference)
+        self._draw_ghost(view)
         self._draw_paths(time, view)
         force = view.get(MASTER_MEASURED_CF)
         felt = self.master.draw(
             time, view.get(MASTER_MEASURED_CP), None if force is None else force[:3]
         )
         self._draw_fixture(view, is_touched=felt > _TOUCH)
+
+    def _draw_ghost(self, view: ArmView) -> None:
+        """Draw the reference posture, every third time: it tells no more than where to."""
+        reference = view.get(SLAVE_SETPOINT_JS)
+        self._count = (self._count + 1) % 3
+        if self._ghost is None or reference is None or not self._is_ghost_shown or self._count:
+            return
+        self._ghost.move(reference)
 
     def _draw_paths(self, time: float, view: ArmView) -> None:
         measured = view.get(SLAVE_MEASURED_CP)

@@ -8,6 +8,7 @@ import viser
 
 from teleop_core.bodies import Bodies, Role, Solid
 from teleop_core.console.meshes import merged, mesh_of
+from teleop_core.console.poses import moved, set_pose
 from teleop_core.geometry import Array, rotations_from_quaternions
 
 Color = tuple[int, int, int]
@@ -18,8 +19,6 @@ ROLES: Mapping[Role, Color] = MappingProxyType({
 """Colours of solids, readable on light and on dark ground."""
 GHOST: Color = (66, 133, 244)
 AT_LIMIT: Color = (224, 49, 49)
-_STILL = 2e-5
-"""Change of a pose [m, parts of a turn] below which nothing is sent."""
 
 
 class BodyNodes:
@@ -57,11 +56,9 @@ class BodyNodes:
         Bodies whose place is not finite stay where they are.
         """
         poses = self._bodies.poses(joints)
-        change = np.abs(poses - self._drawn).max(axis=1)
-        for body in np.flatnonzero(change > _STILL).tolist():
-            frame, pose = self._list[body], poses[body]
-            frame.position, frame.wxyz = pose[:3], pose[3:]
-            self._drawn[body] = pose
+        for body in moved(poses, self._drawn):
+            set_pose(self._list[body], poses[body])
+            self._drawn[body] = poses[body]
         return poses
 
     def mark(self, joints: frozenset[int]) -> None:
@@ -89,7 +86,7 @@ def add_solids(
         meshes[role] = server.scene.add_mesh_simple(
             f"{path}/{role}", vertices.astype(np.float32), faces.astype(np.uint32),
             color=GHOST if is_ghost else ROLES[role], opacity=0.3 if is_ghost else None,
-            cast_shadow=not is_ghost, receive_shadow=False,
+            cast_shadow=False, receive_shadow=False,
         )  # fmt: skip
     return meshes
 

@@ -1,6 +1,7 @@
 """Cameras: places from which a session is seen, for the browser of one person."""
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import viser
@@ -11,6 +12,8 @@ FIELD = np.radians(45.0)
 """Vertical field of view of all cameras [rad]."""
 _FROM = np.array([-0.80, -0.42, 0.48])
 """Direction from what is seen to the first camera: behind the arm, over its right shoulder."""
+_WIDE, _HIGH = 1.05, 0.8
+"""Parts of a square picture that may be filled across and upwards: windows are rarely narrower."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +51,14 @@ class Camera:
 
 def around(low: Array, high: Array) -> Camera:
     """Camera that sees a box, given by its lowest and highest corner (3,) [m], as a whole."""
-    middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    middle, up = 0.5 * (low + high), np.array([0.0, 0.0, 1.0])
     direction = _FROM / np.linalg.norm(_FROM)
-    distance = 0.85 * radius / np.sin(0.5 * FIELD)
-    return Camera(middle + distance * direction, middle, np.array([0.0, 0.0, 1.0]))
+    turn = rotations_from_quaternions(Camera(middle + direction, middle, up).quaternion[None])[0]
+    corners = np.array(list(product(*zip(low, high, strict=True)))) - middle
+    right, down, into = (corners @ turn).T
+    half = np.tan(0.5 * FIELD)
+    needed = np.maximum(np.abs(right) / (_WIDE * half), np.abs(down) / (_HIGH * half)) - into
+    return Camera(middle + float(needed.max()) * direction, middle, up)
 
 
 def from_tool(pose: Array, size: float) -> Camera:
@@ -62,11 +69,11 @@ def from_tool(pose: Array, size: float) -> Camera:
         size: Length [m] to which the robot reaches.
     """
     turn = rotations_from_quaternions(pose[None, 3:])[0]
-    back = pose[:3] - turn @ np.array([0.10 * size, 0.0, 0.25 * size])
-    return Camera(back, pose[:3] + 0.05 * size * turn[:, 2], turn[:, 0])
+    beside = pose[:3] - size * (turn @ np.array([0.16, 0.0, 0.10]))
+    return Camera(beside, pose[:3] + 0.04 * size * turn[:, 2], turn[:, 0])
 
 
 def microscope(place: Array, size: float) -> Camera:
     """Fixed camera above a place (3,) [m], steep from above, as a microscope over the task."""
-    position = place + size * np.array([-0.08, -0.05, 0.35])
+    position = place + size * np.array([0.06, 0.0, 0.35])
     return Camera(position, place.copy(), np.array([1.0, 0.0, 0.0]))

@@ -6,12 +6,12 @@ import viser
 from teleop_core.console.arrows import ForceArrow
 from teleop_core.console.body_nodes import add_solids
 from teleop_core.console.outlines import OutlineNode
+from teleop_core.console.poses import move
 from teleop_core.console.stand import DEVICE, REST, STYLUS, Stand
 from teleop_core.console.tails import Tail
 from teleop_core.geometry import Array
 
 _HAND = (112, 72, 190)
-_STILL = 2e-5  # [m, parts of a turn]
 
 
 class MasterNodes:
@@ -53,10 +53,7 @@ class MasterNodes:
         """
         if pose is None:
             return 0.0
-        if abs(self.stylus.position - pose[:3]).max() > _STILL:
-            self.stylus.position = pose[:3]
-        if abs(self.stylus.wxyz - pose[3:]).max() > _STILL:
-            self.stylus.wxyz = pose[3:]
+        move(self.stylus, pose)
         self.tail.draw(time, pose[:3])
         return 0.0 if force is None else self._force.draw(pose[:3], force)
 

@@ -131,7 +131,7 @@ class Scene:
         self._server.scene.add_grid(
             "/ground", wide, wide, cell_size=cell, section_size=5.0 * cell,
             cell_color=(150, 150, 150), section_color=(125, 125, 125), cell_thickness=0.6,
-            section_thickness=1.0, fade_distance=2.5 * wide, shadow_opacity=0.2,
+            section_thickness=1.0, fade_distance=2.5 * wide, shadow_opacity=0.0,
             position=(middle[0], middle[1], low[2] - 1e-3),
         )  # fmt: skip
 

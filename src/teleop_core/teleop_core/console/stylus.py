@@ -9,6 +9,7 @@ import viser
 from viser import TransformControlsEvent as Event
 
 from teleop_core.console.link import View
+from teleop_core.console.poses import move
 from teleop_core.console.scene import Scene
 from teleop_core.errors import UnknownNameError
 from teleop_core.geometry import Array, turn_by
@@ -20,7 +21,6 @@ STEP_LENGTH, STEP_TURN = 1e-3, np.radians(1.0)
 """A small step [m, rad]."""
 LINGER = 1.0
 """Time for which the stylus is held after a small step, in which the next may come [s]."""
-_STILL = 1e-4  # [m, parts of a turn]
 
 
 @dataclass
@@ -65,7 +65,7 @@ class Stylus:
         may_drive: Callable[[int], bool],
         on_hold: Callable[[str, Array], None],
         on_let_go: Callable[[str], None],
-        scale: float = 0.12,
+        scale: float = 0.08,
     ) -> None:
         self._time: float | None = None
         self._may_drive, self._on_hold, self._on_let_go = may_drive, on_hold, on_let_go
@@ -138,7 +138,7 @@ class Stylus:
             hand = self._hands[arm]
             hand.measured = pose.copy()
             if hand.wanted is None:
-                _place(hand.gizmo, pose)
+                move(hand.gizmo, pose)
 
     def tick(self, dt: float) -> None:
         """Tell all poses that are held again; to be called at least every 50 ms.
@@ -182,7 +182,7 @@ class Stylus:
             if start is None or hand.client is not None:
                 return
             hand.wanted, hand.remaining = stepped(start, axis, sign), LINGER
-            _place(hand.gizmo, hand.wanted)
+            move(hand.gizmo, hand.wanted)
             self._on_hold(arm, hand.wanted.copy())
 
     def let_go(self, arm: str) -> None:
@@ -212,10 +212,3 @@ def stepped(pose: Array, axis: str, sign: int) -> Array:
     turn_by(vector, out[3:])
     out[3:] /= np.linalg.norm(out[3:])
     return out
-
-
-def _place(gizmo: viser.TransformControlsHandle, pose: Array) -> None:
-    if np.abs(gizmo.position - pose[:3]).max() > _STILL:
-        gizmo.position = pose[:3]
-    if np.abs(gizmo.wxyz - pose[3:]).max() > _STILL:
-        gizmo.wxyz = pose[3:]

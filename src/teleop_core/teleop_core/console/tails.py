@@ -8,9 +8,9 @@ from teleop_core.geometry import Array
 Color = tuple[int, int, int]
 LENGTH = 10.0
 """Time that a tail shows [s]."""
-PERIOD = 0.2
+PERIOD = 0.25
 """Time between two drawings of a tail [s]."""
-_POINTS = 200
+_POINTS = 160
 _SHORTEST = 1e-4  # between two points of it [m]
 
 
@@ -32,7 +32,7 @@ class Tail:
         self._color = np.array(color, np.float64)
         self._sampled = self._drawn = -np.inf
         self._background = np.full(3, 255.0)
-        self._is_hidden = True
+        self._is_hidden = False
         self._line = server.scene.add_line_segments(
             name, np.zeros((_POINTS, 2, 3), np.float32), np.zeros((_POINTS, 2, 3), np.uint8),
             thickness=thickness, thickness_units="screen", visible=False,
