@@ -31,6 +31,7 @@ demo: setup
 	$(BIN)/teleop evaluate $(OUT)/demo/coarse_box $(OUT)/demo/fine_box $(OUT)/demo/live \
 	    --json $(OUT)/demo/scores.json --html $(OUT)/demo/report.html
 	@echo "$(CURDIR)/$(OUT)/demo/report.html"
+	@echo "to see it and be the hand: $(BIN)/teleop console"
 
 lint: setup
 	$(BIN)/ruff check .

@@ -22,7 +22,7 @@ def files(folder: str, pattern: str) -> tuple[str, list[str]]:
 
 setup(
     name="teleop_core",
-    version="0.5.0",
+    version="0.6.0",
     description="Master-slave teleoperation stack for ROS 2 Jazzy",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_core", "teleop_core.*"]),
@@ -76,6 +76,8 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/teleop_core"]),
         ("share/teleop_core", ["package.xml"]),
         files("config", "*.yaml"),
+        files("config", "*.json"),
+        files("config", "*.rviz"),
         files("config/robots", "*.yaml"),
         files("launch", "*.launch.py"),
     ],

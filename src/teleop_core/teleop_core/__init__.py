@@ -20,7 +20,7 @@ Everything a user needs is here:
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-__version__ = "0.5.0"
+__version__ = "0.6.0"
 
 if TYPE_CHECKING:
     from teleop_core import topics
