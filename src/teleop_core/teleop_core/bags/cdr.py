@@ -38,6 +38,15 @@ class Template:
         self.length(len(data))
         self._extend(data, b"\xff")
 
+    def numbers(self, code: str, *numbers: float) -> None:
+        """Append constant numbers of one struct code."""
+        self.block(code, struct.pack(f"<{len(numbers)}{code}", *numbers))
+
+    def block(self, code: str, data: bytes) -> None:
+        """Append the bytes of constant numbers of one struct code."""
+        self._align(struct.calcsize(code))
+        self._extend(data, b"\xff")
+
     def gap(self, code: str, columns: slice) -> None:
         """Append numbers of one struct code that vary: these columns of the values."""
         self._align(struct.calcsize(code))

@@ -33,6 +33,10 @@ class Newest:
         self._data[name] = data
         return True
 
+    def data(self, name: str) -> bytes:
+        """Newest message of a topic; empty before the first."""
+        return self._data[name]
+
     def values(self, topic: Topic, joint_names: tuple[str, ...] = ()) -> tuple[int, Array] | None:
         """Stamp [ns] and values of the newest message; None without a sound one."""
         data = self._data[topic.name]
@@ -106,7 +110,7 @@ class ModelTopics:
         self._publishers: dict[str, Any] = {}
         for topic in topics:
             try:
-                publisher = node.open_publisher(replace(topic, name=f"/{topic.name}"))
+                publisher = node.open_publisher(absolute(topic))
             except (ImportError, AttributeError):
                 continue
             self._publishers[topic.name] = publisher
@@ -124,3 +128,8 @@ def _joints(arm: ArmModel) -> Topic:
 
 def _stylus(arm: ArmModel) -> Topic:
     return MASTER_MEASURED_CP.of_arm(arm.arm)
+
+
+def absolute(topic: Topic) -> Topic:
+    """The topic by its full name: its arm's namespace holds that of the node already."""
+    return replace(topic, name=f"/{topic.name}")

@@ -18,6 +18,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rosgraph_msgs.msg import Clock
 
 from teleop_core.bags.reader import Bag
+from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
 from teleop_core.errors import ParameterError, RecordingError
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.quality import profile
@@ -25,6 +26,7 @@ from teleop_core.nodes.streams import message_type
 from teleop_core.topics import BY_NAME, Quality
 
 CLOCK = "clock"
+_KNOWN = BY_NAME | {topic.name: topic for topic in (TF, ROBOT_DESCRIPTION)}
 DISCOVERY_TIME = 1.0
 """Time for subscribers to be found before the first message [s]."""
 
@@ -41,7 +43,7 @@ def play(
 
     Args:
         bag: The recording.
-        topics: Topics to publish; None for all.
+        topics: Topics to publish; None for all, without ``/tf`` where its type is not installed.
         rate: Times real time, > 0.
         console: Where the progress is shown, if it is a terminal.
         loop: Whether to begin again at the end. Nodes take the older stamps then as those of a
@@ -60,8 +62,10 @@ def play(
         raise ParameterError("--rate", rate, "a number above 0")
     if not 0.0 <= clock <= 1000.0:
         raise ParameterError("--clock", clock, "from 0 to 1000 Hz")
-    names = list(bag.topics) if topics is None else [name.removeprefix("/") for name in topics]
-    bag.require(names if topics is not None else ())
+    names = [name.removeprefix("/") for name in topics or ()]
+    bag.require(names)
+    if topics is None:
+        names = [name for name in bag.topics if name != TF.name or _is_installed(bag, name)]
     clock_ns = round(1e9 / clock) if clock else 0
     if clock_ns:
         names = [name for name in names if name != CLOCK]
@@ -115,17 +119,26 @@ def _publishers(bag: Bag, names: list[str], *, has_clock: bool) -> Iterator[dict
     try:
         publishers = {}
         for name, kind in types.items():
-            topic = BY_NAME.get(name)
+            topic = _KNOWN.get(name)
             publishers[name] = node.create_publisher(kind, name, profile(topic) if topic else 10)
         if has_clock:
             publishers[CLOCK] = node.create_publisher(Clock, f"/{CLOCK}", 1)
         yield publishers
         for name, publisher in publishers.items():
-            if name not in BY_NAME or BY_NAME[name].quality is not Quality.STREAM:
+            if name not in _KNOWN or _KNOWN[name].quality is not Quality.STREAM:
                 publisher.wait_for_all_acked(Duration(seconds=1))
     finally:
         node.destroy_node()
         context.try_shutdown()
+
+
+def _is_installed(bag: Bag, name: str) -> bool:
+    """Whether messages of a topic can be published; ``tf2_msgs`` comes with ROS alone."""
+    try:
+        _type_in(bag, name)
+    except RecordingError:
+        return False
+    return True
 
 
 def _type_in(bag: Bag, name: str) -> Any:

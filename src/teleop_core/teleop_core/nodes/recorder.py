@@ -17,6 +17,7 @@ from teleop_core.errors import RecordingError, SessionError, TeleopError
 from teleop_core.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.files import graph_of, session_of
+from teleop_core.nodes.markers import LiveMarkers
 from teleop_core.nodes.model import LiveModel, ModelTopics
 from teleop_core.nodes.recorder_services import serve
 from teleop_core.nodes.sender import Sender
@@ -146,6 +147,8 @@ class RecorderNode(CoreNode):
         topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
         self._model = self._model_of(configuration, parameters)
         self._model_topics = ModelTopics(self, self._model.topics)
+        arms = ("/".join(filter(None, (self.arm, arm))) for arm in graph.namespaces)
+        self._markers = [LiveMarkers(self, arm) for arm in arms]
         every = parameters.every_nth((*topics, *self._model.topics))
         self._recorded = [topic for topic in topics if every[topic.name]]
         self._mark_topic, self._part, self._marks = MARKS.of_arm(self.arm), 0, 0
@@ -240,6 +243,8 @@ class RecorderNode(CoreNode):
         came.sort(key=lambda message: message[0])
         self._last.update({m[1]: m[2] for m in came if m[1].quality is Quality.LATCHED})
         drawn = self._model.messages(came)
+        for markers in self._markers:
+            markers.take(came)
         for topic, data, _ in drawn:
             self._model_topics.send(topic, data)
         if not self._is_recording:

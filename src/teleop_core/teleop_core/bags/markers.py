@@ -1,0 +1,101 @@
+"""Markers: shapes that RViz and Foxglove draw beside a robot, as bytes, without ROS.
+
+They are built by hand, since a path of hundreds of points is one block of bytes here and hundreds
+of objects in the messages of rclpy: a running session has no time for these.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+
+from teleop_core.bags.cdr import Template
+from teleop_core.bags.layouts import SECOND_NS
+from teleop_core.geometry import Array
+from teleop_core.topics import Kind, Quality, Topic
+
+MARKERS = Topic(
+    "teleop/markers", Kind.REPORT, quality=Quality.REPORT,
+    message="visualization_msgs/msg/MarkerArray",
+)  # fmt: skip
+"""Fixture, forces and paths of an arm, drawn."""
+Color = tuple[float, float, float, float]
+"""Red, green, blue, opacity, 0 to 1."""
+_NONE = np.zeros((0, 3))
+
+
+class Shape(IntEnum):
+    """Values of the field ``type`` of visualization_msgs/Marker."""
+
+    ARROW = 0
+    CUBE = 1
+    SPHERE = 2
+    LINE_STRIP = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Marker:
+    """One shape.
+
+    Attributes:
+        name: Its namespace, which tells it from the others of its topic.
+        frame: Frame that it is in.
+        shape: What it is; a cube or sphere fills the box of its scale.
+        pose: Its place (7,): x, y, z [m], quaternion w, x, y, z.
+        scale: Size along x, y, z [m]; a line's width comes first, an arrow between two points has
+            the diameters of shaft and head, and the length of the head.
+        color: Its colour.
+        points: Of a line, or from where to where an arrow points (N, 3) [m].
+        is_shown: Whether it is there; false takes it away.
+    """
+
+    name: str
+    frame: str
+    shape: Shape
+    pose: Array = field(default_factory=lambda: np.array([0.0, 0, 0, 1, 0, 0, 0]))
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    color: Color = (1.0, 1.0, 1.0, 1.0)
+    points: Array = field(default_factory=_NONE.copy)
+    is_shown: bool = True
+
+
+def marker_message(stamp_ns: int, markers: Iterable[Marker]) -> bytes:
+    """Message of ``visualization_msgs/MarkerArray``.
+
+    Args:
+        stamp_ns: Stamp of all of them [ns].
+        markers: The shapes.
+    """
+    shapes, cdr = list(markers), Template()
+    cdr.length(len(shapes))
+    for marker in shapes:
+        _append(cdr, stamp_ns, marker)
+    return bytes(cdr.template)
+
+
+def _append(cdr: Template, stamp_ns: int, marker: Marker) -> None:
+    x, y, z, qw, qx, qy, qz = marker.pose.tolist()
+    cdr.numbers("i", stamp_ns // SECOND_NS)
+    cdr.numbers("I", stamp_ns % SECOND_NS)
+    cdr.string(marker.frame)
+    cdr.string(marker.name)
+    cdr.numbers("i", 0, int(marker.shape), 0 if marker.is_shown else 2)
+    cdr.numbers("d", x, y, z, qx, qy, qz, qw, *marker.scale)
+    cdr.numbers("f", *marker.color)
+    cdr.numbers("I", 0, 0)  # stays until it is replaced
+    cdr.numbers("B", 1)  # moves with its frame
+    cdr.length(len(marker.points))
+    if len(marker.points):
+        cdr.block("d", np.ascontiguousarray(marker.points, np.float64).tobytes())
+    cdr.length(0)  # colours of the points
+    cdr.string("")  # texture_resource
+    cdr.numbers("I", 0, 0)
+    for _ in range(2):  # frame and format of the texture
+        cdr.string("")
+    cdr.length(0)
+    cdr.length(0)  # uv_coordinates
+    for _ in range(3):  # text, mesh_resource, name of mesh_file
+        cdr.string("")
+    cdr.length(0)
+    cdr.numbers("B", 0)
