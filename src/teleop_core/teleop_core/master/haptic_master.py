@@ -29,6 +29,7 @@ from teleop_core.master.hand import HAND_PARAMETERS, HandParameters, join, move_
 from teleop_core.master.rendering import RENDERING_PARAMETERS, RENDERING_STATE, render
 from teleop_core.operation.states import State
 from teleop_core.operators import OPERATORS, Setting
+from teleop_core.operators.follower import MOST, WANTED
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.remote import RemoteHand
 from teleop_core.operators.shapes import PHASES
@@ -53,6 +54,8 @@ REST_TILT = math.radians(-23.4)
 REST_POSITION = (0.0, -0.065511, -0.088114)
 BLOCK = 1000
 """Ticks for which the wanted motion and the noise are drawn at once, at most."""
+_DOUBT_NS = 1_000_000_000
+"""Time for which a source of force is not believed after it was out of range [ns]."""
 PRESS_TIME = 0.1
 """How long the operator presses the fixture or the mode button [s]."""
 
@@ -87,6 +90,11 @@ class HapticMasterParameters:
     force_timeout: float = parameter(
         0.1, unit="s", lower=0.002, upper=5.0, doc="without a newer servo_cf the force is zero"
     )
+    force_range: float = parameter(
+        30.0, unit="N", lower=0.1, upper=1000.0,
+        doc="a servo_cf beyond it comes from a broken sensor: no force until it was within for 1 s",
+        source="assumed: no stage asks for more than 20 N, no such device gives more than 10",
+    )  # fmt: skip
     patience: float = parameter(
         10.0, unit="s", lower=0.0, upper=3600.0, fixed=True,
         doc="the operator begins when teleop/state says that the slave follows, or after this",
@@ -98,7 +106,7 @@ class HapticMasterParameters:
 
 
 _PARAMETERS = [
-    *((name, "f8") for name in ("resolution", "gimbal", "tremor", "frequency")),
+    *((name, "f8") for name in ("resolution", "gimbal", "tremor", "frequency", "force_range")),
     ("center", "f8", (3,)), ("half", "f8", (3,)), ("patience_ns", "i8"),
     *HAND_PARAMETERS, *RENDERING_PARAMETERS,
 ]  # fmt: skip
@@ -106,10 +114,9 @@ _STATE = [
     *((name, "f8", (3,)) for name in ("position", "speed", "hand", "hand_speed", "wanted",
       "phase", "wander", "reading", "rate", "turning")),
     ("attitude", "f8", (4,)), ("next", "i8"), ("next_noise", "i8"), ("has_begun", "i8"),
-    ("first_ns", "i8"), ("is_stopped", "i8"), *RENDERING_STATE, *CONTACT_STATE,
+    ("first_ns", "i8"), ("is_stopped", "i8"), ("doubted_ns", "i8"), ("doubted", "f8"),
+    *RENDERING_STATE, *CONTACT_STATE,
 ]  # fmt: skip
-_WANTED = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("buttons", "f8", (3,)),
-           ("tremor", "f8", (3,))]  # fmt: skip
 _STATE_OF_SLAVE, _FAULT = OPERATION.index("state"), int(State.FAULT)
 _IS_FOLLOWING = STATE["is_following"]
 _MOST = MASTER_CONTACT.columns.index("largest_force")
@@ -129,6 +136,17 @@ def _begins(p: Any, s: Any, row: Any) -> bool:
     if row.now_ns - s.first_ns >= p.patience_ns:
         s.has_begun = 1
     return s.has_begun > 0
+
+
+@inner
+def _is_sound(p: Any, s: Any, force: Array, now_ns: int) -> bool:
+    """Whether the force (6,) can be given: within its range now, and in the last second."""
+    square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
+    if not square <= p.force_range * p.force_range:  # NaN is not
+        s.doubted_ns, s.doubted = now_ns, square**0.5
+    elif s.doubted_ns != 0 and now_ns - s.doubted_ns > _DOUBT_NS:
+        s.doubted_ns = 0
+    return bool(s.doubted_ns == 0)
 
 
 @kernel
@@ -152,7 +170,8 @@ def haptic_master_step(
         row: Signals.
         dt: Tick [s].
     """
-    if s.is_stopped or row.slave_operation[_STATE_OF_SLAVE] == _FAULT:
+    is_sound = _is_sound(p, s, row.master_servo_cf, row.now_ns)
+    if s.is_stopped or not is_sound or row.slave_operation[_STATE_OF_SLAVE] == _FAULT:
         for i in range(row.master_servo_cf.shape[0]):
             row.master_servo_cf[i] = 0.0
     if _begins(p, s, row):
@@ -197,7 +216,7 @@ class HapticMaster(RunningStage):
         super().__init__(HAPTIC_MASTER, 0, dt)
         self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
         # The first record of what is wanted is that of the present tick.
-        self._wanted, self._noises = records(_WANTED, BLOCK + 1), np.zeros((BLOCK, 6))
+        self._wanted, self._noises = records(WANTED, BLOCK + 1), np.zeros((BLOCK, 6))
         self._fixed = parameters
         self.kernel = haptic_master_step
         self.retune(parameters)
@@ -212,6 +231,9 @@ class HapticMaster(RunningStage):
         self.ahead = min(self._operator.ahead, BLOCK)
         setting = Setting(wanted, phases, self._fixed.seed, self._fixed.device)
         self._motion = self._asked(self._operator.make, wanted.kind.parameters, setting)
+        self._person, buttons = self._motion, self._fixed.buttons
+        is_person = isinstance(self._motion, RemoteHand)
+        self._draws_hand = is_person and not (buttons.clutch or buttons.fixture or buttons.mode)
         self._tick, self._end, self._end_of_noise = 0, 1, 0
         self._rest = np.empty(4)
         quaternion_from_rotation(rotation("x", REST_TILT), self._rest)
@@ -248,6 +270,7 @@ class HapticMaster(RunningStage):
         operator = OPERATORS.find(self._fixed.operator.kind.kind)
         p["tremor"] = 0.0 if operator.trembles else hand.tremor_amplitude
         p["frequency"] = hand.tremor_frequency
+        p["force_range"] = parameters.force_range
         p["patience_ns"] = round(parameters.patience * 1e9)
         p["center"] = np.subtract(REST_POSITION, device.start)
         p["half"] = 0.5 * np.array(device.workspace)
@@ -255,6 +278,11 @@ class HapticMaster(RunningStage):
     def press(self, *, is_pressed: bool) -> None:
         """Give no force from the next tick on while an emergency stop is pressed."""
         self.state["is_stopped"] = is_pressed
+
+    @property
+    def doubted_force(self) -> float:
+        """Force that was out of range and is not believed [N]; 0 while all is well."""
+        return float(self.state["doubted"]) if self.state["doubted_ns"] else 0.0
 
     @property
     def has_begun(self) -> bool:
@@ -294,6 +322,10 @@ class HapticMaster(RunningStage):
     def _draw(self, drawn: Any) -> None:
         """Fill records with what the operator wants in the ticks that follow."""
         count = len(drawn)
+        if self._draws_hand and count <= MOST:  # a tenth of the time of what follows
+            drawn[:] = self._person.draw((self._tick + 1) * self.dt, self.dt, count)
+            self._tick += count
+            return
         times = np.arange(self._tick + 1, self._tick + count + 1, dtype=np.float64) * self.dt
         self._tick += count
         moves = self._moves(times)

@@ -87,6 +87,9 @@ class HapticMasterNode(TickingNode):
         found = []
         if not self.stage.has_begun:
             found.append("waits until teleop/state says that the slave follows")
+        if doubted := self.stage.doubted_force:
+            bound = self.parameters.force_range
+            found.append(f"no force: {doubted:.3g} N came, at most {bound:g}: a broken sensor")
         most = float(self.stage.signals[MASTER_CONTACT.field][_MOST])
         if 0.0 < most < self.parameters.device.peak_force:
             found.append(f"its motors are warm: {most:.2f} N at most")
