@@ -34,6 +34,7 @@ class Origin:
         plant: What the simulated slave was; "ideal" of versions that knew no other, None if no
             simulator is told of.
         controller: Its control law; None if it is not told.
+        geometry: Settings that its robot was made with.
         tool: Quaternions (4,) of the maps from the master's base to the slave's axes, and from the
             stylus to the tool; None where the tool does not turn as much as the stylus.
     """
@@ -45,6 +46,7 @@ class Origin:
     tool: tuple[Array, Array] | None = None
     plant: str | None = None
     controller: str | None = None
+    geometry: tuple[str, ...] = ()
 
     @cached_property
     def chain(self) -> tuple[tuple[str, Topic], ...]:
@@ -75,7 +77,7 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
     layer = _layer(bag)
     return Origin(
         _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
-        _tool(layer, arm), *_slave(layer, arm),
+        _tool(layer, arm), *_slave(layer, arm), _geometry(layer, arm),
     )  # fmt: skip
 
 
@@ -117,6 +119,13 @@ def _slave(layer: Layer, arm: str) -> tuple[str | None, str | None]:
         return None, None
     law = said.get("controller.kind", "pid")
     return str(said.get("plant.kind", "ideal")), str(law)
+
+
+def _geometry(layer: Layer, arm: str) -> tuple[str, ...]:
+    """Settings of the robot of the arm, or of all arms."""
+    name = SLAVE_SIM.name
+    said = (layer.get(name, {}) | layer.get(f"{arm}/{name}", {})).get("geometry")
+    return tuple(map(str, said)) if isinstance(said, list | tuple) else ()
 
 
 def _tool(layer: Layer, arm: str) -> tuple[Array, Array] | None:

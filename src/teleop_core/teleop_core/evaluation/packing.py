@@ -86,10 +86,22 @@ def pack(values: Numbers, bits: float) -> Packed:
     if len(numbers) <= EXACT:  # such as those of an axis with a logarithmic scale
         exact = deflated(numbers.astype("<f8").tobytes())
         return Packed(len(numbers), 0.0, 0.0, 0, 8, exact, "", wide=True)
+    filled = _filled(numbers, ~np.isfinite(numbers))
+    return pack_to(numbers, step_for(filled, bits))
+
+
+def pack_to(values: Numbers, step: float) -> Packed:
+    """Numbers rounded to whole steps from the first, in as many bits as that takes.
+
+    Args:
+        values: Shape (N,), N >= 1; what is not finite becomes NaN.
+        step: Distance of neighbouring levels, in the unit of the numbers; the range has at most
+            2³⁰ of them.
+    """
+    numbers = np.asarray(values, dtype=float)
     is_hole = ~np.isfinite(numbers)
     filled = _filled(numbers, is_hole)
     first = float(filled[0])
-    step = step_for(filled, bits)
     levels = np.round((filled - first) / step).astype(np.int64)
     order, differences = _shortest(levels)
     codes = ((differences << 1) ^ (differences >> 63)).astype("<u4")

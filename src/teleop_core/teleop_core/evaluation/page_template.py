@@ -8,7 +8,7 @@ POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; font-src data:; worker-src blob:"
 )
-_SCRIPTS = ("unpack", "thin", "bands", "paths", "plot", "recording", "page")
+_SCRIPTS = ("unpack", "thin", "bands", "paths", "plot", "replay", "recording", "page")
 
 
 @cache

@@ -80,6 +80,7 @@ METRICS: Registry[type[Metric]] = Registry(
     "metrics",
     {
         "samples": f"{_FOLDER}.samples:SamplesMetric",
+        "replay": f"{_FOLDER}.replay:ReplayMetric",
         "path": f"{_FOLDER}.path:PathMetric",
         "reach": f"{_FOLDER}.reach:ReachMetric",
         "asked_error_mm": f"{_FOLDER}.asked_error:AskedErrorMetric",
