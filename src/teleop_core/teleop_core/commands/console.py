@@ -99,6 +99,8 @@ def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
 def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
     """Start sessions one after the other, each with the page, until Ctrl-C."""
     from teleop_core.console.app import Console, splash
+    from teleop_core.console.recorded_arms import parameters_of
+    from teleop_core.session.layers import SESSION
 
     ros_module("console_session")
     from teleop_core.nodes.console_session import ConsoleSession
@@ -117,7 +119,8 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
                 raise
         wanted.clear()
         with session, link:
-            console = Console(server, link, wanted.append)
+            of_session = parameters_of(configuration, (SESSION,))
+            console = Console(server, link, wanted.append, of_session)
             console.run(lambda session=session: session.is_over or bool(wanted))  # type: ignore[misc]
         session.check()
         print(f"{out}: recorded; next: teleop evaluate {out}", flush=True)

@@ -2,11 +2,11 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from teleop_core.console.link import Link
+from teleop_core.console.link import Link, ParameterInfo
 from teleop_core.console.panel import Panel
 from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
@@ -26,11 +26,13 @@ class Console:
         server: Where it is served.
         link: The session.
         renew: Begins a new session with other settings; None where the session is not ours.
+        of_session: Parameters of the session as a whole, which no node has.
     """
 
     def __init__(
         self, server: ConsoleServer, link: Link,
         renew: Callable[[tuple[str, ...]], None] | None = None,
+        of_session: Mapping[tuple[str, str], ParameterInfo] | None = None,
     ) -> None:  # fmt: skip
         self._server, self._link, drivers = server, link, server.drivers
         theme(server.viser, is_dark=False)
@@ -40,7 +42,13 @@ class Console:
             may_drive=drivers.hold,
         )  # fmt: skip
         self.panel = Panel(
-            server.viser, link, drivers.may_drive, drivers.take, lambda: drivers.driver, renew
+            server.viser,
+            link,
+            drivers.may_drive,
+            drivers.take,
+            lambda: drivers.driver,
+            renew,
+            of_session,
         )
         with self.panel.stylus_folder:
             Steps(

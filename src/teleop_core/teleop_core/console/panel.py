@@ -4,14 +4,14 @@ import html
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Literal
 
 import viser
 
 from teleop_core.console.history import History, LiveScores
-from teleop_core.console.link import Link, View
+from teleop_core.console.link import Link, ParameterInfo, View
 from teleop_core.console.plots import Plots
 from teleop_core.console.settings import SettingsPanel
 from teleop_core.errors import TeleopError
@@ -44,12 +44,14 @@ class Panel:
         take: Makes a browser the one that drives.
         driver: Says who drives: the number of a browser, or None.
         renew: Begins a new session with other settings; None where the session is not ours.
+        of_session: Parameters of the session as a whole, which no node has.
     """
 
     def __init__(
         self, server: viser.ViserServer, link: Link, may_drive: Callable[[int], bool],
         take: Callable[[int], None], driver: Callable[[], int | None],
         renew: Callable[[tuple[str, ...]], None] | None = None,
+        of_session: Mapping[tuple[str, str], ParameterInfo] | None = None,
     ) -> None:  # fmt: skip
         self._server, self._gui, self._link = server, server.gui, link
         self._may_drive, self._take, self._driver = may_drive, take, driver
@@ -66,7 +68,7 @@ class Panel:
         with tabs.add_tab("Plots"):
             self._add_plots()
         with tabs.add_tab("Settings"):
-            self.settings = SettingsPanel(server, link, self._guard, renew)
+            self.settings = SettingsPanel(server, link, self._guard, renew, of_session)
         with tabs.add_tab("Scores"):
             self._add_scores()
         self.view_tab = tabs.add_tab("View")
@@ -246,7 +248,7 @@ def _status_html(view: View, title: str, driver: int | None) -> str:
             lines.append(f"{is_fine} × {arm.state['gain']:g} · {hand} · {box}")
     where = html.escape(view.recording.name) if view.recording else "not recording"
     who = "nobody drives" if driver is None else f"browser {driver + 1} drives"
-    lines.append(f"{html.escape(title)} · run {view.run + 1} · {where} · {who} · {view.time:.0f} s")
+    lines.append(f"{html.escape(title)} · run {view.run + 1} · {where} · {who}")
     lines += [f'<span style="color:#e8a100">⚠ {html.escape(text)}</span>' for text in view.news[:4]]
     body = "<br>".join(lines)
     # Of one height, so that what is below stays where it is when there is more to say.

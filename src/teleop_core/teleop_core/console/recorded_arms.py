@@ -221,11 +221,20 @@ def _in_words(operation: Mapping[str, float], joints: tuple[str, ...]) -> str:
     return ""
 
 
-def parameters_of(configuration: Configuration | None) -> dict[tuple[str, str], ParameterInfo]:
-    """Parameters of all stages with their declarations, by node and name; all of them fixed."""
+def parameters_of(
+    configuration: Configuration | None, only: tuple[str, ...] = ()
+) -> dict[tuple[str, str], ParameterInfo]:
+    """Parameters of groups with their declarations, by node and name; all of them fixed.
+
+    Args:
+        configuration: The session; None for none.
+        only: Names of the groups that are wanted; empty for all.
+    """
     found = {}
     groups: dict[str, Any] = {} if configuration is None else configuration.groups
     for node, group in groups.items():
+        if only and node not in only:
+            continue
         values = values_of(group)
         for spec in specs(type(group)):
             if spec.name in values:

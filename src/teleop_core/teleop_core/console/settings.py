@@ -13,7 +13,7 @@ QUICK = (
     ("motion_scaling", "mode"), ("motion_scaling", "coarse_gain"), ("motion_scaling", "fine_gain"),
     ("motion_scaling", "fixture.kind"), ("motion_scaling", "fixture.box.size"),
     ("motion_scaling", "fixture.sphere.diameter"), ("slave_sim", "reference_filter.is_on"),
-    ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"),
+    ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"), ("teleop", "delays"),
 )  # fmt: skip
 """What people change most, by stage and name."""
 Guard = Callable[[int | None], bool]
@@ -29,6 +29,7 @@ class SettingsPanel:
         may_drive: Asked before anything is changed.
         renew: Begins a new session with other texts ``node.name=value``, for what is fixed while
             one runs; None where the session is not ours.
+        of_session: Parameters of the session as a whole, which no node has.
 
     Attributes:
         known: All parameters, as they were when they were last asked for.
@@ -37,8 +38,10 @@ class SettingsPanel:
     def __init__(
         self, server: viser.ViserServer, link: Link, may_drive: Guard,
         renew: Callable[[tuple[str, ...]], None] | None = None,
+        of_session: Mapping[tuple[str, str], ParameterInfo] | None = None,
     ) -> None:  # fmt: skip
         self._gui, self._link, self._may, self._renew = server.gui, link, may_drive, renew
+        self._of_session = dict(of_session or {})
         self.known: Mapping[tuple[str, str], ParameterInfo] = {}
         self._wanted: dict[tuple[str, str], Setting] = {}
         self._told = self._gui.add_markdown("parameters are being asked for …")
@@ -54,7 +57,7 @@ class SettingsPanel:
     def refresh(self) -> None:
         """Ask the nodes anew, and show what they say; takes a moment."""
         try:
-            self.known = self._link.parameters()
+            self.known = {**self._of_session, **self._link.parameters()}
         except TeleopError as error:
             self._told.content = f"**{error}**"
             return
