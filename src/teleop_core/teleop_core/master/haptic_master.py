@@ -231,9 +231,9 @@ class HapticMaster(RunningStage):
         self.ahead = min(self._operator.ahead, BLOCK)
         setting = Setting(wanted, phases, self._fixed.seed, self._fixed.device)
         self._motion = self._asked(self._operator.make, wanted.kind.parameters, setting)
-        self._person, buttons = self._motion, self._fixed.buttons
-        is_person = isinstance(self._motion, RemoteHand)
-        self._draws_hand = is_person and not (buttons.clutch or buttons.fixture or buttons.mode)
+        buttons = self._fixed.buttons
+        has_presses = bool(buttons.clutch or buttons.fixture or buttons.mode)
+        self._person = None if has_presses else self.hand
         self._tick, self._end, self._end_of_noise = 0, 1, 0
         self._rest = np.empty(4)
         quaternion_from_rotation(rotation("x", REST_TILT), self._rest)
@@ -322,7 +322,7 @@ class HapticMaster(RunningStage):
     def _draw(self, drawn: Any) -> None:
         """Fill records with what the operator wants in the ticks that follow."""
         count = len(drawn)
-        if self._draws_hand and count <= MOST:  # a tenth of the time of what follows
+        if self._person is not None and count <= MOST:  # faster than by way of turns
             drawn[:] = self._person.draw((self._tick + 1) * self.dt, self.dt, count)
             self._tick += count
             return

@@ -10,36 +10,43 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.geometry import Array, turn_between, turn_by, turn_within
-from teleop_core.kernels import inner, kernel, records
+from teleop_core.geometry import Array, turn_between, turn_by
+from teleop_core.kernels import bound, inner, kernel, records
 
+MOST = 4
+"""Ticks for which it can be asked at once: what is wanted is so much later at most."""
+WANTED = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("buttons", "f8", (3,)),
+          ("tremor", "f8", (3,))]  # fmt: skip
+"""Fields of what a hand wants in a tick: place [m] and attitude of the stylus, quaternion, in the
+master's base; clutch, fixture, mode, 1 pressed; and tremor [m]."""
 _BOUNDS = [
     ("rate", "f8"), ("speed", "f8"), ("acceleration", "f8"), ("turn_speed", "f8"),
-    ("turn_acceleration", "f8"), ("low", "f8", (3,)), ("high", "f8", (3,)), ("start", "f8", (7,)),
+    ("turn_acceleration", "f8"), ("low", "f8", (3,)), ("high", "f8", (3,)),
 ]  # fmt: skip
 _STATE = [
-    ("time", "f8"), ("pose", "f8", (7,)), ("velocity", "f8", (3,)), ("turning", "f8", (3,)),
-    ("target", "f8", (7,)),
+    ("time", "f8"), ("next", "f8"), ("tick", "f8"), ("pose", "f8", (7,)),
+    ("velocity", "f8", (3,)), ("turning", "f8", (3,)), ("target", "f8", (7,)),
+    ("buttons", "f8", (3,)),
 ]  # fmt: skip
 
 
 @kernel
-def follow(b: Any, s: Any, times: Array, rows: Array) -> None:
-    """Follow the target up to each time, and write where the stylus is then.
+def follow(b: Any, s: Any, rows: Any) -> None:
+    """Follow the target for some ticks, and write where the stylus is in each.
 
     Args:
         b: Bounds: ``rate`` [1/s], twice the inverse of the delay; largest speeds and accelerations
-            [m/s, m/s², rad/s, rad/s²]; the room's corners ``low`` and ``high`` (3,) [m]; and the
-            ``start`` (7,), both in the master's base.
-        s: State: ``time`` [s], ``pose`` (7,), its velocities, and the ``target`` (7,), at most one
-            unit of length off in its quaternion; written.
-        times: Rising times (N,) [s]; those that are not later than the state's repeat it.
-        rows: Rows (N, 6 or more) of :data:`teleop_core.operators.Motion`; written.
+            [m/s, m/s², rad/s, rad/s²]; and the room's corners ``low`` and ``high`` (3,) [m] in the
+            master's base.
+        s: State: ``time`` [s], ``pose`` (7,), its velocities, the ``target`` (7,), the ``buttons``
+            (3,), the time of the ``next`` tick and the length of each, ``tick`` [s]; written.
+        rows: Records (N,) of :data:`WANTED`; written, but for the tremor.
     """
     gap, turn = np.empty(3), np.empty(3)
-    for k in range(times.shape[0]):
-        h = max(times[k] - s.time, 0.0)
+    for k in range(rows.shape[0]):
+        row, h = rows[k], max(s.next - s.time, 0.0)
         s.time += h
+        s.next += s.tick
         for i in range(3):
             gap[i] = min(max(s.target[i], b.low[i]), b.high[i]) - s.pose[i]
         turn_between(s.pose[3:7], s.target[3:7], turn)
@@ -52,8 +59,10 @@ def follow(b: Any, s: Any, times: Array, rows: Array) -> None:
         turn_by(turn, s.pose[3:7])
         _normalise(s.pose[3:7])
         for i in range(3):
-            rows[k, i] = s.pose[i] - b.start[i]
-        turn_within(b.start[3:7], s.pose[3:7], rows[k, 3:6])
+            row.wanted[i] = s.pose[i]
+            row.buttons[i] = s.buttons[i]
+        for i in range(4):
+            row.attitude[i] = s.pose[3 + i]
 
 
 @inner
@@ -111,7 +120,9 @@ class Follower:
         b["speed"], b["turn_speed"] = speed
         b["acceleration"], b["turn_acceleration"] = acceleration
         b["low"], b["high"] = room
-        b["start"] = s["pose"] = s["target"] = start
+        s["pose"] = s["target"] = start
+        self._rows = [records(WANTED, count) for count in range(MOST + 1)]
+        self._follow = [bound(follow, b, s, rows) for rows in self._rows]
 
     @property
     def time(self) -> float:
@@ -134,8 +145,21 @@ class Follower:
         s["target"][:3] += s["velocity"] / b["rate"]
         turn_by(s["turning"] / b["rate"], s["target"][3:])
 
-    def go_on(self, times: Array) -> Array:
-        """Rows (N, 12) of :data:`teleop_core.operators.Motion`: buttons and tremor are zero."""
-        rows = np.zeros((len(times), 12))
-        follow(self._bounds, self._state, np.ascontiguousarray(times), rows)
-        return rows
+    def press(self, buttons: tuple[bool, ...]) -> None:
+        """Show buttons clutch, fixture and mode from now on."""
+        self._state["buttons"] = buttons
+
+    def go_on(self, first: float, tick: float, count: int) -> Any:
+        """Go on for some ticks.
+
+        Args:
+            first: Time of the first one [s], not before :attr:`time`.
+            tick: Time from one to the next [s].
+            count: How many, 1 to :data:`MOST`.
+
+        Returns:
+            Records (count,) of :data:`WANTED`, which the next call writes again.
+        """
+        self._state["next"], self._state["tick"] = first, tick
+        self._follow[count]()
+        return self._rows[count]

@@ -8,7 +8,7 @@ clutch is pressed then, so that the slave holds.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -19,14 +19,15 @@ from teleop_core.geometry import (
     multiply_quaternions,
     quaternion_from_rotation,
     rotation,
+    turn_within,
 )
 from teleop_core.operators import Motion, Operator, Setting
-from teleop_core.operators.follower import Follower
+from teleop_core.operators.follower import MOST, Follower
 from teleop_core.parameters import parameter
 
 __all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operator"]
 
-AHEAD = 4
+AHEAD = MOST
 """Ticks for which the hand is asked at once: what is wanted is so much later at most."""
 BUTTONS = ("clutch", "fixture", "mode")
 _PRESSED, _BETWEEN = 0.1, 0.05  # how long a button is pressed, and released at least [s]
@@ -115,7 +116,8 @@ class RemoteHand:
             p.delay, (p.speed, p.turn_speed), (p.acceleration, p.turn_acceleration), begin, corners
         )
         self._wanted = self._seen = _Wanted(begin, math.nan, 0)
-        self._heard = -math.inf
+        self._end, self._shown = -math.inf, (False, False, False)
+        self._start = begin
         self._first, self._held, self._turn = begin, begin, np.array([1.0, 0.0, 0.0, 0.0])
         self._is_held = False
         self._down = dict.fromkeys(BUTTONS, False)
@@ -198,57 +200,66 @@ class RemoteHand:
         """Where the stylus goes: the :data:`~teleop_core.operators.Motion` of an operator.
 
         Args:
-            times: Times (N,) [s], rising, and later than those of the last call.
+            times: Times (N,) [s], a tick apart from each other, later than those of the last call.
 
         Returns:
             Rows (N, 12): place and turn relative to the start, buttons, no tremor.
         """
-        now = float(times[0])
-        self._listen(now)
-        held = self._count_held(times)
-        if held in (0, len(times)):
-            rows = self._follower.go_on(times)
-        else:
-            before = self._follower.go_on(times[:held])
-            self._release()
-            rows = np.vstack((before, self._follower.go_on(times[held:])))
-        rows[:held, 6] = self._down["clutch"]
-        rows[held:, 6] = 1.0
-        for column, (name, button) in enumerate(self._buttons.items(), 7):
-            rows[:, column] = button.at(now, is_down=self._down[name])
+        rows = np.zeros((len(times), 12))
+        tick = float(times[1] - times[0]) if len(times) > 1 else 0.0
+        for first in range(0, len(times), MOST):
+            part = rows[first : first + MOST]
+            drawn = self.draw(float(times[first]), tick, len(part))
+            part[:, :3] = drawn["wanted"] - self._start[:3]
+            part[:, 6:9] = drawn["buttons"]
+            for row, wanted in zip(part, drawn, strict=True):
+                turn_within(self._start[3:], wanted["attitude"], row[3:6])
         return rows
 
     __call__ = motion
 
+    def draw(self, first: float, tick: float, count: int) -> Any:
+        """The same as records, for a few ticks, as the haptic master needs them.
+
+        Args:
+            first: Time of the first tick [s].
+            tick: Length of a tick [s].
+            count: How many ticks, 1 to 4.
+
+        Returns:
+            Records (count,) of :data:`teleop_core.operators.follower.WANTED`: places and attitudes
+            in the master's base. The next call writes them again.
+        """
+        if self._wanted is not self._seen:
+            self._listen(first)
+        if self._is_held and first > self._end:
+            self._release()
+        fixture, mode = self._buttons.values()
+        pressed = (
+            self._down["clutch"] or not self._is_held,
+            fixture.at(first, is_down=self._down["fixture"]),
+            mode.at(first, is_down=self._down["mode"]),
+        )
+        if pressed != self._shown:
+            self._follower.press(pressed)
+            self._shown = pressed
+        return self._follower.go_on(first, tick, count)
+
     def _listen(self, now: float) -> None:
         """Take what is wanted now."""
         wanted, before = self._wanted, self._seen
-        if wanted is before:
-            return
         self._seen = wanted
         came = now if math.isnan(wanted.time) else min(wanted.time, now)
-        if wanted.grip != before.grip or came - self._heard > self._parameters.timeout:
+        if wanted.grip != before.grip or came > self._end:
             self._release()
-        self._heard = came
-        if now - came > self._parameters.timeout:
+        self._end = came + self._parameters.timeout
+        if now > self._end:
             return
         if not self._is_held:
             self._is_held = True
             self._first, self._held = wanted.pose, self._follower.pose
             invert_quaternion(self._first[3:], self._turn)
         self._follower.aim(self._moved(wanted.pose))
-
-    def _count_held(self, times: Array) -> int:
-        """How many of the times, which rise, are before the silence has lasted too long."""
-        if not self._is_held:
-            return 0
-        end = self._heard + self._parameters.timeout
-        if times[-1] <= end:
-            return len(times)
-        held = int(np.searchsorted(times, end, side="right"))
-        if not held:
-            self._release()
-        return held
 
     def _moved(self, pose: Array) -> Array:
         """Where the stylus was gripped, moved by as much as the wanted pose was since then."""
