@@ -1,0 +1,68 @@
+"""What the page remembers: the last thirty seconds, and figures that numpy finds too."""
+
+import numpy as np
+import pytest
+
+from teleop_core.console.history import SPAN, History, LiveScores
+from teleop_core.console.link import Arm, ArmView
+from teleop_core.robots import load_robot
+from teleop_core.topics import MASTER_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
+
+ARM = Arm("", load_robot("rcrt1"))
+
+
+def seen(reference, place, force=(0.0, 0.0, 0.0), *, is_following=True):
+    """A view of an arm whose tip is wanted in one place and is in another [m]."""
+    turn = [1.0, 0.0, 0.0, 0.0]
+    streams = {
+        SLAVE_SERVO_CP.name: np.array([*reference, *turn]),
+        SLAVE_MEASURED_CP.name: np.array([*place, *turn]),
+        MASTER_MEASURED_CF.name: np.array([*force, 0.0, 0.0, 0.0]),
+    }
+    return ArmView(streams=streams, state={"is_following": float(is_following)})
+
+
+def test_history_reaches_back_thirty_seconds_and_ends_now():
+    history = History(ARM)
+    for time in np.arange(0.0, 70.0, 1.0 / 30.0):
+        history.add(float(time), seen((time, 0, 0), (0, 0, 0)), 0.001)
+    at, reference = history.read("reference")
+    assert at[-1] == 0.0
+    assert -SPAN <= at[0] < -SPAN + 0.1
+    np.testing.assert_allclose(np.diff(reference[:, 0]), np.diff(at), atol=1e-9)
+
+
+def test_what_was_not_known_is_not_a_number_in_history():
+    history = History(ARM)
+    history.add(1.0, ArmView(), float("nan"))
+    assert np.isnan(history.read("joints")[1]).all()
+
+
+def test_a_time_that_goes_back_begins_history_anew():
+    history = History(ARM)
+    for time in (5.0, 6.0, 2.0):
+        history.add(time, seen((0, 0, 0), (0, 0, 0)), 0.0)
+    assert len(history.read("error")[0]) == 1
+
+
+def test_live_figures_are_those_of_all_samples_at_even_times():
+    rng = np.random.default_rng(1)
+    reference, place = rng.normal(0.0, 0.01, (2, 200, 3))
+    force = rng.normal(0.0, 1.0, (200, 3))
+    scores = LiveScores()
+    for i in range(200):
+        scores.add(0.03 * i, seen(reference[i], place[i], force[i]))
+    error = np.linalg.norm(reference - place, axis=1)[1:]  # a first sample has no step before it
+    assert scores.rms == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert scores.largest == pytest.approx(error.max())
+    assert scores.way == pytest.approx(np.linalg.norm(np.diff(place, axis=0), axis=1).sum())
+    assert scores.force == pytest.approx(np.linalg.norm(force, axis=1).max())
+    assert scores.time == pytest.approx(199 * 0.03)
+
+
+def test_what_does_not_follow_does_not_count():
+    scores = LiveScores()
+    for i in range(50):
+        scores.add(0.03 * i, seen((1, 0, 0), (0, 0.01 * i, 0), is_following=False))
+    assert (scores.time, scores.way, scores.largest) == (0.0, 0.0, 0.0)
+    assert "0.0 s" in scores.text()

@@ -1,0 +1,41 @@
+"""Settings of the page: what a control shows is what the parameter is, there and back."""
+
+import pytest
+
+from teleop_core.console.link import ParameterInfo
+from teleop_core.console.settings import _parsed, _shown, _text
+from teleop_core.parameters import specs, values_of
+from teleop_core.plain_yaml import parse
+from teleop_core.session.layers import declared_groups
+
+EVERY = [
+    (name, spec.name, values_of(group())[spec.name])
+    for name, group in declared_groups().items()
+    for spec in specs(group)
+    if spec.name in values_of(group())
+]
+
+
+@pytest.mark.parametrize(("node", "name", "value"), EVERY, ids=[f"{n}.{p}" for n, p, _ in EVERY])
+def test_a_value_that_is_shown_is_read_as_itself(node, name, value):
+    info = ParameterInfo(node, name, value)
+    read = _parsed(_shown(value), info)
+    assert read == value or read == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("shown", "present", "wanted"),
+    [
+        ("[0.1, 2]", (1.0,), (0.1, 2.0)), ("0.1, 2", (1.0,), (0.1, 2.0)), ("3", (1.0,), (3.0,)),
+        ("[a, b]", (), ("a", "b")), ("['a=0.1']", ("b",), ("a=0.1",)), ("[]", (1.0,), ()),
+        ("[a]", (1.0,), None), (3, 2, 3), (3, 2.0, 3.0), (True, False, True),
+    ],
+)  # fmt: skip
+def test_lists_are_read_as_people_write_them_and_refused_where_they_are_none(shown, present, wanted):
+    assert _parsed(shown, ParameterInfo("node", "name", present)) == wanted
+
+
+@pytest.mark.parametrize("value", [(0.1, 2.0), ("a=0.1", "b"), (), True, 3, 0.25, "hold"])
+def test_a_setting_text_is_read_by_the_session_as_the_value(value):
+    found = parse(_text(value)) if not isinstance(value, bool) else {"True": True}[_text(value)]
+    assert (tuple(found) if isinstance(found, list) else found) == value
