@@ -1,0 +1,81 @@
+"""What RViz and Foxglove get of a running session, and what its recording holds of it."""
+
+import numpy as np
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from teleop_core.bags.layouts import layout
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.ros_types import deserialise
+from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
+from teleop_core.bodies import bodies_of
+from teleop_core.bodies.urdf import urdf_of
+from teleop_core.robots import load_robot
+from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_JS
+
+pytestmark = pytest.mark.ros
+
+MS = 1_000_000
+REST = [0.0, -0.06, -0.08, 1.0, 0.0, 0.0, 0.0]
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer, tmp_path):
+    robot = load_robot("rcrt1")
+    recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    described, drawn = [], []
+    joints = np.concatenate((robot.start, np.zeros(2 * robot.n)))
+    tip = bodies_of(robot).poses(robot.start)[-1]
+    peer.node.create_subscription(MarkerArray, "/teleop/markers", drawn.append, 10)
+    stamps = iter(range(MS, 10**6 * MS, MS))
+
+    def sent():
+        stamp_ns = next(stamps)
+        peer.send(SLAVE_MEASURED_JS, stamp_ns, joints)
+        peer.send(SLAVE_MEASURED_CP, stamp_ns, tip)
+        peer.send(MASTER_MEASURED_CP, stamp_ns, np.array(REST))
+        peer.spin()
+        return len(drawn) > 2
+
+    peer.wait(sent, "markers")
+    # Somebody who comes late gets the description all the same.
+    peer.node.create_subscription(String, "/robot_description", described.append, LATCHED)
+
+    def told():
+        peer.spin()
+        return described
+
+    peer.wait(told, "the robot's description")
+    assert described[0].data == urdf_of(robot, prefix="slave_")
+    path = next(m for m in drawn[-1].markers if m.ns == "measured")
+    assert (path.header.frame_id, path.type) == ("slave_base", Marker.LINE_STRIP)
+    assert [path.points[-1].x, path.points[-1].y] == pytest.approx(tip[:2])
+    assert recorder.end() == 0
+    bag = Bag(tmp_path / "bag")
+    assert bag.topics[ROBOT_DESCRIPTION.name].count == 1
+    for _, kind, _, data in bag.raw([TF]):
+        (found,) = (t for t in deserialise(data, kind).transforms if "tip" in t.child_frame_id)
+        place = found.transform.translation
+        assert [place.x, place.y, place.z] == pytest.approx(tip[:3])
+
+
+def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(peer, tmp_path):
+    robot = load_robot("puma560")
+    recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    joints = np.concatenate((robot.start, np.zeros(2 * robot.n)))
+    stamps = iter(range(MS, 10**6 * MS, MS))
+    form = layout(SLAVE_MEASURED_JS, robot.joint_names)
+    publisher = peer.publisher(SLAVE_MEASURED_JS)
+    key = f"received.{MASTER_MEASURED_CP.name}"
+
+    def heard():
+        stamp_ns = next(stamps)
+        publisher.publish(form.encode_one(stamp_ns, joints))
+        peer.send(MASTER_MEASURED_CP, stamp_ns, np.array(REST))
+        return peer.status("recorder").number(key) > 300
+
+    peer.wait(heard, "samples at the recorder")
+    assert recorder.end() == 0
+    assert Bag(tmp_path / "bag").topics[ROBOT_DESCRIPTION.name].count == 0
