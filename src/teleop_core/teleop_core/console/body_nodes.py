@@ -51,7 +51,7 @@ class BodyNodes:
         self._marked: frozenset[int] = frozenset()
 
     def move(self, joints: Array) -> Array:
-        """Draw them where joints (n,) [rad, m] bring them; returns their poses (B, 7).
+        """Draw them where joints (n,) [rad, m] bring them; returns the poses (B, 7) drawn.
 
         Bodies whose place is not finite stay where they are.
         """
@@ -59,7 +59,7 @@ class BodyNodes:
         for body in moved(poses, self._drawn):
             set_pose(self._list[body], poses[body])
             self._drawn[body] = poses[body]
-        return poses
+        return self._drawn.copy()
 
     def mark(self, joints: frozenset[int]) -> None:
         """Draw the bodies that these joints move first in another colour, and no others."""
