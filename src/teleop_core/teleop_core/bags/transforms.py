@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags import ros_types
-from teleop_core.bags.cdr import NUMPY_CODES, Template
+from teleop_core.bags.cdr import Template
 from teleop_core.bags.layouts import SECOND_NS, Bytes, Stamps
 from teleop_core.errors import ShapeError
 from teleop_core.geometry import Array
@@ -40,14 +40,9 @@ class TransformMessages:
             cdr.string(child)
             cdr.gap("d", slice(7 * index, 7 * index + 7))
         self._template: Bytes = np.frombuffer(bytes(cdr.template), np.uint8)
-        self._dtype = np.dtype(
-            {
-                "names": [f"part{i}" for i in range(len(cdr.gaps))],
-                "formats": [f"<{count}{NUMPY_CODES[code]}" for _, code, count, _ in cdr.gaps],
-                "offsets": [at for at, *_ in cdr.gaps],
-                "itemsize": len(cdr.template),
-            }
-        )
+        # Where the bytes of all stamps, and of all numbers, stand in a message.
+        self._stamps = _places([at for at, code, *_ in cdr.gaps if code == "i"], 8)
+        self._numbers = _places([at for at, code, *_ in cdr.gaps if code == "d"], 56)
 
     def encode(self, stamp_ns: Stamps, poses: Array) -> list[bytes]:
         """Messages of N times.
@@ -63,13 +58,17 @@ class TransformMessages:
             raise ShapeError("poses", (len(stamp_ns), len(self.frames), 7), poses.shape)
         rows = np.empty((len(stamp_ns), len(self._template)), np.uint8)
         rows[:] = self._template
-        records: NDArray[np.void] = rows.view(self._dtype)[:, 0]
-        seconds, numbers = stamp_ns // SECOND_NS, poses[..., _MESSAGE_ORDER]
-        for index in range(len(self.frames)):
-            records[f"part{3 * index}"][:, 0] = seconds
-            records[f"part{3 * index + 1}"][:, 0] = stamp_ns - seconds * SECOND_NS
-            records[f"part{3 * index + 2}"] = numbers[:, index]
+        seconds = stamp_ns // SECOND_NS
+        stamps = np.stack((seconds, stamp_ns - seconds * SECOND_NS), axis=1).astype("<u4")
+        rows[:, self._stamps] = np.tile(stamps.view(np.uint8), len(self.frames))
+        numbers = np.ascontiguousarray(poses[..., _MESSAGE_ORDER], dtype="<f8")
+        rows[:, self._numbers] = numbers.reshape(len(rows), -1).view(np.uint8)
         return [row.tobytes() for row in rows]
+
+
+def _places(begins: list[int], size: int) -> NDArray[np.int64]:
+    """Places of all bytes of pieces of one size."""
+    return np.asarray(np.add.outer(begins, np.arange(size)).ravel())
 
 
 def text_message(text: str) -> bytes:

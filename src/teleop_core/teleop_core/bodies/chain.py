@@ -63,7 +63,9 @@ def tip_of(bodies: Sequence[Body], frame: Array, tip: Array, reach: float) -> Bo
 
     Both are those at the posture of reference.
     """
-    solids = (ball(np.zeros(3), 1.3 * _THIN * reach, "tool"),)
+    # A tip in the middle of the last joint, as of a wrist without a tool, shows around it.
+    is_hidden = float(np.linalg.norm(tip[:3] - frame[:3])) < 3.0 * _THIN * reach
+    solids = (ball(np.zeros(3), (2.2 if is_hidden else 1.3) * _THIN * reach, "tool"),)
     return Body("tip", solids, len(bodies) - 1, Joint.FIXED, product(inverse(frame), tip))
 
 
