@@ -1,0 +1,227 @@
+"""Scene of the console: what is drawn is where it is, and only what changed is sent."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+import teleop_core as tc
+from teleop_core.bodies import Solid
+from teleop_core.console.body_nodes import AT_LIMIT, ROLES
+from teleop_core.console.link import Arm, ArmView, View
+from teleop_core.console.meshes import mesh_of
+from teleop_core.console.outlines import FREE, TOUCHED, unit_outline
+from teleop_core.console.recorded import RecordedLink
+from teleop_core.console.scene import Scene
+from teleop_core.console.server import ConsoleServer
+from teleop_core.geometry import rotations_from_quaternions
+
+# Poses that differ less from what is drawn are not sent.
+STILL = 3e-5
+MASTER, TIP, FORCE = "master/measured_cp", "slave/measured_cp", "master/measured_cf"
+
+
+@pytest.fixture(scope="module")
+def server():
+    with ConsoleServer(port=0) as opened:
+        yield opened.viser
+
+
+@pytest.fixture(scope="module")
+def session():
+    """Free motion, then a box of 16 mm, which the hand leaves."""
+    return tc.run("coarse_box", duration=11.0, fixture__box__size=[0.016] * 3)
+
+
+@pytest.fixture
+def link(session):
+    return RecordedLink(session.bag)
+
+
+def drawn(server, link, time):
+    """Scene of a recording at a time, and the view that it shows."""
+    server.scene.reset()
+    scene = Scene(server, link.arms)
+    scene.retune(link.parameters())
+    link.seek(time)
+    view = link.view()
+    scene.draw(view)
+    return scene, view
+
+
+def turned(node):
+    return rotations_from_quaternions(node.wxyz[None])[0]
+
+
+def sent(server):
+    """Messages that were ever queued for browsers."""
+    return server._websock_server.get_message_buffer().message_counter
+
+
+@pytest.mark.parametrize("time", [0.0, 3.0, 7.5, 11.0])
+def test_the_tip_is_drawn_where_it_was_measured(server, link, time):
+    scene, view = drawn(server, link, time)
+    tip, measured = scene.arms[""].drawn.frames["tip"], view.arms[""].streams[TIP]
+    np.testing.assert_allclose(tip.position, measured[:3], atol=STILL)
+    assert abs(tip.wxyz @ measured[3:]) > 1.0 - STILL
+
+
+def test_the_stylus_moves_on_the_page_as_the_command_of_the_tip_does(server, link):
+    scene, before = drawn(server, link, 2.0)
+    link.seek(6.0)
+    after = link.view()
+    base = turned(scene.arms[""].master.base)
+    hand, command = (
+        after.arms[""].streams[name][:3] - before.arms[""].streams[name][:3]
+        for name in (MASTER, "slave/servo_cp")
+    )
+    assert np.linalg.norm(hand) > 5e-3
+    np.testing.assert_allclose(base @ hand, command, atol=5e-4)  # gain 1
+
+
+def test_the_fixture_is_drawn_around_the_hand_where_its_button_was_pressed(server, link, session):
+    state = session["teleop/state"]
+    when = state.stamp_ns[np.argmax(state["is_fixture_on"] > 0)]
+    master = session[MASTER]
+    there = master[["x", "y", "z"]][np.searchsorted(master.stamp_ns, when)]
+    scene, view = drawn(server, link, 11.0)
+    assert view.arms[""].state["is_fixture_on"]
+    outline = scene.arms[""].master.outline.line
+    np.testing.assert_allclose(outline.position, there, atol=2e-4)
+    np.testing.assert_allclose(outline.scale, [0.016] * 3, rtol=1e-9)
+
+
+def test_a_fixture_is_red_where_its_wall_is_felt_and_green_elsewhere(server, link, session):
+    force = session[FORCE]
+    size = np.linalg.norm(force[["fx", "fy", "fz"]], axis=1)
+    colors = []
+    for time in (force.time[np.argmax(size)], force.time[size == 0.0][-1]):
+        scene, view = drawn(server, link, time)
+        assert view.arms[""].state["is_fixture_on"]
+        colors.append(tuple(scene.arms[""].outline.line.colors.tolist()))
+    assert colors == [TOUCHED, FREE]
+
+
+def test_no_fixture_is_drawn_before_there_is_one(server, link):
+    scene, _ = drawn(server, link, 1.0)
+    assert scene.arms[""].outline.line is None
+
+
+def test_the_same_view_again_sends_nothing(server, link):
+    scene, view = drawn(server, link, 9.0)
+    scene.draw(view)
+    before = sent(server)
+    for _ in range(50):
+        scene.draw(view)
+    assert sent(server) == before
+
+
+def test_another_view_sends_no_mesh_again(server, link):
+    scene, _ = drawn(server, link, 9.0)
+    count = len(server._websock_server.get_message_buffer().message_from_id)
+    for time in np.linspace(9.0, 10.5, 100):
+        link.seek(time)
+        scene.draw(link.view())
+    grown = len(server._websock_server.get_message_buffer().message_from_id) - count
+    assert grown < 40, "messages are kept for those who come later, the newest of each kind alone"
+
+
+@pytest.mark.parametrize("name", tc.list_robots())
+def test_every_robot_is_drawn(server, name):
+    server.scene.reset()
+    robot = tc.load_robot(name)
+    scene = Scene(server, [Arm("", robot)])
+    scene.draw(View(arms={"": ArmView()}))
+    rng = np.random.default_rng(4)
+    for joints in (robot.home, rng.uniform(robot.lower, robot.upper), np.full(robot.n, np.nan)):
+        state = np.concatenate((joints, np.zeros(2 * robot.n)))
+        streams = {"slave/measured_js": state, "slave/setpoint_js": joints}
+        scene.show_ghost(True)
+        scene.draw(View(arms={"": ArmView(streams)}))
+    scene.show_frames(True)
+    for camera in (scene.whole(), scene.tool(), scene.microscope()):
+        assert np.isfinite(camera.quaternion).all()
+    assert all(np.isfinite(frame.position).all() for frame in scene.arms[""].drawn.frames.values())
+
+
+def test_a_joint_at_its_limit_is_drawn_in_another_colour(server):
+    server.scene.reset()
+    robot = tc.load_robot("rcrt1")
+    scene = Scene(server, [Arm("", robot)])
+    bodies = scene.arms[""].bodies
+
+    def colours(joints):
+        state = np.concatenate((joints, np.zeros(2 * robot.n)))
+        scene.draw(View(arms={"": ArmView({"slave/measured_js": state})}))
+        name = bodies.bodies[bodies.joint_body[1]].name
+        return {
+            mesh.color
+            for role in ROLES
+            if (mesh := server.scene.get_handle_by_name(f"/arm/robot/{name}/{role}")) is not None
+        }
+
+    at_limit = robot.start.copy()
+    at_limit[1] = robot.upper[1]
+    assert AT_LIMIT not in colours(robot.start)
+    assert colours(at_limit) == {AT_LIMIT}
+    assert AT_LIMIT not in colours(robot.start)
+
+
+def test_two_arms_stand_beside_each_other_and_each_tip_is_where_it_was_measured(server, link):
+    server.scene.reset()
+    scene = Scene(server, [replace(link.arms[0], name=name) for name in ("", "right")])
+    view = View()
+    for name, time in (("", 2.0), ("right", 9.0)):
+        link.seek(time)
+        view.arms[name] = link.view().arms[""]
+    scene.draw(view)
+    (low, _), (_, high) = (scene.arms[name].room() for name in ("", "right"))
+    assert high[1] < low[1]
+    for name in ("", "right"):
+        nodes = scene.arms[name]
+        root = server.scene.get_handle_by_name(nodes.path)
+        tip = server.scene.get_handle_by_name(f"{nodes.path}/robot/tip")
+        np.testing.assert_allclose(tip.position, view.arms[name].streams[TIP][:3], atol=STILL)
+        np.testing.assert_allclose(nodes.tip()[:3], root.position + tip.position, atol=STILL)
+
+
+def test_the_first_camera_sees_all_of_every_robot_in_a_square_window(server):
+    for name in tc.list_robots():
+        server.scene.reset()
+        scene = Scene(server, [Arm("", tc.load_robot(name))])
+        camera, (low, high) = scene.whole(), scene.arms[""].room()
+        corners = np.array([[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]]
+                            for i in (0, 1) for j in (0, 1) for k in (0, 1)])  # fmt: skip
+        turn = rotations_from_quaternions(camera.quaternion[None])[0]
+        right, down, depth = ((corners - camera.position) @ turn).T
+        half = np.tan(0.5 * server.initial_camera.fov)
+        assert (depth > 0.0).all()
+        assert (np.abs(down) < half * depth).all(), name
+        assert (np.abs(right) < 1.06 * half * depth).all(), name
+
+
+SOLIDS = {
+    "box": ((0.1, 0.2, 0.3), 0.006),
+    "sphere": ((0.1,), 4 / 3 * np.pi * 1e-3),
+    "cylinder": ((0.1, 0.3), np.pi * 3e-3),
+    "capsule": ((0.1, 0.3), np.pi * 3e-3 + 4 / 3 * np.pi * 1e-3),
+}
+
+
+@pytest.mark.parametrize("kind", SOLIDS)
+def test_meshes_are_closed_look_outwards_and_have_the_volume_of_their_solid(kind):
+    size, volume = SOLIDS[kind]
+    pose = np.array([0.3, -0.2, 0.1, 0.5, 0.5, 0.5, 0.5])
+    mesh = trimesh.Trimesh(*mesh_of(Solid(kind, size, pose, "link")))
+    mesh.merge_vertices()
+    mesh.update_faces(mesh.nondegenerate_faces())
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(volume, rel=0.05)
+    np.testing.assert_allclose(mesh.center_mass, pose[:3], atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["box", "sphere", "of another program"])
+def test_outlines_are_one_long_along_each_axis(kind):
+    points = unit_outline(kind).reshape(-1, 3)
+    np.testing.assert_allclose(np.ptp(points, axis=0), 1.0)
