@@ -24,6 +24,8 @@ pytestmark = pytest.mark.ros
 # A device without friction and noise goes where the hand is.
 EXACT = {"device__friction": 0.0, "device__gimbal_noise": 0.0}
 GAIN = 0.5
+PATIENT = 1.5
+"""Silence that lets go [s]: on a busy machine poses may stay away for longer than a page's."""
 
 
 class Person:
@@ -56,7 +58,7 @@ def session(peer, tmp_path):
     """Composed session whose hand is a person's."""
     parameters = {
         "recorder": {"out": str(tmp_path / "bag")},
-        "haptic_master": {"operator": {"kind": "remote"}}
+        "haptic_master": {"operator": {"kind": "remote", "remote": {"timeout": PATIENT}}}
         | {"device": {"friction": 0.0, "gimbal_noise": 0.0}},
         "slave_sim": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
         "motion_scaling": {"reach_force": {"is_on": False}, "coarse_gain": GAIN},
@@ -123,7 +125,8 @@ def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(pe
 
 def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
     poses, buttons = peer.listen(MASTER_MEASURED_CP), peer.listen(MASTER_BUTTONS)
-    peer.start("haptic_master", operator__kind="remote", patience=0.0, **EXACT)
+    hand = {"operator__kind": "remote", "operator__remote__timeout": PATIENT}
+    peer.start("haptic_master", patience=0.0, **hand, **EXACT)
     peer.wait(lambda: buttons.take() and buttons.values[-1][0] == 1.0, "a pressed clutch")
     person = Person(peer)
 
@@ -131,6 +134,7 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
         poses.take()
         return np.abs(poses.values[-1][:3] - rest_pose()[:3] - [0.01, 0.0, 0.0]).max() < 1e-4
 
+    person.hold([0.0, 0.0, 0.0], is_held(peer), "a grip")
     person.drag([0.0, 0.0, 0.0], [0.01, 0.0, 0.0])
     person.hold([0.01, 0.0, 0.0], follows, "the stylus where it is wanted")
     buttons.take()
@@ -139,6 +143,8 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
     peer.wait_value("haptic_master", "refused.hand/servo_cp.not_finite", lambda n: n > 0)
 
     buttons.forget()
+    deep = peer.publisher(HAND_BUTTONS, readers=0)  # its queue holds ten
+    peer.wait(deep.get_subscription_count, "a reader of the buttons")
     for pressed in ([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]):
         peer.send(HAND_BUTTONS, time.time_ns(), pressed)
 
