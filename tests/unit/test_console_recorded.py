@@ -13,7 +13,7 @@ import teleop_core as tc
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.console.recorded import FRAME, RecordedLink
 from teleop_core.console.recorded_arms import configuration_of, recorded_arms
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
+from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Kind, Topic
 
 
 @pytest.fixture(scope="module")
@@ -175,12 +175,19 @@ def test_of_a_long_recording_one_of_some_samples_is_kept_and_memory_stays_bounde
     np.testing.assert_array_equal(track.rows, whole.values[::thinning])
 
 
-def test_a_path_ends_at_the_present_time(link, session):
+def test_a_path_is_that_of_the_last_seconds(link, session):
     link.seek(3.0)
-    times, rows = link.path(MASTER_MEASURED_CP, points=100)
-    assert len(times) <= 100
-    assert times[-1] == pytest.approx(3.0, abs=1e-3)
+    times, rows = link.path(MASTER_MEASURED_CP, "", 2.0)
+    assert len(times) == len(rows) > 100
+    assert times[0] == pytest.approx(1.0, abs=2e-3)
+    assert times[-1] == pytest.approx(3.0, abs=2e-3)
     np.testing.assert_array_equal(rows[-1], link.view().arms[""].streams["master/measured_cp"])
+
+
+def test_what_was_not_recorded_has_no_path(link):
+    times, rows = link.path(Topic("nobody/measured_cp", Kind.POSE), "", 10.0)
+    assert times.shape == (0,)
+    assert rows.shape == (0, 7)
 
 
 def foreign(small, lacking, metadata):

@@ -103,6 +103,39 @@ def test_a_fixture_is_red_where_its_wall_is_felt_and_green_elsewhere(server, lin
     assert colors == [TOUCHED, FREE]
 
 
+def path_of(server, name):
+    """Points of a path on the page, along it, without what is too old."""
+    line = server.scene.get_handle_by_name(f"/arm/{name}")
+    points = np.concatenate((line.points[:, 0], line.points[-1:, 1]))
+    return points[np.abs(np.diff(points, axis=0, prepend=np.nan)).max(axis=1) != 0.0]
+
+
+def test_the_path_of_the_tip_goes_through_where_it_was_measured(server, link, session):
+    scene, _ = drawn(server, link, 4.0)
+    for time in np.arange(4.0, 10.0, 1 / 30):
+        link.seek(time)
+        scene.draw(link.view())
+    measured, points = session[TIP], path_of(server, "measured")
+    recent = measured[["x", "y", "z"]][measured.time > 4.0]
+    assert len(points) > 50
+    distances = np.linalg.norm(points[:, None] - recent[None], axis=2).min(axis=1)
+    assert distances.max() < 1e-6
+
+
+def test_after_a_jump_in_time_the_path_is_that_of_the_recording(server, link, session):
+    scene, _ = drawn(server, link, 0.0)
+    scene.draw(link.view())
+    link.seek(9.0)
+    scene.draw(link.view())
+    assert len(path_of(server, "measured")) == 1
+    scene.remember(link.path)
+    link.seek(6.0)
+    scene.draw(link.view())
+    points = path_of(server, "measured")
+    np.testing.assert_allclose(points[-1], link.view().arms[""].streams[TIP][:3], atol=1e-4)
+    np.testing.assert_allclose(points[0], session[TIP][["x", "y", "z"]][0], atol=1e-4)
+
+
 def test_no_fixture_is_drawn_before_there_is_one(server, link):
     scene, _ = drawn(server, link, 1.0)
     assert scene.arms[""].outline.line is None

@@ -1,5 +1,6 @@
 """Arm nodes: one arm with its master on the page."""
 
+from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
@@ -12,7 +13,7 @@ from teleop_core.console.master_nodes import MasterNodes
 from teleop_core.console.meshes import mesh_of
 from teleop_core.console.outlines import OutlineNode
 from teleop_core.console.stand import DEVICE, PUBLISHED_AXES, REST, stand_beside
-from teleop_core.console.tails import Tail
+from teleop_core.console.tails import LENGTH, Tail, is_jump
 from teleop_core.errors import TeleopError
 from teleop_core.fixtures.box import BOX
 from teleop_core.geometry import Array
@@ -26,11 +27,14 @@ from teleop_core.topics import (
     SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
     Limit,
+    Topic,
 )
 
 MEASURED: Color = (194, 55, 10)
 REFERENCE: Color = (66, 133, 244)
 """Colours of paths."""
+Path = Callable[[Topic, str, float], tuple[Array, Array]]
+"""From a topic, an arm and a length [s]: times (N,) [s] and rows (N, width) up to now."""
 _AT = 1e-3
 """Share of a joint's range next to its end that counts as at its limit."""
 _TOUCH = 0.05  # force of a wall that somebody touches [N]
@@ -48,6 +52,7 @@ class ArmNodes:
         low: Lowest corner (3,) [m] of what arm and master take, in slave_base.
         high: Highest corner (3,) [m].
         fixture_kind: Name of the kind of its fixture.
+        recorded_path: Where paths come from when time jumps; None where nothing is recorded.
     """
 
     def __init__(self, server: viser.ViserServer, arm: Arm) -> None:
@@ -71,6 +76,8 @@ class ArmNodes:
         self.outline = OutlineNode(server, f"{self.path}/fixture", self._stand.quaternion)
         self._poses = self.drawn.move(start)
         self._begin: Array | None = None
+        self._name, self._last = arm.name, 0.0
+        self.recorded_path: Path | None = None
         self._side, self._count = 0.0, 0
         self.low, self.high = self._room()
 
@@ -143,6 +150,14 @@ class ArmNodes:
         self._ghost.move(reference)
 
     def _draw_paths(self, time: float, view: ArmView) -> None:
+        if self.recorded_path is not None and is_jump(self._last, time):
+            for tail, topic in (
+                (self.measured, SLAVE_MEASURED_CP), (self.reference, SLAVE_SETPOINT_CP),
+                (self.master.tail, MASTER_MEASURED_CP),
+            ):  # fmt: skip
+                times, rows = self.recorded_path(topic, self._name, LENGTH)
+                tail.fill(times, rows[:, :3])
+        self._last = time
         measured = view.get(SLAVE_MEASURED_CP)
         if measured is not None and self._begin is None:
             self._begin = measured[:3].copy()

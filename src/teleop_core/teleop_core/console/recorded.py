@@ -19,6 +19,7 @@ SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """Speeds that the controls offer; any other from 0.01 to 100 is taken too."""
 FRAME = 1.0 / 30.0
 """Length of a step [s]."""
+_PATH = 200  # points of a path
 _REFUSED = "a recording cannot be commanded"
 
 
@@ -75,22 +76,27 @@ class RecordedLink:
             return ()
         return (f"a long recording: one of {self.thinning} samples is shown",)
 
-    def path(self, topic: Topic, arm: str = "", points: int = 500) -> tuple[Array, Array]:
-        """Way of a pose up to the present time: times (N,) [s] and rows (N, width), thinned.
+    def path(self, topic: Topic, arm: str, length: float) -> tuple[Array, Array]:
+        """Way of a stream up to the present time.
 
         Args:
             topic: A stream; nothing is found of one that was not recorded.
             arm: Namespace of the arm.
-            points: Most rows that are returned.
+            length: How long before the present time it begins [s].
+
+        Returns:
+            Times (N,) [s] and rows (N, width), N at most some hundreds.
         """
         one = next(recorded for recorded in self._recorded if recorded.arm.name == arm)
         track = one.tracks.get(topic.name)
         if track is None:
-            return np.empty(0), np.empty((0, 0))
-        end = track.at(self._start_ns + round(self._time * 1e9)) + 1
-        chosen = np.unique(np.linspace(0, max(0, end - 1), min(points, end)).astype(int))
-        times = (track.log_ns[chosen] - self._start_ns) * 1e-9
-        return np.asarray(times, np.float64), track.rows[chosen]
+            return np.empty(0), np.empty((0, topic.width(one.arm.robot.n)))
+        now_ns = self._start_ns + round(self._time * 1e9)
+        begin, end = track.at(now_ns - round(length * 1e9)) + 1, track.at(now_ns) + 1
+        chosen = np.unique(np.linspace(begin, max(begin, end - 1), _PATH).astype(int))
+        chosen = chosen[chosen < end]
+        times = np.asarray((track.log_ns[chosen] - self._start_ns) * 1e-9, np.float64)
+        return times, track.rows[chosen]
 
     def parameters(self) -> Mapping[tuple[str, str], ParameterInfo]:
         """Parameters that it was made with; none of recordings that do not tell."""

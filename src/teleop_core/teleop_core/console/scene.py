@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import viser
 
-from teleop_core.console.arm_nodes import ArmNodes
+from teleop_core.console.arm_nodes import ArmNodes, Path
 from teleop_core.console.cameras import FIELD, Camera, around, from_tool, microscope
 from teleop_core.console.link import Arm, ParameterInfo, View
 from teleop_core.console.stand import PUBLISHED_AXES
@@ -68,6 +68,11 @@ class Scene:
                     nodes.turn_master(_map(axes.value))
                 if (kind := parameters.get((node, "fixture.kind"))) is not None:
                     nodes.fixture_kind = str(kind.value)
+
+    def remember(self, path: Path) -> None:
+        """Take paths from a recording wherever time jumps; without that they begin anew there."""
+        for nodes in self.arms.values():
+            nodes.recorded_path = path
 
     # -- what is shown ---------------------------------------------------------------------------
 

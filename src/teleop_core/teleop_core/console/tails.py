@@ -11,7 +11,13 @@ LENGTH = 10.0
 PERIOD = 0.25
 """Time between two drawings of a tail [s]."""
 _POINTS = 160
+_GAP = 1.0  # between two drawings, from which on something else is seen [s]
 _SHORTEST = 1e-4  # between two points of it [m]
+
+
+def is_jump(before: float, time: float) -> bool:
+    """Whether a time [s] is not one that follows another by drawing after drawing."""
+    return time < before or time > before + _GAP
 
 
 class Tail:
@@ -30,7 +36,7 @@ class Tail:
         self._times = np.full(_POINTS + 1, -np.inf)
         self._points = np.zeros((_POINTS + 1, 3))
         self._color = np.array(color, np.float64)
-        self._sampled = self._drawn = -np.inf
+        self._sampled = self._drawn = self._last = -np.inf
         self._background = np.full(3, 255.0)
         self._is_hidden = False
         self._line = server.scene.add_line_segments(
@@ -51,10 +57,11 @@ class Tail:
     def draw(self, time: float, point: Array | None) -> None:
         """Take the place of the point (3,) [m] at a time [s]; None where it is unknown.
 
-        A time before the last one begins the tail anew.
+        A time before the last one, or long after it, begins the tail anew.
         """
-        if time < self._sampled:
-            self._times[:], self._sampled, self._drawn = -np.inf, -np.inf, -np.inf
+        if is_jump(self._last, time):
+            self.fill(np.empty(0), np.empty((0, 3)))
+        self._last = time
         if point is not None and time >= self._sampled + LENGTH / _POINTS:
             self._append(time, point)
         if time >= self._drawn + PERIOD:
@@ -68,7 +75,7 @@ class Tail:
         self._times[:] = -np.inf
         if count:
             self._times[-count:], self._points[-count:] = times[chosen], points[chosen]
-        self._sampled = float(self._times[-1])
+        self._sampled = self._last = float(self._times[-1])
         self._drawn = -np.inf
 
     def _append(self, time: float, point: Array) -> None:
