@@ -114,6 +114,10 @@ def replay(server: ConsoleServer, path: Path) -> None:
     link = RecordedLink(path)
     console = Console(server, link)
     controls = ReplayControls(server.viser, link)
+    console.panel.settings.refresh()
+    console.scene.retune(link.parameters())
+    console.scene.remember(link.path)
+    console.stylus.show(is_shown=False)
     before = time.monotonic()
     while True:
         now = time.monotonic()

@@ -161,7 +161,7 @@ def widths(robot: Robot) -> dict[str, int]:
 
 
 def box_of(state: Mapping[str, float]) -> tuple[Array, Array] | None:
-    """Centre and size [m] of the fixture that is on, in master_base; None if none is."""
+    """Centre and size [m] of the fixture that is on, in slave_base; None if none is."""
     if not state.get("is_fixture_on"):
         return None
     place = [[state[f"fixture_{what}_{axis}"] for axis in "xyz"] for what in ("center", "size")]

@@ -18,7 +18,7 @@ class ReplayControls:
     def __init__(self, server: viser.ViserServer, link: RecordedLink) -> None:
         self._link, gui = link, server.gui
         self._drawn, self._text = -1.0, ""
-        with gui.add_folder("replay"):
+        with gui.add_folder("replay", order=-0.5):
             self._slider = gui.add_slider(
                 "time", 0.0, max(link.duration, _STEP), _STEP, link.time,
                 hint="seconds since the recording began",

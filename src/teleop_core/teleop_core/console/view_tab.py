@@ -25,7 +25,7 @@ class ViewTab:
             self._camera("Microscope", "fixed, over where the tip starts", scene.microscope)
         with gui.add_folder("show"):
             self._box("frames", False, scene.show_frames, "axes of all bodies")
-            self._box("reference posture", True, scene.show_ghost, "where the setpoints are")
+            self._box("reference posture", False, scene.show_ghost, "where the setpoints are")
             self._box("paths", True, scene.show_tails, "of the tip, wanted and measured, 10 s")
             self._box("dark", False, self._darken, "dark page")
 
