@@ -126,6 +126,32 @@ class Tab(Headless):
             self.mouse("mouseMoved", *point)
             self.value("new Promise(requestAnimationFrame)")
 
+    def seen_at(self, node, point):
+        """Pixel at which a point of a node of viser's scene is seen, both as they are drawn.
+
+        Args:
+            node: Name of the node.
+            point: Place in its frame [m].
+        """
+        return self.value(f"""(() => {{
+            let place = document.querySelector('canvas'), key;
+            const isFiber = (name) => name.startsWith('__reactFiber');
+            while (!(key = Object.keys(place).find(isFiber))) place = place.parentElement;
+            let fiber = place[key];
+            while (!(fiber.memoizedProps && fiber.memoizedProps.value
+                && fiber.memoizedProps.value.mutable)) fiber = fiber.return;
+            const {{ camera, nodeRefFromName }} = fiber.memoizedProps.value.mutable.current;
+            const node = nodeRefFromName[{json.dumps(node)}];
+            node.updateWorldMatrix(true, false);
+            const times = (m, v) => [0, 1, 2, 3].map((row) =>
+                v.reduce((sum, part, i) => sum + m.elements[row + 4 * i] * part, 0));
+            const [x, y, , w] = [node.matrixWorld, camera.matrixWorldInverse,
+                camera.projectionMatrix].reduce((v, m) => times(m, v), {json.dumps([*point, 1.0])});
+            const box = document.querySelector('canvas').getBoundingClientRect();
+            return [box.x + box.width * (0.5 + 0.5 * x / w),
+                    box.y + box.height * (0.5 - 0.5 * y / w)];
+        }})()""")
+
     def faults(self):
         """Errors that mean something."""
         self.value("0")  # what was said before has been heard then
