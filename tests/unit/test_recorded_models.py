@@ -149,6 +149,24 @@ def test_a_replay_gives_the_same_bytes(bag: Path, tmp_path: Path) -> None:
     assert first.read_bytes() == second.read_bytes()
 
 
+@pytest.mark.parametrize("arms", [[], ["right", "left"]])
+def test_what_is_saved_from_memory_has_the_frames_of_what_was_recorded(
+    tmp_path: Path, arms: list[str]
+) -> None:
+    tc.run("free_motion", duration=0.2, arms=arms, out=tmp_path / "recorded")
+    tc.run("free_motion", duration=0.2, arms=arms).save(tmp_path / "saved")
+    recorded, saved = (frames(tmp_path / name) for name in ("recorded", "saved"))
+    assert recorded.keys() == saved.keys()
+    for name, poses in recorded.items():
+        assert list(poses) == list(saved[name])
+        assert np.array_equal(list(poses.values()), list(saved[name].values()))
+    topics = [f"/{arm}/robot_description" for arm in arms[1:]] + ["/robot_description"]
+    for topic in topics:
+        first, second = (messages(tmp_path / name, topic) for name in ("recorded", "saved"))
+        assert [one.data for one in first] == [one.data for one in second]
+        assert len(first) == 1
+
+
 def test_tables_of_numbers_pass_over_the_model(bag: Path) -> None:
     frame = tc.open_recording(bag).frame()
     assert not [name for name in frame.columns if name.startswith(("tf", "robot_description"))]

@@ -16,14 +16,15 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import RecordingParameters
 from teleop_core.bags.series import Series, kind_of
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError, UnknownNameError
+from teleop_core.errors import RecordingError, TeleopError, UnknownNameError
 from teleop_core.geometry import Array
-from teleop_core.topics import BY_NAME, Kind
+from teleop_core.topics import BY_NAME, MASTER_MEASURED_CP, SLAVE_MEASURED_JS, Kind
 
 if TYPE_CHECKING:
     import pandas
 
     from teleop_core.evaluation import Metric, Score
+    from teleop_core.session.model import Model
 
 __all__ = ["Recording", "Stream", "open_recording"]
 
@@ -233,18 +234,23 @@ class Recording:
         if not isinstance(self._bag, MemoryBag):
             return self._copied(Path(path))
         bag = self._bag
+        from teleop_core.session.model import write_model_of
+
         names = {t.arm: found.names for t, found in bag.streams.items() if t.kind.has_joints}
         reports = [t for t in BY_NAME.values() if t.kind is Kind.REPORT]
         reports = [t.of_arm(arm) for arm in ("", *self.arms[1:]) for t in reports]
         topics = [*bag.streams, *(t for t in reports if t.name in bag.topics)]
+        model = _model_of(bag)
         with BagWriter(
-            path, topics, names, parameters=RecordingParameters(), metadata=bag.metadata
-        ) as writer:
+            path, (*topics, *model.topics), names, parameters=RecordingParameters(),
+            metadata=bag.metadata,
+        ) as writer:  # fmt: skip
             for begin, end in _seconds(bag.start_ns, [s.log_ns for s in bag.streams.values()]):
                 writer.write_block({t: _between(s, begin, end) for t, s in bag.streams.items()})
             for topic in topics[len(bag.streams) :]:
                 for _, _, log_ns, data in bag.raw([topic]):
                     writer.write(topic, log_ns, data)
+            write_model_of(bag, model, writer)
         return open_recording(path)
 
     def _copied(self, path: Path) -> "Recording":
@@ -269,6 +275,21 @@ class Recording:
         from teleop_core.evaluation.sketch import sketch
 
         return sketch(self)
+
+
+def _model_of(bag: Bag) -> "Model":
+    """Robots of a recording of ours, by the configuration that is stored with it; else none."""
+    from teleop_core.session.configuration import Configuration
+    from teleop_core.session.model import Model
+    from teleop_core.session.runner import recorded_configuration
+
+    needed = {SLAVE_MEASURED_JS.name, MASTER_MEASURED_CP.name}
+    is_ours = "configuration" in bag.metadata and needed <= set(bag.topics)
+    try:
+        layer, scenario = recorded_configuration(bag)
+        return Model(Configuration.from_layers([layer], scenario), None if is_ours else 0.0)
+    except TeleopError:  # made with parts that are not here: numbers are kept, nothing is drawn
+        return Model(Configuration.from_layers([]), 0.0)
 
 
 def _columns(kind: Kind | None, series: Series) -> tuple[str, ...]:

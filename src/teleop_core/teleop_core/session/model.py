@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import (
     ROBOT_DESCRIPTION,
     TF,
@@ -18,6 +19,7 @@ from teleop_core.bags.transforms import (
     TransformMessages,
     text_message,
 )
+from teleop_core.bags.writer import BagWriter
 from teleop_core.bodies import bodies_of, urdf_of
 from teleop_core.geometry import Array, quaternion_from_rotation
 from teleop_core.graph import RECORDER_NAME
@@ -178,3 +180,27 @@ class ModelRecords:
         joints = block[SLAVE_MEASURED_JS.of_arm(arm.arm).field][rows, : arm.robot.n]
         stylus = block[MASTER_MEASURED_CP.of_arm(arm.arm).field][rows]
         return arm.transforms(block["now_ns"][rows], joints, stylus)
+
+
+def write_model_of(bag: Bag, model: Model, writer: BagWriter) -> None:
+    """Record the model of a session that was kept in memory, as it would have been on disk.
+
+    Args:
+        bag: Its streams.
+        model: Its robots.
+        writer: Where it goes; it knows the topics of the model.
+    """
+    found: list[tuple[int, bytes]] = []
+    for arm in model.arms:
+        names = [t.of_arm(arm.arm).name for t in (SLAVE_MEASURED_JS, MASTER_MEASURED_CP)]
+        series = bag.read_many(names)
+        joints, stylus = (series[name] for name in names)
+        rows = np.flatnonzero(np.diff(joints.log_ns // model.period_ns, prepend=-1))
+        log_ns = joints.log_ns[rows]
+        at = np.searchsorted(stylus.log_ns, log_ns, side="right") - 1
+        places = np.where(at[:, None] >= 0, stylus.values[at], 0.0)
+        messages = arm.transforms(log_ns, joints.values[rows, : arm.robot.n], places)
+        writer.write(arm.description, int(log_ns[0]), arm.urdf())
+        found += zip(log_ns.tolist(), messages, strict=True)
+    for when_ns, data in sorted(found, key=lambda message: message[0]):
+        writer.write(TF, when_ns, data)
