@@ -316,7 +316,7 @@ class _Hand:
 
     def __init__(self, node: Node, arm: str) -> None:
         self._layout, self._pressed = layout(HAND_SERVO_CP, ()), layout(HAND_BUTTONS, ())
-        self._lock = threading.Lock()
+        self._lock, self._pressing = threading.Lock(), threading.Lock()
         self._publishers = [
             node.create_publisher(
                 message_type(topic.kind.ros_type),
@@ -333,10 +333,15 @@ class _Hand:
             self._publishers[0].publish(data)
 
     def press(self, name: str) -> None:
-        """Press a button, and release it a moment later."""
-        pressed = np.array([0.0, name == "fixture", name == "mode"])
-        self._say(pressed)
-        threading.Timer(_PRESS, self._say, (np.zeros(3),)).start()
+        """Press a button and release it a moment later; presses follow one another."""
+        threading.Thread(target=self._press, args=(name,), daemon=True).start()
+
+    def _press(self, name: str) -> None:
+        with self._pressing:
+            self._say(np.array([0.0, name == "fixture", name == "mode"]))
+            time.sleep(_PRESS)
+            self._say(np.zeros(3))
+            time.sleep(_PRESS)  # released for as long, or two presses were one
 
     def _say(self, pressed: Array) -> None:
         with self._lock:

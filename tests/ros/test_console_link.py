@@ -1,0 +1,116 @@
+"""Link to a live session: what the page sees is what is recorded, what it asks for happens."""
+
+import numpy as np
+import pytest
+
+from live_process import wait_until
+from teleop_core import api, topics
+from teleop_core.bags.reader import Bag
+from teleop_core.console.link import box_of
+from teleop_core.errors import ParameterError, SessionError
+from teleop_core.nodes.console_link import LiveLink
+from teleop_core.nodes.console_session import ConsoleSession
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory):
+    """A session behind a page, its link, and where it is recorded."""
+    out = tmp_path_factory.mktemp("console") / "bag"
+    texts = ["operator=remote", "teleop.duration=3600.0", "haptic_master.patience=0.0"]
+    said = []
+    with ConsoleSession(api.configuration(None, texts=texts), out, said.append) as session:
+        link = session.link()
+        with link:
+            wait_until(lambda: any("haptic_master is ready" in line for line in said), "nodes")
+            view = link.view()
+            wait_until(lambda: link.view().arms[""].state and view.recording, "reports")
+            yield session, link, out
+
+
+def state(link):
+    """State of the arm as the page sees it."""
+    return link.view().arms[""].operation_text.split(",")[0].split(":")[0]
+
+
+def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(live):
+    _, link, out = live
+    first = dict(link.view().arms[""].stamp_ns)
+    wait_until(lambda: link.view().arms[""].stamp_ns[topics.SLAVE_MEASURED_JS.name]
+               > first[topics.SLAVE_MEASURED_JS.name], "newer samples")  # fmt: skip
+    view = link.view()
+    assert view.is_fresh
+    assert view.recording == out
+    assert view.arms[""].get(topics.SLAVE_MEASURED_JS).shape == (18,)
+    q = view.arms[""].get(topics.SLAVE_MEASURED_JS)[:6]
+    tip = view.arms[""].get(topics.SLAVE_MEASURED_CP)[:3]
+    np.testing.assert_allclose(link.arms[0].robot.fk(q)[:3, 3], tip, atol=1e-3)
+
+
+def test_commands_are_obeyed_and_answered(live):
+    _, link, _ = live
+    wait_until(lambda: state(link) == "ENABLED", "enabled")
+    assert link.command("pause")[0]
+    wait_until(lambda: state(link) == "PAUSED", "paused")
+    is_taken, text = link.command("home")
+    assert not is_taken
+    assert "PAUSED" in text
+    wait_until(lambda: link.command("resume")[0], "resumed, at rest")
+    wait_until(lambda: state(link) == "ENABLED", "enabled again")
+
+
+def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(live):
+    _, link, _ = live
+    link.press(is_pressed=True)
+    wait_until(lambda: state(link) == "FAULT", "stopped")
+    assert not link.command("enable")[0]
+    link.press(is_pressed=False)
+    wait_until(lambda: link.command("reset")[0], "reset")
+    wait_until(lambda: link.command("enable")[0], "enabled")
+
+
+def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(live):
+    _, link, _ = live
+    known = link.parameters()
+    gain = known["motion_scaling", "fine_gain"]
+    assert (gain.lower, gain.upper) == (0.001, 10.0)
+    assert gain.doc
+    assert known["slave_sim", "robot"].is_fixed
+    assert "box" in known["motion_scaling", "fixture.kind"].choices
+    assert link.change("motion_scaling", "fine_gain", 0.3) == ""
+    assert link.parameters()["motion_scaling", "fine_gain"].value == 0.3
+    assert "10" in link.change("motion_scaling", "fine_gain", 20.0)
+    assert link.change("nobody", "fine_gain", 0.3)
+
+
+def test_the_buttons_of_the_stylus_switch_mode_and_box(live):
+    _, link, _ = live
+    before = link.view().arms[""].state["is_fine"]
+    link.press_button("", "mode")
+    wait_until(lambda: link.view().arms[""].state["is_fine"] != before, "the other mode")
+    link.press_button("", "mode")
+    wait_until(lambda: link.view().arms[""].state["is_fine"] == before, "the mode of before")
+    link.press_button("", "fixture")
+    found = wait_until(lambda: box_of(link.view().arms[""].state), "box")
+    assert (found[1] > 0.0).all()
+
+
+def test_a_saved_recording_is_there_under_its_name_and_the_next_one_goes_on(live):
+    session, link, out = live
+    for name in ("", "a/b", "..", "a b"):
+        with pytest.raises(ParameterError):
+            link.save(name)
+    saved = link.save("first")
+    assert saved == out.with_name("first")
+    assert Bag(saved).topics[topics.SLAVE_MEASURED_JS.name].count > 100
+    with pytest.raises(ParameterError, match="exists already"):
+        link.save("first")
+    wait_until(lambda: link.view().recording not in {None, out}, "the next recording")
+    assert link.view().run == 1
+    assert not session.is_over
+
+
+def test_without_a_session_there_is_one_clear_error():
+    with pytest.raises(SessionError, match="no arm answers on ROS domain 99"):
+        LiveLink(99, patience=0.1)
