@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from teleop_core.console.insets import Insets
 from teleop_core.console.link import Link, ParameterInfo
 from teleop_core.console.panel import Panel
 from teleop_core.console.recorded import RecordedLink
@@ -56,6 +57,7 @@ class Console:
             )
         with self.panel.view_tab:
             ViewTab(server.viser, self.scene)
+            Insets(server.viser, self.scene)
 
     def _let_go(self, arm: str) -> None:
         drivers = self._server.drivers
