@@ -77,7 +77,7 @@ class Tab(Headless):
             const find = () => [...document.querySelectorAll(
                 'button, [role], label, a, input, span, p')].filter(
                     (e) => said(e) === {json.dumps(text)} && e.getClientRects().length).at(-1);
-            const end = performance.now() + 10000;
+            const end = performance.now() + 30000;
             for (let last = '', rests = 0; performance.now() < end;) {{
                 await new Promise(requestAnimationFrame);
                 const element = find();
@@ -88,7 +88,7 @@ class Tab(Headless):
                 rests = last === x + ' ' + y ? rests + 1 : 0;
                 last = x + ' ' + y;
                 const top = document.elementFromPoint(x, y);
-                if (rests > 3 && top && (element.contains(top) || top.contains(element)))
+                if (rests > 1 && top && (element.contains(top) || top.contains(element)))
                     return [x, y];
             }}
             throw new Error('nothing that can be clicked says ' + {json.dumps(text)});
@@ -96,7 +96,7 @@ class Tab(Headless):
 
     def fill(self, label, text):
         """Write a text, in place of what stands there, into the field beside a label."""
-        self.place(label)
+        self.shows(label)
         self.value(f"""(() => {{
             let near = [...document.querySelectorAll('label, span, p, div')].filter((e) =>
                 e.innerText.trim() === {json.dumps(label)} && e.getClientRects().length).at(-1);
