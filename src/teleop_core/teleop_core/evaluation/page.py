@@ -24,6 +24,9 @@ from teleop_core.evaluation.traces import spacing_s
 _ROOM = 6_800_000
 """Bytes for the curves of a recording: with everything else a page of it stays below 10 MB."""
 
+REPLAYS = 7
+"""Recordings of a page with replays: browsers keep 16 pictures in space, and each has another."""
+
 
 def report_page(studies: Sequence[Study]) -> str:
     """HTML page with the summary of all recordings and the plots of each.
@@ -34,6 +37,8 @@ def report_page(studies: Sequence[Study]) -> str:
     sections, drawn, arrays = [], [], Arrays(len(studies))
     for number, study in enumerate(studies):
         plots = study.figures()
+        if len(studies) > REPLAYS:
+            plots = [plot for plot in plots if "meta" not in plot.layout]
         places = [f"plot-{number}-{i}" for i in range(len(plots))]
         sections.append(_section(number, study, plots, places))
         for place, plot in zip(places, plots, strict=True):
