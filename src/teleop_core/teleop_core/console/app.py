@@ -15,6 +15,7 @@ from teleop_core.console.server import ConsoleServer
 from teleop_core.console.steps import Steps
 from teleop_core.console.stylus import Stylus
 from teleop_core.console.view_tab import ViewTab, theme
+from teleop_core.console.visitors import Visitors
 
 RATE = 30.0
 """How often the page is drawn [1/s]."""
@@ -43,14 +44,10 @@ class Console:
             may_drive=drivers.hold,
         )  # fmt: skip
         self.panel = Panel(
-            server.viser,
-            link,
-            drivers.may_drive,
-            drivers.take,
-            lambda: drivers.driver,
-            renew,
+            server.viser, link, drivers.may_drive, drivers.take, lambda: drivers.driver, renew,
             of_session,
-        )
+        )  # fmt: skip
+        self._visitors = Visitors(server.viser, drivers, self.scene)
         with self.panel.stylus_folder:
             Steps(
                 server.viser, self.stylus, tuple(arm.name for arm in link.arms), drivers.may_drive
@@ -71,6 +68,7 @@ class Console:
         self.scene.draw(view)
         self.stylus.draw(view)
         self.panel.draw(view)
+        self._visitors.look()
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Draw until something is over; time that was lost is not made up for."""
@@ -80,6 +78,7 @@ class Console:
             self.draw()
             due = max(due + 1.0 / RATE, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
+        self._visitors.close()
 
     def _refresh(self) -> None:
         """Ask for the parameters, which takes a moment."""

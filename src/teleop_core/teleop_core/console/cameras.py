@@ -12,7 +12,9 @@ FIELD = np.radians(45.0)
 """Vertical field of view of all cameras [rad]."""
 _FROM = np.array([-0.80, -0.42, 0.48])
 """Direction from what is seen to the first camera: behind the arm, over its right shoulder."""
-_WIDE, _HIGH = 1.05, 0.8
+_WIDE, _HIGH = 0.875, 0.8
+ASPECT = 1.2
+"""Width over height of a wide window with the panel beside it."""
 """Parts of a square picture that may be filled across and upwards: windows are rarely narrower."""
 
 
@@ -49,15 +51,23 @@ class Camera:
             client.camera.look_at = self.look_at
 
 
-def around(low: Array, high: Array) -> Camera:
-    """Camera that sees a box, given by its lowest and highest corner (3,) [m], as a whole."""
+def around(low: Array, high: Array, aspect: float = ASPECT) -> Camera:
+    """Camera that sees a box as a whole.
+
+    Args:
+        low: Lowest corner of the box (3,) [m].
+        high: Highest corner (3,) [m].
+        aspect: Width over height of the picture.
+    """
     middle, up = 0.5 * (low + high), np.array([0.0, 0.0, 1.0])
     direction = _FROM / np.linalg.norm(_FROM)
     turn = rotations_from_quaternions(Camera(middle + direction, middle, up).quaternion[None])[0]
     corners = np.array(list(product(*zip(low, high, strict=True)))) - middle
     right, down, into = (corners @ turn).T
     half = np.tan(0.5 * FIELD)
-    needed = np.maximum(np.abs(right) / (_WIDE * half), np.abs(down) / (_HIGH * half)) - into
+    needed = (
+        np.maximum(np.abs(right) / (_WIDE * aspect * half), np.abs(down) / (_HIGH * half)) - into
+    )
     return Camera(middle + float(needed.max()) * direction, middle, up)
 
 

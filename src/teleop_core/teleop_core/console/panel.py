@@ -249,7 +249,9 @@ def _status_html(view: View, title: str, driver: int | None) -> str:
     where = html.escape(view.recording.name) if view.recording else "not recording"
     who = "nobody drives" if driver is None else f"browser {driver + 1} drives"
     lines.append(f"{html.escape(title)} · run {view.run + 1} · {where} · {who}")
-    lines += [f'<span style="color:#e8a100">⚠ {html.escape(text)}</span>' for text in view.news[:4]]
+    said = [arm.operation_text for arm in view.arms.values() if arm.operation_text]
+    news = [text for text in view.news if not any(known in text for known in said)]
+    lines += [f'<span style="color:#e8a100">⚠ {html.escape(text)}</span>' for text in news[:4]]
     body = "<br>".join(lines)
     # Of one height, so that what is below stays where it is when there is more to say.
     style = "padding:0 0.9em;font-size:0.8em;line-height:1.5;height:9em;overflow-y:auto"

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from teleop_core.console.arm_nodes import ArmNodes, Path
-from teleop_core.console.cameras import FIELD, Camera, around, from_tool, microscope
+from teleop_core.console.cameras import ASPECT, FIELD, Camera, around, from_tool, microscope
 from teleop_core.console.link import Arm, ParameterInfo, View
 from teleop_core.console.stand import PUBLISHED_AXES
 from teleop_core.errors import TeleopError
@@ -99,12 +99,12 @@ class Scene:
 
     # -- cameras ---------------------------------------------------------------------------------
 
-    def whole(self) -> Camera:
-        """Camera that sees all arms and their masters."""
+    def whole(self, aspect: float = ASPECT) -> Camera:
+        """Camera that sees all arms and their masters; ``aspect``: width over height."""
         boxes = [nodes.room() for nodes in self.arms.values()]
         low = np.min([low for low, _ in boxes], axis=0)
         high = np.max([high for _, high in boxes], axis=0)
-        return around(low, high)
+        return around(low, high, aspect)
 
     def tool(self, arm: str = "") -> Camera:
         """Camera on the tool of an arm, as it is now; of the first arm if there is no such arm."""

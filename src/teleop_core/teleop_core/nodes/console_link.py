@@ -55,6 +55,7 @@ SEEN = (
 """Streams that the page draws; others cost the session a message a tick for nothing."""
 PATIENCE = 5.0
 """Time in which an arm must be found, and answer [s]."""
+_LIST = "/list_parameters"
 _SILENCE = 1.0  # after which nothing is fresh [s]
 _PRESS = 0.12  # of a button [s]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
@@ -259,7 +260,10 @@ class LiveLink:
     def parameters(self) -> Mapping[tuple[str, str], ParameterInfo]:
         """All parameters of all nodes, asked for anew."""
         found: dict[tuple[str, str], ParameterInfo] = {}
-        for node in sorted(self._statuses):
+        services = [name for name, _ in self._node.get_service_names_and_types()]
+        for node in sorted(
+            name.removesuffix(_LIST).strip("/") for name in services if name.endswith(_LIST)
+        ):
             with suppress(SessionError):  # it may be leaving
                 found |= {(node, name): info for name, info in self._client.read(node).items()}
         self._known = found
