@@ -37,7 +37,7 @@ class LiveProcess:
             self.process = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
                 env=os.environ | {"TMPDIR": str(self.temporary)} | dict(env or {}),
-                preexec_fn=lambda: [signal.signal(n, signal.SIG_IGN) for n in ignores],
+                preexec_fn=lambda: [signal.signal(n, signal.SIG_IGN) for n in ignores],  # noqa: PLW1509
             )  # fmt: skip
 
     @property

@@ -31,7 +31,7 @@ def test_a_value_that_is_shown_is_read_as_itself(node, name, value):
         ("[a]", (1.0,), None), (3, 2, 3), (3, 2.0, 3.0), (True, False, True),
     ],
 )  # fmt: skip
-def test_lists_are_read_as_people_write_them_and_refused_where_they_are_none(shown, present, wanted):
+def test_lists_are_read_as_people_write_them(shown, present, wanted):
     assert _parsed(shown, ParameterInfo("node", "name", present)) == wanted
 
 

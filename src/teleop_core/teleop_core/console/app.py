@@ -48,10 +48,10 @@ class Console:
             of_session,
         )  # fmt: skip
         self._visitors = Visitors(server.viser, drivers, self.scene)
-        with self.panel.stylus_folder:
-            Steps(
-                server.viser, self.stylus, tuple(arm.name for arm in link.arms), drivers.may_drive
-            )
+        if link.is_live:
+            with self.panel.stylus_folder:
+                arms = tuple(arm.name for arm in link.arms)
+                Steps(server.viser, self.stylus, arms, drivers.may_drive)
         with self.panel.view_tab:
             ViewTab(server.viser, self.scene)
             Insets(server.viser, self.scene)

@@ -60,11 +60,13 @@ class Panel:
         self.scores = {arm.name: LiveScores() for arm in link.arms}
         self._plots: list[Plots] = []
         self._gui.main_panel.dock_right()  # beside the scene, not over it
-        self._add_stop()
+        if link.is_live:
+            self._add_stop()
         self._status = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
-        with tabs.add_tab("Drive"):
-            self._add_drive()
+        if link.is_live:
+            with tabs.add_tab("Drive"):
+                self._add_drive()
         with tabs.add_tab("Plots"):
             self._add_plots()
         with tabs.add_tab("Settings"):
@@ -210,13 +212,21 @@ class Panel:
         if now - self._drawn < _PERIOD:
             return
         self._drawn = now
-        self._set(self._status, _status_html(view, self._link.title, self._driver()))
+        doing = self._doing(view) if self._link.is_live else "replay"
+        self._set(self._status, _status_html(view, self._link.title, doing))
         tables = [
             (f"**{name}**\n\n" if len(self.scores) > 1 else "") + scores.text()
             for name, scores in self.scores.items()
         ]
         if self._live.content != (text := "\n\n".join(tables)):
             self._live.content = text
+
+    def _doing(self, view: View) -> str:
+        """Run, recording, and who drives."""
+        where = view.recording.name if view.recording else "not recording"
+        driver = self._driver()
+        who = "nobody drives" if driver is None else f"browser {driver + 1} drives"
+        return f"run {view.run + 1} · {where} · {who}"
 
     @staticmethod
     def _set(handle: viser.GuiHtmlHandle, text: str) -> None:
@@ -230,8 +240,8 @@ def _next_name(name: str) -> str:
     return f"{head}{int(digits) + 1}" if digits else f"{name}_2"
 
 
-def _status_html(view: View, title: str, driver: int | None) -> str:
-    """State of every arm, mode, recording, run and warnings."""
+def _status_html(view: View, title: str, doing: str) -> str:
+    """State of every arm, mode, what is being done, and warnings."""
     lines = []
     for name, arm in view.arms.items():
         state = State(int(arm.operation["state"])) if arm.operation else None
@@ -246,9 +256,7 @@ def _status_html(view: View, title: str, driver: int | None) -> str:
             hand = "clutched" if arm.state["is_clutched"] else "follows"
             box = "box on" if arm.state["is_fixture_on"] else "no box"
             lines.append(f"{is_fine} × {arm.state['gain']:g} · {hand} · {box}")
-    where = html.escape(view.recording.name) if view.recording else "not recording"
-    who = "nobody drives" if driver is None else f"browser {driver + 1} drives"
-    lines.append(f"{html.escape(title)} · run {view.run + 1} · {where} · {who}")
+    lines.append(f"{html.escape(title)} · {html.escape(doing)}")
     said = [arm.operation_text for arm in view.arms.values() if arm.operation_text]
     news = [text for text in view.news if not any(known in text for known in said)]
     lines += [f'<span style="color:#e8a100">⚠ {html.escape(text)}</span>' for text in news[:4]]

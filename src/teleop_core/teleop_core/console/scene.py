@@ -9,6 +9,7 @@ from teleop_core.console.arm_nodes import ArmNodes, Path
 from teleop_core.console.cameras import ASPECT, FIELD, Camera, around, from_tool, microscope
 from teleop_core.console.link import Arm, ParameterInfo, View
 from teleop_core.console.stand import PUBLISHED_AXES
+from teleop_core.console.targets import targets_of
 from teleop_core.errors import TeleopError
 from teleop_core.geometry import Array
 from teleop_core.mapping.parameters import axis_map
@@ -55,7 +56,7 @@ class Scene:
                     nodes.draw(view.time, seen)
 
     def retune(self, parameters: Mapping[tuple[str, str], ParameterInfo]) -> None:
-        """Take what parameters of the session say of the picture: axes, and kind of fixture.
+        """Take what parameters of the session say of the picture: axes, fixture, targets.
 
         Args:
             parameters: As :meth:`~teleop_core.console.link.Link.parameters` gives them; what they
@@ -68,6 +69,15 @@ class Scene:
                     nodes.turn_master(_map(axes.value))
                 if (kind := parameters.get((node, "fixture.kind"))) is not None:
                     nodes.fixture_kind = str(kind.value)
+                self._show_targets(nodes, targets_of(parameters, name))
+
+    def _show_targets(self, nodes: ArmNodes, points: Array) -> None:
+        """Show the points of a task in the hand's space, as balls of 2 mm."""
+        if len(points):
+            self._server.scene.add_point_cloud(
+                f"{nodes.master.path}/targets", points, colors=(230, 150, 30), point_size=0.002,
+                point_shape="circle",
+            )  # fmt: skip
 
     def remember(self, path: Path) -> None:
         """Take paths from a recording wherever time jumps; without that they begin anew there."""

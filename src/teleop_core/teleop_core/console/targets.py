@@ -1,0 +1,28 @@
+"""Targets: the points to which a simulated operator goes, in the space of the hand."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from teleop_core.console.link import ParameterInfo
+from teleop_core.geometry import Array
+from teleop_core.master.haptic_master import REST_POSITION
+
+_POINTS = {"tour": "operator.tour.points", "points": "operator.points"}
+"""Operators that go to points, and where these stand."""
+
+
+def targets_of(parameters: Mapping[tuple[str, str], ParameterInfo], arm: str) -> Array:
+    """Points (N, 3) [m] in master_base to which the operator of an arm goes; none for others.
+
+    Args:
+        parameters: As :meth:`~teleop_core.console.link.Link.parameters` gives them.
+        arm: Namespace of the arm.
+    """
+    node = f"{arm}/haptic_master" if arm else "haptic_master"
+    values = {name: info.value for (owner, name), info in parameters.items() if owner == node}
+    points = values.get(_POINTS.get(str(values.get("operator.kind")), ""))
+    center = np.array(values.get("operator.center", (0.0, 0.0, 0.0)), dtype=np.float64)
+    if not isinstance(points, tuple) or not points or len(points) % 3:
+        return np.zeros((0, 3))
+    return np.asarray(REST_POSITION + center + np.reshape(np.array(points, np.float64), (-1, 3)))
