@@ -17,7 +17,8 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 PUBLIC = {
-    "teleop_core.calibration", "teleop_core.operation",
+    "teleop_core.calibration", "teleop_core.operation", "teleop_core.console.app",
+    "teleop_core.console.recorded", "teleop_core.console.server",
     "teleop_core", "teleop_core.evaluation", "teleop_core.operators", "teleop_core.fixtures",
     "teleop_core.controllers", "teleop_core.robots", "teleop_core.topics",
     "teleop_core.experiments", "numpy",
@@ -276,6 +277,13 @@ def test_a_stopped_arm_stands_still_and_goes_on_when_it_is_enabled(tmp_path):
     assert stopped == paused == 0.0
     assert min(before, after, again) > 1.0
     assert re.findall(r"s  (\w+)", text)[-1] == "ENABLED"
+
+
+def test_a_page_draws_the_recording_at_the_times_it_is_led_to(tmp_path):
+    lines = run("console_replay", tmp_path).splitlines()
+    places = [re.search(r"tip at \[\s*(-?\d+)", line) for line in lines[:5]]
+    assert len({place[1] for place in places}) > 2  # it moves
+    assert "127.0.0.1 alone" in lines[5]
 
 
 def test_a_person_moves_the_slave_while_they_hold_the_stylus_and_not_else(tmp_path):

@@ -9,7 +9,7 @@ import numpy as np
 
 from teleop_core.geometry import Array
 from teleop_core.robots.robot import Robot
-from teleop_core.topics import STREAMS, Kind, Topic
+from teleop_core.topics import Topic
 
 Setting = (
     bool
@@ -148,16 +148,6 @@ class Link(Protocol):
         Raises:
             TeleopError: The name cannot be used, or the recorder refuses.
         """
-
-
-def empty_view(arms: tuple[Arm, ...]) -> View:
-    """A view of arms that have not spoken yet."""
-    return View(arms={arm.name: ArmView() for arm in arms})
-
-
-def widths(robot: Robot) -> dict[str, int]:
-    """Number of columns of each stream of an arm, by name."""
-    return {topic.name: topic.width(robot.n) for topic in STREAMS if topic.kind is not Kind.REPORT}
 
 
 def box_of(state: Mapping[str, float]) -> tuple[Array, Array] | None:
