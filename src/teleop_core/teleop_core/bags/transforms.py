@@ -62,7 +62,7 @@ class TransformMessages:
         stamps = np.stack((seconds, stamp_ns - seconds * SECOND_NS), axis=1).astype("<u4")
         rows[:, self._stamps] = np.tile(stamps.view(np.uint8), len(self.frames))
         numbers = np.ascontiguousarray(poses[..., _MESSAGE_ORDER], dtype="<f8")
-        rows[:, self._numbers] = numbers.reshape(len(rows), -1).view(np.uint8)
+        rows[:, self._numbers] = numbers.reshape(len(rows), 7 * len(self.frames)).view(np.uint8)
         return [row.tobytes() for row in rows]
 
 
