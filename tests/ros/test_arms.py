@@ -9,6 +9,7 @@ from rich.console import Console
 
 from teleop_core import topics
 from teleop_core.bags.reader import Bag
+from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
 from teleop_core.nodes.live import live
 from teleop_core.robots import load_robot
@@ -61,7 +62,8 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer, tmp_path)
     bag = Bag(tmp_path / "bag")
     streams = {name for name in bag.topics if bag.topics[name].count}
     assert streams == {LEFT_MASTER.name, topics.DIAGNOSTICS.name}
-    assert all(name.startswith("left/") for name in {*bag.topics} - {topics.DIAGNOSTICS.name})
+    shared = {topics.DIAGNOSTICS.name, TF.name}
+    assert all(name.startswith("left/") for name in {*bag.topics} - shared)
     assert (bag.read(LEFT_MASTER).values == REST).all()
 
 
