@@ -10,6 +10,7 @@ from rcl_interfaces.srv import GetParameters
 
 from teleop_core import topics
 from teleop_core.bags.reader import Bag
+from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.naming import taken_names
@@ -74,7 +75,8 @@ def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
         "haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "recorder",
     }  # fmt: skip
     bag = recorded(peer, process, tmp_path, "left/slave_sim")
-    assert all(name.startswith("left/") for name in {*bag.topics} - {topics.DIAGNOSTICS.name})
+    shared = {topics.DIAGNOSTICS.name, TF.name}
+    assert all(name.startswith("left/") for name in {*bag.topics} - shared)
     (score,) = scores(bag)
     assert (score.session.arm, score.session.robot) == ("left", "rcrt1")
     assert score.session.duration_s > 1.0
