@@ -23,6 +23,8 @@ GRIP, ARROW = "/arm/master/grip", 0.07  # the stylus' gizmo, and the heads of it
 DRIVER = "/browser [0-9]+ drives/.exec(document.body.innerText)?.[0]"
 PULLED = 0.012  # m
 STARTS = 180.0  # s; kernels may have to be compiled
+# Software draws the page with the processors that the session needs: a small one.
+SIZE = (1000, 560)  # px
 # The hand's mass swings a little, and it lets go for moments where the browser is slow.
 SHARE, STILL = 0.15, 2e-4  # m
 
@@ -62,7 +64,7 @@ def console(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(console, tmp_path_factory):
     """The page in a browser that drives."""
-    with Tab(tmp_path_factory.mktemp("browser")) as tab:
+    with Tab(tmp_path_factory.mktemp("browser"), *SIZE) as tab:
         tab.visit(console.url)
         tab.shows("ENABLED", STARTS)
         tab.shows("drives")
@@ -152,7 +154,7 @@ def test_page_that_is_loaded_again_goes_on_driving(page):
 def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page, console, tmp_path):
     ready(page)
     saved(page, console, "before_close")
-    with Tab(tmp_path) as other:
+    with Tab(tmp_path, *SIZE) as other:
         other.visit(console.url)
         driver = page.value(DRIVER)
         other.click("Take control")

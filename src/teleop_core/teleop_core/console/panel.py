@@ -18,6 +18,7 @@ from teleop_core.errors import TeleopError
 from teleop_core.operation import State
 
 _PERIOD = 0.2  # between two drawings of the texts [s]
+_PATIENCE = 3.0  # for an arm that must be at rest first [s]
 _WATCHING = "You watch. Take control first."
 _COLORS = {
     State.ENABLED: "#2f9e44", State.PAUSED: "#e8a100", State.DISABLED: "#868e96",
@@ -162,11 +163,20 @@ class Panel:
         told = []
         for arm in self._link.arms:
             for word in words:
-                is_taken, text = self._link.command(word, arm.name)
+                is_taken, text = self._insist(word, arm.name)
                 told.append(f"- {'✓' if is_taken else '⚠'} {text}")
                 if not is_taken and len(words) == 1:
                     self._tell(client, text)
         self._told.content = "\n".join(told)
+
+    def _insist(self, word: str, arm: str) -> tuple[bool, str]:
+        """Send a command; an arm that is coming to rest is asked again for a while."""
+        until = time.monotonic() + _PATIENCE
+        while True:
+            is_taken, text = self._link.command(word, arm)
+            if is_taken or "rest" not in text or time.monotonic() > until:
+                return is_taken, text
+            time.sleep(_PERIOD)
 
     def _press(self, name: str, client: int) -> None:
         for arm in self._link.arms:
