@@ -245,6 +245,11 @@ class Peer:
         """Serve what has come for the test's own node."""
         self._executor.spin_once(0.01)
 
+    def slave_holds(self) -> bool:
+        """Whether the slave says that it holds: for want of commands, or paused since."""
+        message = self.status("slave_sim").message
+        return "holds" in message or "PAUSED" in message
+
     # -- services --------------------------------------------------------------------------------
 
     def call(self, service: Any, name: str, request: Any) -> Any:

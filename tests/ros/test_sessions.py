@@ -237,7 +237,7 @@ def test_restarting_a_node_does_not_move_the_slave(peer, name):
 
     def holds():
         measured.take()
-        return "holds" in peer.status("slave_sim").message
+        return peer.slave_holds()
 
     peer.wait(holds, "slave holds")
     # A new master starts in the inkwell, 20 mm away, and leaves it very slowly.
@@ -263,7 +263,7 @@ def test_slave_holds_when_the_master_dies(peer):
     )
     (master,) = [node for node in peer.nodes if node.name == "haptic_master"]
     master.process.kill()
-    peer.wait(lambda: "holds" in peer.status("slave_sim").message, "slave holds")
+    peer.wait(peer.slave_holds, "slave holds")
     measured.forget()
     peer.wait(lambda: measured.take() > 1000, "samples go on")
     assert np.ptp(np.array(measured.values)[500:, :6], axis=0).max() < STILL
