@@ -4,7 +4,7 @@
 
 Rounds of a composed session alone, of one with the page's server, and of one with a real browser on
 it. A browser without a graphics processor draws with the processor that the session needs; so the
-page is drawn small here, and what the browser itself takes is not counted. Ratios count.
+page is drawn small here, in what the session leaves, and is not counted. Ratios count.
 """
 
 import argparse
@@ -77,7 +77,7 @@ def _watched(command: list[str], seconds: float, browser: str = "") -> dict[str,
 def _open(browser: str) -> "subprocess.Popen[bytes]":
     profile = tempfile.mkdtemp()
     return subprocess.Popen(
-        [browser, *FLAGS, f"--user-data-dir={profile}", f"http://127.0.0.1:{PORT}/"],
+        ["nice", "-n", "15", browser, *FLAGS, f"--user-data-dir={profile}", f"http://127.0.0.1:{PORT}/"],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
     )  # fmt: skip
 

@@ -1,5 +1,6 @@
 """Console: the page of one session, from its opening to its end."""
 
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -19,6 +20,7 @@ from teleop_core.console.visitors import Visitors
 
 RATE = 30.0
 """How often the page is drawn [1/s]."""
+_NICE = 10
 
 
 class Console:
@@ -72,6 +74,8 @@ class Console:
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Draw until something is over; time that was lost is not made up for."""
+        if self._link.is_live:
+            give_way()
         threading.Thread(target=self._refresh, daemon=True).start()
         due = time.monotonic()
         while not is_over():
@@ -84,6 +88,13 @@ class Console:
         """Ask for the parameters, which takes a moment."""
         self.panel.settings.refresh()
         self.scene.retune(self.panel.settings.known)
+
+
+def give_way() -> None:
+    """Let the session go first where processors are short: the page can be late, the arm not."""
+    with suppress(OSError):  # elsewhere than on Linux threads have no priorities of their own
+        for thread in os.listdir("/proc/self/task"):
+            os.setpriority(os.PRIO_PROCESS, int(thread), _NICE)
 
 
 @contextmanager
