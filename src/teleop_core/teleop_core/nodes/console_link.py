@@ -1,7 +1,7 @@
 """Console link: a live session as the page sees it, over its topics and services alone.
 
-Streams are read best effort and one deep: the page looks some thirty times a second and takes the
-newest sample of each, so that a slow page costs the session nothing.
+Of streams it reads the slow copies that the recorder gives (:mod:`teleop_core.nodes.display`);
+where nobody records, the streams themselves, best effort and one deep.
 """
 
 import math
@@ -26,6 +26,7 @@ from teleop_core.bags.messages import Layout, layout, read_any, read_numbers, re
 from teleop_core.console.link import Arm, ArmView, ParameterInfo, Setting, View
 from teleop_core.errors import ParameterError, SessionError
 from teleop_core.geometry import Array
+from teleop_core.nodes.display import SEEN, displayed
 from teleop_core.nodes.observer import WARNING, Status
 from teleop_core.nodes.operation import STOP_TOPIC
 from teleop_core.nodes.parameter_client import ParameterClient, call
@@ -36,23 +37,12 @@ from teleop_core.topics import (
     DIAGNOSTICS,
     HAND_BUTTONS,
     HAND_SERVO_CP,
-    MASTER_MEASURED_CF,
-    MASTER_MEASURED_CP,
     OPERATION,
-    SLAVE_MEASURED_CP,
-    SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
-    SLAVE_SERVO_CP,
-    SLAVE_SETPOINT_JS,
     TELEOP_STATE,
     Topic,
 )
 
-SEEN = (
-    MASTER_MEASURED_CP, MASTER_MEASURED_CF, SLAVE_SERVO_CP, SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS,
-    SLAVE_MEASURED_CP,
-)  # fmt: skip
-"""Streams that the page draws; others cost the session a message a tick for nothing."""
 PATIENCE = 5.0
 """Time in which an arm must be found, and answer [s]."""
 _LIST = "/list_parameters"
@@ -67,8 +57,9 @@ class _Seen:
     def __init__(self, node: Node, topic: Topic, arm: Arm) -> None:
         self.topic, self._joints = topic, arm.robot.joint_names
         self._layout: Layout = layout(topic, self._joints)
-        name = f"/{topic.of_arm(arm.name).name}"
-        self._subscription = Subscription(node, topic.of_arm(arm.name), name, 1)
+        self._node, self._own = node, topic.of_arm(arm.name)
+        self._name, self._since = displayed(self._own).name, time.monotonic()
+        self._subscription = Subscription(node, self._own, self._name, 1)
 
     def take(self, view: ArmView) -> bool:
         """Write the newest sample into a view; whether there was one."""
@@ -76,6 +67,7 @@ class _Seen:
         while (taken := self._subscription.take()) is not None:
             newest = taken[0]
         if newest is None:
+            self._find_another()
             return False
         found: Any = self._layout.decode_one(newest) or read_any(
             self.topic.kind, newest, self._joints
@@ -84,6 +76,16 @@ class _Seen:
             return False  # refused and counted by the nodes that need it
         view.stamp_ns[self.topic.name], view.streams[self.topic.name] = found[0], found[1].copy()
         return True
+
+    def _find_another(self) -> None:
+        """Read the stream itself where nobody says it again."""
+        is_slow = self._name.startswith("/display/")
+        if is_slow and time.monotonic() - self._since > _SILENCE:
+            self._since = time.monotonic()
+            if not self._node.count_publishers(self._name):
+                self._subscription.close()
+                self._name = f"/{self._own.name}"
+                self._subscription = Subscription(self._node, self._own, self._name, 1)
 
 
 class LiveLink:

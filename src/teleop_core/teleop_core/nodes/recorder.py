@@ -16,6 +16,7 @@ from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError, SessionError, TeleopError
 from teleop_core.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.base import SUCCESS, CoreNode
+from teleop_core.nodes.display import LiveDisplay
 from teleop_core.nodes.files import graph_of, session_of
 from teleop_core.nodes.markers import LiveMarkers
 from teleop_core.nodes.model import LiveModel, ModelTopics
@@ -148,7 +149,7 @@ class RecorderNode(CoreNode):
         self._model = self._model_of(configuration, parameters)
         self._model_topics = ModelTopics(self, self._model.topics)
         arms = ("/".join(filter(None, (self.arm, arm))) for arm in graph.namespaces)
-        self._markers = [LiveMarkers(self, arm) for arm in arms]
+        self._shown = [kind(self, arm) for arm in arms for kind in (LiveMarkers, LiveDisplay)]
         every = parameters.every_nth((*topics, *self._model.topics))
         self._recorded = [topic for topic in topics if every[topic.name]]
         self._mark_topic, self._part, self._marks = MARKS.of_arm(self.arm), 0, 0
@@ -243,8 +244,8 @@ class RecorderNode(CoreNode):
         came.sort(key=lambda message: message[0])
         self._last.update({m[1]: m[2] for m in came if m[1].quality is Quality.LATCHED})
         drawn = self._model.messages(came)
-        for markers in self._markers:
-            markers.take(came)
+        for shown in self._shown:
+            shown.take(came)
         for topic, data, _ in drawn:
             self._model_topics.send(topic, data)
         if not self._is_recording:
