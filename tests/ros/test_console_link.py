@@ -10,6 +10,7 @@ from teleop_core.console.link import box_of
 from teleop_core.errors import ParameterError, SessionError
 from teleop_core.nodes.console_link import LiveLink
 from teleop_core.nodes.console_session import ConsoleSession
+from teleop_core.nodes.display import SEEN
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
@@ -26,6 +27,7 @@ def live(tmp_path_factory):
             wait_until(lambda: any("haptic_master is ready" in line for line in said), "nodes")
             view = link.view()
             wait_until(lambda: link.view().arms[""].state and view.recording, "reports")
+            wait_until(lambda: len(link.view().arms[""].streams) == len(SEEN), "streams")
             yield session, link, out
 
 
