@@ -121,7 +121,7 @@ class LiveLink:
         self._known: dict[tuple[str, str], ParameterInfo] = {}
         self._statuses: dict[str, Status] = {}
         self._reports = Subscription(self._node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
-        self._runs = 0
+        self._runs, self._is_pressed = 0, False
         try:
             self._find(patience)
         except BaseException:
@@ -199,6 +199,7 @@ class LiveLink:
                 if any(taken):
                     self._heard = now
                 self._hear(arm, view.arms[arm.name])
+            self._insist(view)
             self._hear_nodes(view)
             view.time, view.is_fresh = now - self._begun, now - self._heard < _SILENCE
             return view
@@ -255,9 +256,22 @@ class LiveLink:
         return bool(answer.success), str(answer.message)
 
     def press(self, *, is_pressed: bool) -> None:
-        """Press or release the emergency stop of all arms; a release is said several times."""
+        """Press or release the emergency stop of all arms; a release is said several times.
+
+        A stop is said again at every :meth:`view` until all arms have said that it is in force.
+        """
+        self._is_pressed = is_pressed
         for _ in range(1 if is_pressed else 3):
             self._button.publish(Bool(data=is_pressed))
+
+    def _insist(self, view: View) -> None:
+        """Say a stop again that some arm has not confirmed."""
+        if self._is_pressed:
+            self._is_pressed = not all(
+                arm.operation.get("is_stopped") for arm in view.arms.values()
+            )
+        if self._is_pressed:
+            self._button.publish(Bool(data=True))
 
     def parameters(self) -> Mapping[tuple[str, str], ParameterInfo]:
         """All parameters of all nodes, asked for anew."""
