@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup crtk_msgs demo test coverage lint format bench bench-setup endurance fuzz clean
+.PHONY: setup crtk_msgs demo test test-slow coverage lint format bench bench-setup endurance fuzz clean
 
 setup: $(VENV)/.installed
 
@@ -47,8 +47,13 @@ format: setup
 # files that stay together would not allow. Elsewhere the tests of a file stay together: what they
 # compile, one process does.
 test: lint crtk_msgs
-	$(BIN)/pytest -n 2 --dist loadfile -m "not ros"
-	$(BIN)/pytest -n 1 -m ros
+	$(BIN)/pytest -n 2 --dist loadfile -m "not ros and not slow"
+	$(BIN)/pytest -n 1 -m "ros and not slow"
+
+# Those that take longer than five seconds each; CI runs both.
+test-slow: setup crtk_msgs
+	$(BIN)/pytest -n 2 --dist loadfile -m "slow and not ros"
+	$(BIN)/pytest -n 1 -m "slow and ros"
 
 # Broken files, texts and messages, other ones each time; an hour. The tests have a short form of it.
 FUZZ_CASES ?= 1000000

@@ -6,6 +6,7 @@ import shutil
 import socket
 import time
 
+import numpy as np
 import pytest
 
 from headless import Headless
@@ -30,6 +31,18 @@ def chromium():
         reason = f"no browser to open the page with; install one of {', '.join(BROWSERS)}"
         (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
     return found
+
+
+VIEWER = """(() => {
+    let place = document.querySelector('canvas'), key;
+    const isFiber = (name) => name.startsWith('__reactFiber');
+    while (!(key = Object.keys(place).find(isFiber))) place = place.parentElement;
+    let fiber = place[key];
+    while (!(fiber.memoizedProps && fiber.memoizedProps.value
+        && fiber.memoizedProps.value.mutable)) fiber = fiber.return;
+    return fiber.memoizedProps.value.mutable.current;
+})()"""
+"""What viser's page holds: its camera, and its nodes by name."""
 
 
 class Tab(Headless):
@@ -120,11 +133,18 @@ class Tab(Headless):
         """Drag slowly, as a hand does, from one point to another [px]; the button stays down."""
         self.mouse("mouseMoved", *begin)
         self.mouse("mousePressed", *begin)
-        for step in range(1, steps + 1):
-            share = step / steps
-            point = [a + share * (b - a) for a, b in zip(begin, end, strict=True)]
+        for point in np.linspace(begin, end, steps + 1)[1:]:
             self.mouse("mouseMoved", *point)
             self.value("new Promise(requestAnimationFrame)")
+
+    def swipe(self, begin, end, steps=20):
+        """The same by a finger, which is lifted at the end."""
+        points = np.linspace(begin, end, steps + 1)
+        for kind, where in zip(["Start"] + ["Move"] * steps, points, strict=True):
+            touched = [{"x": float(where[0]), "y": float(where[1])}]
+            self.call("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=touched)
+            self.value("new Promise(requestAnimationFrame)")
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
     def seen_at(self, node, point):
         """Pixel at which a point of a node of viser's scene is seen, both as they are drawn.
@@ -134,13 +154,7 @@ class Tab(Headless):
             point: Place in its frame [m].
         """
         return self.value(f"""(() => {{
-            let place = document.querySelector('canvas'), key;
-            const isFiber = (name) => name.startsWith('__reactFiber');
-            while (!(key = Object.keys(place).find(isFiber))) place = place.parentElement;
-            let fiber = place[key];
-            while (!(fiber.memoizedProps && fiber.memoizedProps.value
-                && fiber.memoizedProps.value.mutable)) fiber = fiber.return;
-            const {{ camera, nodeRefFromName }} = fiber.memoizedProps.value.mutable.current;
+            const {{ camera, nodeRefFromName }} = {VIEWER};
             const node = nodeRefFromName[{json.dumps(node)}];
             node.updateWorldMatrix(true, false);
             const times = (m, v) => [0, 1, 2, 3].map((row) =>
@@ -151,6 +165,10 @@ class Tab(Headless):
             return [box.x + box.width * (0.5 + 0.5 * x / w),
                     box.y + box.height * (0.5 - 0.5 * y / w)];
         }})()""")
+
+    def place_of(self, node):
+        """Expression of the place of a node of viser's scene in its parent's frame [m]."""
+        return f"{VIEWER}.nodeRefFromName[{json.dumps(node)}].position.toArray()"
 
     def faults(self):
         """Errors that mean something."""

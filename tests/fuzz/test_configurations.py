@@ -44,6 +44,7 @@ ANY_KEY = st.one_of(
 )
 
 
+@pytest.mark.slow
 @fuzz(
     "settings", key=ANY_KEY, value=TEXTS, equals=st.sampled_from(("=", "=", "=", "==", "", " = "))
 )

@@ -133,6 +133,7 @@ VALUES = st.one_of(
 ENTRIES = ("relative_file_paths", "compression_mode", "version", "files", "storage_identifier")
 
 
+@pytest.mark.slow
 def test_any_metadata_leads_to_the_file_beside_it_or_is_refused(folder):
     made(folder / "bag", "none")
     index = folder / "bag" / "metadata.yaml"

@@ -59,6 +59,7 @@ def finds(name, legs, rng):
     return False
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:The iteration is not making good progress")
 @pytest.mark.parametrize("name", SEARCHES)
 def test_what_is_called_open_is_closed_by_no_other_search(name):

@@ -108,6 +108,7 @@ def test_no_joint_steps_farther_than_its_drive_can_whatever_happens(robot):
         assert np.isfinite(chaos.row[name]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", list(PLANTS))
 def test_after_any_faults_the_arm_can_be_made_to_follow_again(plant):
     for seed in range(20):

@@ -77,6 +77,7 @@ def test_a_batch_is_the_same_as_its_single_questions(name, geometry):
         assert np.array_equal(reached[k], robot.solve_fk(single.q).T)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "geometry"), ROBOTS)
 def test_every_robot_is_led_through_the_graph_with_all_its_actuators(name, geometry):
     session = VirtualTime(configure(settings=[f"robot={name}", f"geometry=[{geometry}]"]))

@@ -28,6 +28,7 @@ from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot
+from teleop_core.stage import STAGES
 from teleop_core.topics import Topic
 
 with warnings.catch_warnings():
@@ -287,3 +288,35 @@ def peer(tmp_path: Path) -> Iterator[Peer]:
             yield made
         finally:
             made.close()
+
+
+@pytest.fixture
+def compose(peer, tmp_path):
+    """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
+    started = []
+
+    def start(namespace: str = "", **parameters: dict[str, Any]) -> "subprocess.Popen[bytes]":
+        common = {
+            "recorder": {"out": str(tmp_path / "bag")},
+            "slave_sim": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
+        }
+        file = tmp_path / "session.yaml"
+        groups = {name: {"ros__parameters": p} for name, p in (common | parameters).items()}
+        file.write_text(yaml.safe_dump(groups))
+        command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session"]
+        command += ["--ros-args", "--params-file", str(file)]
+        command += ["-r", f"__ns:=/{namespace}"] if namespace else []
+        env = environment() | {"ROS_DOMAIN_ID": peer.domain}
+        started.append(subprocess.Popen(command, env=env))
+        for name in STAGES:
+            peer.wait_state(f"{namespace}/{name}" if namespace else name, "active")
+        return started[-1]
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.terminate()
+        try:
+            process.wait(TIMEOUT)
+        finally:
+            process.kill()

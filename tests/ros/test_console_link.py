@@ -116,3 +116,12 @@ def test_a_saved_recording_is_there_under_its_name_and_the_next_one_goes_on(live
 def test_without_a_session_there_is_one_clear_error():
     with pytest.raises(SessionError, match="no arm answers on ROS domain 99"):
         LiveLink(99, patience=0.1)
+
+
+def test_of_a_session_in_a_namespace_the_link_knows_arm_and_recorder(compose, peer, tmp_path):
+    compose("left")
+    with LiveLink(int(peer.domain)) as link:
+        assert [arm.name for arm in link.arms] == ["left"]
+        wait_until(lambda: link.view().recording == tmp_path / "bag", "its recorder's report")
+        assert link.save("kept") == tmp_path / "kept"
+        assert Bag(tmp_path / "kept").topics["left/slave/measured_cp"].count

@@ -1,11 +1,5 @@
 """Console's page: in a real browser a person drives a live session, and its recordings prove it."""
 
-import re
-import signal
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,7 +7,9 @@ pytest.importorskip("viser")
 
 import teleop_core as tc
 from browser import Tab, until
+from console_process import STARTS, ConsoleProcess
 from teleop_core.bags.reader import Bag
+from teleop_core.console.recorded_arms import configuration_of
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.operation import State
 
@@ -22,39 +18,16 @@ pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow]
 GRIP, ARROW = "/arm/master/grip", 0.07  # the stylus' gizmo, and the heads of its arrows [m]
 DRIVER = "/browser [0-9]+ drives/.exec(document.body.innerText)?.[0]"
 PULLED = 0.012  # m
-STARTS = 180.0  # s; kernels may have to be compiled
 # Software draws the page with the processors that the session needs: a small one.
 SIZE = (1000, 560)  # px
 # The hand's mass swings a little, and it lets go for moments where the browser is slow.
 SHARE, STILL = 0.15, 2e-4  # m
 
 
-class Console:
-    """The command as a process; what it says is in ``text``."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self._log = folder, folder / "console.log"
-        command = [sys.executable, "-m", "teleop_core.cli", "console", "--port", "0"]
-        command += ["--no-browser", "--out", str(folder / "session")]
-        with self._log.open("wb") as log:
-            self._process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder)
-        told = until(lambda: re.search(r"http://\S+?/(?=;)", self.text), "an address", STARTS)
-        self.url = told[0]
-
-    @property
-    def text(self) -> str:
-        return self._log.read_text(errors="replace")
-
-    def end(self) -> int:
-        """Exit code after Ctrl-C."""
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
-        return self._process.wait(60)
-
-
 @pytest.fixture(scope="module")
 def console(tmp_path_factory):
-    started = Console(tmp_path_factory.mktemp("console"))
+    folder = tmp_path_factory.mktemp("console")
+    started = ConsoleProcess(folder, "--out", folder / "session")
     try:
         yield started
     finally:
@@ -79,11 +52,16 @@ def ready(tab):
     tab.shows("ENABLED", 60)
 
 
-def pull(tab, axis, way=PULLED):
-    """Take an arrow of the stylus and pull it along itself; the button stays down."""
+def arrow(tab, axis, way=PULLED):
+    """Where an arrow of the stylus is seen, and where it would be a way farther [px]."""
     begin, end = np.zeros(3), np.zeros(3)
     begin[axis], end[axis] = ARROW, ARROW + way
-    grip, goal = tab.seen_at(GRIP, begin), tab.seen_at(GRIP, end)
+    return tab.seen_at(GRIP, begin), tab.seen_at(GRIP, end)
+
+
+def pull(tab, axis, way=PULLED):
+    """Take an arrow of the stylus and pull it along itself; the button stays down."""
+    grip, goal = arrow(tab, axis, way)
     tab.mouse("mouseMoved", *grip)
     tab.value("new Promise((done) => setTimeout(done, 200))")
     tab.pull(grip, goal, steps=10)
@@ -109,16 +87,19 @@ def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(page, con
     assert page.hosts() == {console.url.split("/")[2]}
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-def test_stylus_that_is_pulled_moves_the_slave_by_the_gain_and_the_map_of_axes(page, console, axis):
+@pytest.mark.parametrize(("axis", "by"), [(0, "mouse"), (1, "mouse"), (1, "finger")])
+def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(page, console, axis, by):
     ready(page)
-    saved(page, console, f"before_{axis}")
-    page.mouse("mouseReleased", *pull(page, axis))
-    path = saved(page, console, f"pulled_{axis}")
+    saved(page, console, f"before_{axis}_{by}")
+    if by == "mouse":
+        page.mouse("mouseReleased", *pull(page, axis))
+    else:
+        page.swipe(*arrow(page, axis, -PULLED))
+    path = saved(page, console, f"pulled_{axis}_{by}")
     recording, origin = tc.open_recording(path), read_origin(Bag(path))
     hand, slave = way(recording["master/measured_cp"]), way(recording["slave/measured_cp"])
     assert np.argmax(np.abs(hand)) == axis
-    assert hand[axis] == pytest.approx(PULLED, rel=0.5)  # as far as the screen tells
+    assert abs(hand[axis]) == pytest.approx(PULLED, rel=0.5)  # as far as the screen tells
     gain = recording["teleop/state"]["gain"][-1]
     expected = gain * origin.axes @ hand
     assert np.linalg.norm(slave - expected) < SHARE * np.linalg.norm(expected)
@@ -171,3 +152,29 @@ def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page, console, 
     still = after["slave/measured_cp"][["x", "y", "z"]]
     assert np.ptp(still, axis=0).max() < STILL
     assert after["teleop/state"]["is_clutched"][-1] == 1.0
+
+
+def test_recording_that_was_saved_is_scored_by_a_button(page, console):
+    ready(page)
+    page.mouse("mouseReleased", *pull(page, 0))
+    saved(page, console, "to_score")
+    page.click("Scores")
+    page.click("Score the last saved recording")
+    page.shows("tracking error", 60)
+    page.click("Drive")
+
+
+def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(page, console):
+    ready(page)
+    page.click("Settings")
+    page.fill("delays", "[nowhere=0.02]")
+    page.click("New session with these")
+    page.shows("nowhere")
+    page.shows("⚠")
+    page.fill("delays", "[slave/servo_jp=0.02]")
+    page.click("New session with these")
+    until((console.folder / "session_session2").exists, "a new session")
+    page.shows("ENABLED", STARTS)
+    configuration = configuration_of(Bag(saved(page, console, "delayed")))
+    assert configuration.groups["teleop"].delays == ("slave/servo_jp=0.02",)
+    assert not page.faults()

@@ -236,6 +236,7 @@ def findings_of(*faults, may_move=False):
         context.try_shutdown()
 
 
+@pytest.mark.slow
 def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes():
     found = findings_of(may_move=True)
     verdicts = {name: one.verdict for name, one in found.items()}
@@ -263,6 +264,7 @@ def test_faults_of_a_foreign_arm_are_found_by_looking(fault, topic, note):
     assert note in found.note
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "topic", "note"),
     [

@@ -7,15 +7,12 @@ import sys
 import time
 
 import pytest
-import yaml
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from live_process import LiveProcess, are_gone, wait_until
 from teleop_core import topics
 from teleop_core.bags.reader import Bag
-from teleop_core.nodes.children import environment
-from teleop_core.robots import load_robot
 from teleop_core.stage import STAGES
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
@@ -90,27 +87,9 @@ def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer):
 
 
 @pytest.fixture
-def composed(peer, tmp_path):
+def composed(compose):
     """Process of the composed session, all its nodes active."""
-    parameters = {
-        "recorder": {"out": str(tmp_path / "bag")},
-        "haptic_master": {"operator": {"approach_time": 1.0}, "patience": 0.0},
-        "slave_sim": {"start": load_robot("rcrt1").home.tolist()},
-    }
-    file = tmp_path / "session.yaml"
-    file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))
-    command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session", "--ros-args"]
-    process = subprocess.Popen(
-        [*command, "--params-file", str(file)], env=environment() | {"ROS_DOMAIN_ID": peer.domain}
-    )
-    try:
-        for name in NODES:
-            peer.wait_state(name, "active")
-        yield process
-    finally:
-        if process.poll() is None:
-            process.kill()
-        process.wait()
+    return compose(haptic_master={"operator": {"approach_time": 1.0}, "patience": 0.0})
 
 
 @pytest.mark.parametrize("name", ["slave_sim", "recorder"])

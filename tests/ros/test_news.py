@@ -22,6 +22,7 @@ def test_a_node_says_once_what_it_is_reads_and_writes(peer):
     assert "writes /left/slave/setpoint_js, " in line
 
 
+@pytest.mark.slow
 def test_a_node_says_who_commands_it_when_that_changes(peer):
     node = peer.start("slave_sim")
     assert said(node, "comes from") == []

@@ -189,6 +189,7 @@ def test_what_arrived_just_before_the_signal_is_recorded(peer, tmp_path):
     assert np.array_equal(stamps[-100:], last)
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer, tmp_path):
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     peer.start("haptic_master")
@@ -206,6 +207,7 @@ def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer, tm
     assert Bag(bag).topics["master/measured_cp"].count > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_every_node_ends_with_0(peer, tmp_path, number):
     for name in STAGES:

@@ -43,6 +43,7 @@ def count(path, topic=MASTER):
     return Bag(path).topics[topic.name].count
 
 
+@pytest.mark.slow
 def test_a_split_closes_the_recording_and_goes_on_in_the_next_directory(peer, tmp_path):
     session = Session(peer, out=str(tmp_path / "bag"))
     session.send()
@@ -60,6 +61,7 @@ def test_a_split_closes_the_recording_and_goes_on_in_the_next_directory(peer, tm
     assert count(tmp_path / "bag") == first
 
 
+@pytest.mark.slow
 def test_nothing_is_recorded_between_stop_and_start(peer, tmp_path):
     session = Session(peer, out=str(tmp_path / "bag"))
     session.send()

@@ -25,6 +25,7 @@ def start(peer, tmp_path):
     return recorder
 
 
+@pytest.mark.slow
 def test_a_killed_recorder_loses_at_most_a_fifth_of_a_second(peer, tmp_path):
     recorder = start(peer, tmp_path)
     killed_ns = time.time_ns()
@@ -36,6 +37,7 @@ def test_a_killed_recorder_loses_at_most_a_fifth_of_a_second(peer, tmp_path):
     assert len(series) > 1000
 
 
+@pytest.mark.slow
 def test_a_recorder_whose_directory_moved_keeps_everything_and_does_not_say_success(peer, tmp_path):
     recorder = start(peer, tmp_path)
     (tmp_path / "bag").rename(tmp_path / "moved")
@@ -44,6 +46,7 @@ def test_a_recorder_whose_directory_moved_keeps_everything_and_does_not_say_succ
     assert Bag(tmp_path / "moved").topics["master/measured_cp"].count > 1500
 
 
+@pytest.mark.slow
 def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(peer, tmp_path):
     recorder = start(peer, tmp_path)
     (tmp_path / "bag" / "metadata.yaml").mkdir()
@@ -53,6 +56,7 @@ def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(peer
     assert Bag(out).topics["master/measured_cp"].count > 1500
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [(), ("--composed",)], ids=["processes", "composed"])
 def test_live_does_not_call_a_recording_that_moved_recorded(peer, tmp_path, way):
     out = tmp_path / "bag"

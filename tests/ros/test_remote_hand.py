@@ -1,17 +1,11 @@
 """A person as the hand over real topics: what they send moves the slave, silence holds it."""
 
-import subprocess
-import sys
 import time
 
 import numpy as np
 import pytest
-import yaml
 
-from teleop_core.nodes.children import environment
 from teleop_core.operators.remote import rest_pose
-from teleop_core.robots import load_robot
-from teleop_core.stage import STAGES
 from teleop_core.topics import (
     HAND_BUTTONS,
     HAND_SERVO_CP,
@@ -54,28 +48,13 @@ class Person:
 
 
 @pytest.fixture
-def session(peer, tmp_path):
+def session(compose):
     """Composed session whose hand is a person's."""
-    parameters = {
-        "recorder": {"out": str(tmp_path / "bag")},
-        "haptic_master": {"operator": {"kind": "remote", "remote": {"timeout": PATIENT}}}
+    return compose(
+        haptic_master={"operator": {"kind": "remote", "remote": {"timeout": PATIENT}}}
         | {"device": {"friction": 0.0, "gimbal_noise": 0.0}},
-        "slave_sim": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
-        "motion_scaling": {"reach_force": {"is_on": False}, "coarse_gain": GAIN},
-    }
-    file = tmp_path / "session.yaml"
-    file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))
-    command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session", "--ros-args"]
-    process = subprocess.Popen(
-        [*command, "--params-file", str(file)], env=environment() | {"ROS_DOMAIN_ID": peer.domain}
+        motion_scaling={"reach_force": {"is_on": False}, "coarse_gain": GAIN},
     )
-    try:
-        for name in STAGES:
-            peer.wait_state(name, "active")
-        yield process
-    finally:
-        process.terminate()
-        process.wait(60)
 
 
 def is_held(peer):
@@ -93,6 +72,7 @@ def at_rest(listener, count=1000):
     return is_at_rest
 
 
+@pytest.mark.slow
 def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(peer, session):
     peer.wait(lambda: "nobody holds" in peer.status("haptic_master").message, "a hand that waits")
     peer.wait_value("haptic_master", "has_begun", lambda n: n == 1)
@@ -123,6 +103,7 @@ def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(pe
     np.testing.assert_allclose(tips.values[-1][:3] - there, [0.0, -GAIN * 0.004, 0.0], atol=3e-4)
 
 
+@pytest.mark.slow
 def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
     poses, buttons = peer.listen(MASTER_MEASURED_CP), peer.listen(MASTER_BUTTONS)
     hand = {"operator__kind": "remote", "operator__remote__timeout": PATIENT}

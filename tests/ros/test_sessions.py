@@ -44,6 +44,7 @@ def drive(peer, topic, wanted, listener, start=0):
     return stamp
 
 
+@pytest.mark.slow
 def test_slave_refuses_bad_commands_and_holds(peer):
     setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
     peer.start("slave_sim")
@@ -151,6 +152,7 @@ def test_another_frame_and_another_order_of_joints_give_the_same_motion(peer):
     peer.wait(followed, "same setpoint")
 
 
+@pytest.mark.slow
 def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer):
     answers = peer.listen(topics.SLAVE_SERVO_CP)
     peer.start("motion_scaling", feedback_timeout=5.0)
@@ -189,6 +191,7 @@ def chain(peer, master=STEADY):
     peer.start("haptic_master", **master)
 
 
+@pytest.mark.slow
 def test_the_hand_rests_until_the_slave_follows(peer):
     poses = peer.listen(topics.MASTER_MEASURED_CP)
     peer.start("haptic_master", patience=3600.0, **STEADY)

@@ -3,13 +3,10 @@
 import io
 import os
 import signal
-import subprocess
-import sys
 from itertools import pairwise
 
 import numpy as np
 import pytest
-import yaml
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rich.console import Console
@@ -17,7 +14,6 @@ from std_srvs.srv import Trigger
 
 from teleop_core import topics
 from teleop_core.bags.reader import Bag
-from teleop_core.nodes.children import environment
 from teleop_core.nodes.live import live
 from teleop_core.nodes.real_time import apply_options
 from teleop_core.robots import load_robot
@@ -34,28 +30,12 @@ MS = 1_000_000
 
 
 @pytest.fixture
-def session(peer, tmp_path):
+def session(compose):
     """Process of the composed session, all its nodes active."""
-    parameters = {
-        "recorder": {"out": str(tmp_path / "bag")},
-        "haptic_master": {"operator": {"approach_time": 1.0}, "patience": 0.0},
-        "slave_sim": {"start": HOME},  # follows at once
-        "motion_scaling": {"reach_force": {"is_on": False}},
-    }
-    file = tmp_path / "session.yaml"
-    file.write_text(yaml.safe_dump({n: {"ros__parameters": p} for n, p in parameters.items()}))
-    command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session", "--ros-args"]
-    process = subprocess.Popen(
-        [*command, "--params-file", str(file)], env=environment() | {"ROS_DOMAIN_ID": peer.domain}
+    return compose(
+        haptic_master={"operator": {"approach_time": 1.0}, "patience": 0.0},
+        motion_scaling={"reach_force": {"is_on": False}},
     )
-    try:
-        for name in NODES:
-            peer.wait_state(name, "active")
-        yield process
-    finally:
-        if process.poll() is None:
-            process.kill()
-        process.wait()
 
 
 def change(peer, name, transition):

@@ -126,6 +126,7 @@ def test_what_the_user_says_of_the_range_holds(said, chosen):
     assert bool(beyond_this_machine(environment)) != is_local
 
 
+@pytest.mark.slow
 def test_the_stream_of_a_slave_goes_on_while_those_who_read_it_are_killed(peer, tmp_path):
     """A reader that was killed held its writer's thread up for two seconds at a time."""
     peer.start("slave_sim", real_time__freeze_gc=True)

@@ -106,6 +106,7 @@ def waits(times):
     return np.column_stack((swing, -swing, 0.5 * swing))
 
 
+@pytest.mark.slow
 def test_delay_of_one_arm_is_not_one_of_the_other(own_parts):
     register_operator("waits", waits)
     # The scara starts at home; its hand begins at once, whenever it follows.
@@ -120,6 +121,7 @@ def test_delay_of_one_arm_is_not_one_of_the_other(own_parts):
     assert np.ptp(setpoints[1][:, :3], axis=0).min() > 1e-3
 
 
+@pytest.mark.slow
 def test_one_recording_holds_and_replays_both_arms_to_the_bit(tmp_path, both):
     configuration = settings(*ARMS, "duration=1.5")
     simulate(configuration, tmp_path / "bag")

@@ -52,6 +52,7 @@ def test_sim_records_every_stream_at_1_khz(recording):
         assert bag.topics[topic.name].count == TICKS
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(teleop, tmp_path):
     bytes_of = []
     for folder, seed in (("a", 3), ("b", 3), ("c", 4)):
@@ -161,6 +162,7 @@ def test_sim_refuses_wrong_parameter_files_in_one_line(teleop, tmp_path, text, w
     assert word in one_line(teleop("sim", "--config", file, "--out", tmp_path / "bag", code=2))
 
 
+@pytest.mark.slow
 def test_an_existing_output_is_never_overwritten(teleop, recording, tmp_path):
     for command in (("sim",), ("replay", recording)):
         line = one_line(teleop(*command, "--out", recording, code=2))
@@ -207,6 +209,7 @@ def test_recover_saves_what_a_truncated_bag_holds(teleop, recording, tmp_path):
     assert np.array_equal(saved.values, whole.values[: len(saved)])
 
 
+@pytest.mark.slow
 def test_lookups_answer_without_a_session(teleop):
     assert "coarse_box" in teleop("scenarios").stdout
     assert "motion_scaling.fine_gain" in teleop("parameters").stdout
@@ -230,6 +233,7 @@ def test_help_answers_without_numpy(teleop):
     assert "numba" not in done.stderr
 
 
+@pytest.mark.slow
 def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop, tmp_path):
     piped = teleop("sim", "--duration", 1, "--out", tmp_path / "piped")
     assert "simulating" not in piped.stderr
@@ -258,6 +262,7 @@ def test_long_compiling_is_told_while_no_tick_was_made(capsys):
     assert capsys.readouterr().err == f"{COMPILING}, once for this graph …\n"
 
 
+@pytest.mark.slow
 def test_an_operator_can_follow_a_recording(teleop, recording, tmp_path):
     out = tmp_path / "followed"
     settings = ("path.kind=bag", f"path.bag={recording}", "tremor_amplitude=0.0")

@@ -128,6 +128,7 @@ def test_page_draws_every_figure_and_is_as_wide_as_its_window(browser, outcomes,
     assert marks >= sum(outcome.agreeing for outcome in outcomes)
 
 
+@pytest.mark.slow
 def test_sessions_that_several_experiments_need_run_once(outcomes):
     bench = experiments.Bench(settings=SHORT)
     experiments.run("master_slave", bench=bench)

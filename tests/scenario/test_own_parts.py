@@ -102,6 +102,7 @@ def mirror(name, topic, **more):
     return Stage(name, NoParameters, (SLAVE_MEASURED_CP,), (topic,), step=step, **more)
 
 
+@pytest.mark.slow
 def test_delay_to_one_reader_leaves_the_others_in_time(own_parts, plain):
     first, second = (
         Topic(f"test/{name}", Kind.POSE, passed_on("slave/measured_cp")) for name in "ab"
@@ -159,6 +160,7 @@ def limit(name, step):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_plain_stage_gives_the_same_bits_as_the_same_function_compiled(own_parts):
     register_stage(limit("limit", kernel(limit_step)))
     register_stage(limit("plain_limit", limit_step))

@@ -114,6 +114,7 @@ def test_file_of_parts_that_raises_is_told_with_its_line(teleop, tmp_path, text,
     assert re.search(told, line), line
 
 
+@pytest.mark.slow
 def test_command_notes_an_answer_that_nobody_reads_and_scores_without_its_file(
     teleop, forgetful, tmp_path
 ):

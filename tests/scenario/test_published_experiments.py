@@ -59,6 +59,7 @@ def following(block):
     return block[block["command_status"] == CommandStatus.FRESH]
 
 
+@pytest.mark.slow
 def test_position_error_predicts_the_published_one():  # case 28
     # Of three hands; the plant is fitted to tables 7.1-7.6 alone.
     found = {}

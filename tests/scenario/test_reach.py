@@ -228,6 +228,7 @@ def test_unknown_sources_are_told_with_the_alternatives():
         tc.reach(person("pen", 1.0), share=1.5)
 
 
+@pytest.mark.slow
 def test_what_the_command_prints_and_writes_is_what_replay_takes(tmp_path, teleop):
     bag = saved("da_vinci_30", 15.0, tmp_path)
     file, page = tmp_path / "reach.yaml", tmp_path / "reach.html"
@@ -248,6 +249,7 @@ def test_what_the_command_prints_and_writes_is_what_replay_takes(tmp_path, teleo
     assert "too fast for the joints" in text
 
 
+@pytest.mark.slow
 def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop):
     bag = saved("da_vinci_30", 2.0, tmp_path)
     for arguments, expected in (

@@ -18,6 +18,7 @@ SHORT = ("teleop.duration=3.0", "operator.approach_time=1.0", "operator.size=[0.
 TABLES = sorted(map(str, Path("config/robots").glob("*.yaml")))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*list_robots(), *TABLES])
 def test_every_robot_follows_a_session_inside_its_limits_and_drives(name, tmp_path):
     configuration = configure("free_motion", settings=[*SHORT, f"robot={name}"])
@@ -36,6 +37,7 @@ def test_every_robot_follows_a_session_inside_its_limits_and_drives(name, tmp_pa
     assert np.ptp(measured, axis=0).max() > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["A", "B", "C"])
 def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model):
     handle = ("device.handle=mma", f"device.handle_geometry=[model={model}]")

@@ -169,10 +169,10 @@ def test_of_a_long_recording_one_of_some_samples_is_kept_and_memory_stays_bounde
     track = arm.tracks[SLAVE_MEASURED_CP.name]
     whole = session["slave/measured_cp"]
     assert thinning > 5
-    kept = sum(one.rows.nbytes + one.log_ns.nbytes + one.stamp_ns.nbytes
+    kept = sum(one.values.nbytes + one.log_ns.nbytes + one.stamp_ns.nbytes
                for one in arm.tracks.values())  # fmt: skip
     assert kept < 1.2 * most
-    np.testing.assert_array_equal(track.rows, whole.values[::thinning])
+    np.testing.assert_array_equal(track.values, whole.values[::thinning])
 
 
 def test_a_path_is_that_of_the_last_seconds(link, session):

@@ -19,6 +19,7 @@ from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.slave_sim import SlaveSimParameters
 
+pytestmark = pytest.mark.slow
 ARM = load_robot("rcrt1")
 NAMES = ARM.joint_names
 

@@ -213,6 +213,7 @@ def test_minimum_jerk_way_that_would_swing_beyond_a_limit_stays_at_it():
     assert np.allclose(found, TOP + np.minimum(free, 0.0), rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.floats(-1e-3, 5e-3), min_size=2, max_size=8),
     st.integers(2, 90),

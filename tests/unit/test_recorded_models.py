@@ -132,6 +132,7 @@ def test_who_chooses_topics_chooses_the_model_too(tmp_path: Path) -> None:
         )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_each_arm_has_its_own_robot_and_frames(tmp_path: Path) -> None:
     made = tc.run("free_motion", duration=0.2, arms=["right", "left"], out=tmp_path / "bag")
     told = frames(tmp_path / "bag")

@@ -53,6 +53,7 @@ def test_two_loads_share_no_array_that_can_be_written(name):
             assert not any(np.shares_memory(array, other) for other in two.values()), entry
 
 
+@pytest.mark.slow
 @robots
 def test_writing_what_can_be_written_changes_no_answer(name):
     robot = load_robot(name)

@@ -347,6 +347,7 @@ def test_it_is_a_slave_with_nine_actuators_and_a_home_it_can_hold():
         assert np.allclose(result.q, arm.home, atol=SOLVED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", ["", "heading=carried", "sigma_b=0.26, sigma_m=0.26"])
 def test_nine_simulated_actuators_follow_the_master_in_the_graph(options):
     settings = ["robot=scara_stewart", f"geometry=[{options}]"]

@@ -177,6 +177,7 @@ def slave_step_trace(name, axis, size):
     return trace
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "axis"), [(n, a) for n, a in AXES if n != "rps3" and a < 3])
 def test_slave_passes_its_goal_by_no_more_than_what_dry_friction_leaves(name, axis):
     robot = ROBOTS[name]

@@ -1,7 +1,7 @@
 """Series: the messages of one topic as columns, collected stretch by stretch."""
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,10 @@ class Series:
 
     def __len__(self) -> int:
         return len(self.stamp_ns)
+
+    def at(self, time_ns: int) -> int:
+        """Index of the last message that was recorded by a time [ns]; -1 before the first."""
+        return int(np.searchsorted(self.log_ns, time_ns, side="right")) - 1
 
     def only(self, is_kept: NDArray[np.bool_]) -> "Series":
         """Some of the messages; ``is_kept`` has the shape (N,)."""
@@ -167,10 +171,15 @@ def join(parts: list[Series], column: Column) -> Series:
     if not parts:
         width = column.kind.width(len(column.names))
         return Series(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, width)))
+    return replace(in_order(parts), names=column.names, frame_id=column.frame_id)
+
+
+def in_order(parts: list[Series]) -> Series:
+    """One series of all parts, at least one, in the order of log times; names are the first's."""
     stamps = np.concatenate([part.stamp_ns for part in parts])
     logs = np.concatenate([part.log_ns for part in parts])
     values = np.concatenate([part.values for part in parts])
     if (np.diff(logs) < 0).any():
         order = np.argsort(logs, kind="stable")
         stamps, logs, values = stamps[order], logs[order], values[order]
-    return Series(stamps, logs, values, column.names, column.frame_id)
+    return Series(stamps, logs, values, parts[0].names, parts[0].frame_id)

@@ -106,7 +106,16 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
     from teleop_core.nodes.console_session import ConsoleSession
 
     first = arguments.out or Path("bags") / time.strftime("console_%Y%m%d_%H%M%S")
-    texts, number, wanted = [*_OWN, *arguments.settings], 0, list[tuple[str, ...]]()
+    texts, number, wanted = [*_OWN, *arguments.settings], 0, list[str]()
+
+    def renew(more: tuple[str, ...]) -> str:
+        try:
+            _configured(arguments, [*texts, *more])
+        except TeleopError as error:
+            return str(error)
+        wanted.extend(more)
+        return ""
+
     while True:
         out = first if not number else first.with_name(f"{first.name}_session{number + 1}")
         with splash(server) as say:
@@ -120,13 +129,13 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
         wanted.clear()
         with session, link:
             of_session = parameters_of(configuration, (SESSION,))
-            console = Console(server, link, wanted.append, of_session)
+            console = Console(server, link, renew, of_session)
             console.run(lambda session=session: session.is_over or bool(wanted))  # type: ignore[misc]
         session.check()
         print(f"{out}: recorded; next: teleop evaluate {out}", flush=True)
         if not wanted:
             return
-        texts, number = [*texts, *wanted[0]], number + 1
+        texts, number = [*texts, *wanted], number + 1
 
 
 def _configured(arguments: argparse.Namespace, texts: list[str]) -> Any:

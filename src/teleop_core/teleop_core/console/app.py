@@ -3,16 +3,17 @@
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from teleop_core.console.insets import Insets
-from teleop_core.console.link import Link, ParameterInfo
+from teleop_core.console.link import Link, Parameters
 from teleop_core.console.panel import Panel
 from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
+from teleop_core.console.settings import Renew
 from teleop_core.console.steps import Steps
 from teleop_core.console.stylus import Stylus
 from teleop_core.console.view_tab import ViewTab, theme
@@ -29,14 +30,15 @@ class Console:
     Args:
         server: Where it is served.
         link: The session.
-        renew: Begins a new session with other settings; None where the session is not ours.
+        renew: Begins a new session with other settings, and returns why it does not, empty if it
+            does; None where the session is not ours.
         of_session: Parameters of the session as a whole, which no node has.
     """
 
     def __init__(
         self, server: ConsoleServer, link: Link,
-        renew: Callable[[tuple[str, ...]], None] | None = None,
-        of_session: Mapping[tuple[str, str], ParameterInfo] | None = None,
+        renew: Renew | None = None,
+        of_session: Parameters | None = None,
     ) -> None:  # fmt: skip
         self._server, self._link, drivers = server, link, server.drivers
         theme(server.viser, is_dark=False)
@@ -49,6 +51,7 @@ class Console:
             server.viser, link, drivers.may_drive, drivers.take, lambda: drivers.driver, renew,
             of_session,
         )  # fmt: skip
+        self.panel.settings.on_change(self.scene.retune)
         self._visitors = Visitors(server.viser, drivers, self.scene)
         if link.is_live:
             with self.panel.stylus_folder:
@@ -76,18 +79,14 @@ class Console:
         """Draw until something is over; time that was lost is not made up for."""
         if self._link.is_live:
             give_way()
-        threading.Thread(target=self._refresh, daemon=True).start()
+        # Asking the nodes takes a moment.
+        threading.Thread(target=self.panel.settings.refresh, daemon=True).start()
         due = time.monotonic()
         while not is_over():
             self.draw()
             due = max(due + 1.0 / RATE, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
         self._visitors.close()
-
-    def _refresh(self) -> None:
-        """Ask for the parameters, which takes a moment."""
-        self.panel.settings.refresh()
-        self.scene.retune(self.panel.settings.known)
 
 
 def give_way() -> None:
@@ -127,7 +126,6 @@ def replay(server: ConsoleServer, path: Path) -> None:
     console = Console(server, link)
     controls = ReplayControls(server.viser, link)
     console.panel.settings.refresh()
-    console.scene.retune(link.parameters())
     console.scene.remember(link.path)
     console.stylus.show(is_shown=False)
     before = time.monotonic()

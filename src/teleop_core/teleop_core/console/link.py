@@ -105,6 +105,10 @@ class ParameterInfo:
     is_fixed: bool = False
 
 
+Parameters = Mapping[tuple[str, str], ParameterInfo]
+"""Parameters by node and name."""
+
+
 class Link(Protocol):
     """A session as the page sees it. All methods may be called from any thread.
 
@@ -127,7 +131,7 @@ class Link(Protocol):
     def press(self, *, is_pressed: bool) -> None:
         """Press or release the emergency stop of all arms."""
 
-    def parameters(self) -> Mapping[tuple[str, str], ParameterInfo]:
+    def parameters(self) -> Parameters:
         """All parameters of all nodes by node and name, as they were when last asked for."""
 
     def change(self, node: str, name: str, value: Setting) -> str:

@@ -4,16 +4,16 @@ import html
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Literal
 
 import viser
 
 from teleop_core.console.history import History, LiveScores
-from teleop_core.console.link import Link, ParameterInfo, View
+from teleop_core.console.link import Link, Parameters, View
 from teleop_core.console.plots import Plots
-from teleop_core.console.settings import SettingsPanel
+from teleop_core.console.settings import Renew, SettingsPanel
 from teleop_core.errors import TeleopError
 from teleop_core.operation import State
 
@@ -44,15 +44,16 @@ class Panel:
         may_drive: Whether a browser may command the arm.
         take: Makes a browser the one that drives.
         driver: Says who drives: the number of a browser, or None.
-        renew: Begins a new session with other settings; None where the session is not ours.
+        renew: Begins a new session with other settings, and returns why it does not, empty if it
+            does; None where the session is not ours.
         of_session: Parameters of the session as a whole, which no node has.
     """
 
     def __init__(
         self, server: viser.ViserServer, link: Link, may_drive: Callable[[int], bool],
         take: Callable[[int], None], driver: Callable[[], int | None],
-        renew: Callable[[tuple[str, ...]], None] | None = None,
-        of_session: Mapping[tuple[str, str], ParameterInfo] | None = None,
+        renew: Renew | None = None,
+        of_session: Parameters | None = None,
     ) -> None:  # fmt: skip
         self._server, self._gui, self._link = server, server.gui, link
         self._may_drive, self._take, self._driver = may_drive, take, driver

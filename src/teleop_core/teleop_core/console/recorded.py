@@ -2,14 +2,13 @@
 
 import math
 import threading
-from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.console.link import ArmView, ParameterInfo, Setting, View
+from teleop_core.console.link import ArmView, Parameters, Setting, View
 from teleop_core.console.recorded_arms import configuration_of, parameters_of, recorded_arms
 from teleop_core.errors import ParameterError, SessionError
 from teleop_core.geometry import Array
@@ -96,9 +95,9 @@ class RecordedLink:
         chosen = np.unique(np.linspace(begin, max(begin, end - 1), _PATH).astype(int))
         chosen = chosen[chosen < end]
         times = np.asarray((track.log_ns[chosen] - self._start_ns) * 1e-9, np.float64)
-        return times, track.rows[chosen]
+        return times, track.values[chosen]
 
-    def parameters(self) -> Mapping[tuple[str, str], ParameterInfo]:
+    def parameters(self) -> Parameters:
         """Parameters that it was made with; none of recordings that do not tell."""
         return MappingProxyType(self._parameters)
 

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from teleop_core.bags.arms import arm_names, of_arm, topic_prefix
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import read_reports
+from teleop_core.bags.series import Series, in_order
 from teleop_core.console.link import Arm, ArmView, ParameterInfo, Setting
 from teleop_core.errors import RecordingError, TeleopError
-from teleop_core.geometry import Array
 from teleop_core.operation.report import operation_text
 from teleop_core.parameters import specs, values_of
 from teleop_core.robots import load_robot_set
@@ -35,19 +34,6 @@ _STAMP_BYTES = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
-    """Samples of one stream: times of recording (N,) [ns], stamps (N,) [ns], rows (N, width)."""
-
-    log_ns: NDArray[np.int64]
-    stamp_ns: NDArray[np.int64]
-    rows: Array
-
-    def at(self, time_ns: int) -> int:
-        """Index of the last sample that was recorded by a time [ns]; -1 before the first."""
-        return int(np.searchsorted(self.log_ns, time_ns, side="right")) - 1
-
-
-@dataclass(frozen=True, eq=False)
 class RecordedArm:
     """What is kept of one arm.
 
@@ -57,14 +43,14 @@ class RecordedArm:
     """
 
     arm: Arm
-    tracks: Mapping[str, Track]
+    tracks: Mapping[str, Series]
 
     def show(self, time_ns: int, view: ArmView) -> None:
         """Write what was known at a time [ns] into an empty view."""
         for name, track in self.tracks.items():
             if (i := track.at(time_ns)) < 0:
                 continue
-            row = track.rows[i]
+            row = track.values[i]
             if name == TELEOP_STATE.name:
                 view.state = dict(zip(TELEOP_STATE.columns, row.tolist(), strict=True))
             elif name == SLAVE_OPERATION.name:
@@ -142,7 +128,7 @@ def _size(bag: Bag, joints: int) -> int:
     )
 
 
-def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Track]:
+def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
     """Streams and reports of one arm by their plain names."""
     wanted = [
         topic
@@ -151,7 +137,7 @@ def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Track]:
         and info.count
         and info.type == topic.kind.ros_type
     ]
-    parts: dict[str, list[Track]] = {topic.name: [] for topic in wanted}
+    parts: dict[str, list[Series]] = {topic.name: [] for topic in wanted}
     joints = {topic.name for topic in wanted if topic.kind.has_joints}
     seen = dict.fromkeys(parts, 0)
     for block in bag.blocks(wanted):
@@ -163,8 +149,8 @@ def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Track]:
             rows = series.values[chosen].copy()
             if name in joints:
                 rows = rows[:, _order(bag, series.names, rows.shape[1], arm.robot)]
-            parts[name].append(Track(logs, stamps, rows))
-    tracks = {name: _joined(found) for name, found in parts.items() if found}
+            parts[name].append(Series(stamps, logs, rows))
+    tracks = {name: in_order(found) for name, found in parts.items() if found}
     for topic in (TELEOP_STATE, SLAVE_OPERATION):
         if (found := _reports(bag, topic)) is not None:
             tracks[topic.name] = found
@@ -186,18 +172,7 @@ def _order(bag: Bag, names: tuple[str, ...], width: int, robot: Robot) -> list[i
     return [part * len(names) + joint for part in range(width // len(names)) for joint in chosen]
 
 
-def _joined(parts: list[Track]) -> Track:
-    log_ns = np.concatenate([part.log_ns for part in parts])
-    stamp_ns = np.concatenate([part.stamp_ns for part in parts])
-    rows = np.concatenate([part.rows for part in parts])
-    if (np.diff(log_ns) < 0).any():
-        order = np.argsort(log_ns, kind="stable")
-        log_ns, stamp_ns, rows = log_ns[order], stamp_ns[order], rows[order]
-    rows.setflags(write=False)
-    return Track(log_ns, stamp_ns, rows)
-
-
-def _reports(bag: Bag, topic: Topic) -> Track | None:
+def _reports(bag: Bag, topic: Topic) -> Series | None:
     """Numbers of a report, whose own are those of its columns that it has; None without any."""
     info = bag.topics.get(topic.name)
     if info is None or not info.count or info.type != topic.kind.ros_type:
@@ -211,7 +186,7 @@ def _reports(bag: Bag, topic: Topic) -> Track | None:
                 stamps.append(report.stamp_ns)
     if not rows:
         return None
-    return Track(np.array(logs, np.int64), np.array(stamps, np.int64), np.array(rows))
+    return Series(np.array(stamps, np.int64), np.array(logs, np.int64), np.array(rows))
 
 
 def _in_words(operation: Mapping[str, float], joints: tuple[str, ...]) -> str:

@@ -1,13 +1,13 @@
 """Scene: the arms of a session on the page, with their masters, paths, fixtures and forces."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 import viser
 
 from teleop_core.console.arm_nodes import ArmNodes, Path
 from teleop_core.console.cameras import ASPECT, FIELD, Camera, around, from_tool, microscope
-from teleop_core.console.link import Arm, ParameterInfo, View
+from teleop_core.console.link import Arm, Parameters, View
 from teleop_core.console.stand import PUBLISHED_AXES
 from teleop_core.console.targets import targets_of
 from teleop_core.errors import TeleopError
@@ -55,7 +55,7 @@ class Scene:
                 if (seen := view.arms.get(name)) is not None:
                     nodes.draw(view.time, seen)
 
-    def retune(self, parameters: Mapping[tuple[str, str], ParameterInfo]) -> None:
+    def retune(self, parameters: Parameters) -> None:
         """Take what parameters of the session say of the picture: axes, fixture, targets.
 
         Args:

@@ -2,7 +2,6 @@
 
 import secrets
 import threading
-from types import TracebackType
 
 from teleop_core.console.drivers import PATIENCE, Drivers
 from teleop_core.console.guard import Guard, is_loopback, is_wildcard
@@ -73,12 +72,7 @@ class ConsoleServer:
     def __enter__(self) -> "ConsoleServer":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _look(self) -> None:

@@ -1,12 +1,13 @@
 """Settings: every parameter of the session as a control, with its unit, bounds and meaning."""
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import viser
 
-from teleop_core.console.link import Link, ParameterInfo, Setting
+from teleop_core.console.link import Link, ParameterInfo, Parameters, Setting
 from teleop_core.errors import TeleopError
 
 QUICK = (
@@ -16,6 +17,8 @@ QUICK = (
     ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"), ("teleop", "delays"),
 )  # fmt: skip
 """What people change most, by stage and name."""
+Renew = Callable[[tuple[str, ...]], str]
+"""Begins a new session with other settings; why it does not, empty if it does."""
 Guard = Callable[[int | None], bool]
 """Whether a browser may change something; tells it why not."""
 
@@ -28,21 +31,23 @@ class SettingsPanel:
         link: The session.
         may_drive: Asked before anything is changed.
         renew: Begins a new session with other texts ``node.name=value``, for what is fixed while
-            one runs; None where the session is not ours.
+            one runs, and returns why it does not, empty if it does; None where the session is not
+            ours.
         of_session: Parameters of the session as a whole, which no node has.
 
     Attributes:
-        known: All parameters, as they were when they were last asked for.
+        known: All parameters, as they were when they were last asked for, or set here.
     """
 
     def __init__(
         self, server: viser.ViserServer, link: Link, may_drive: Guard,
-        renew: Callable[[tuple[str, ...]], None] | None = None,
-        of_session: Mapping[tuple[str, str], ParameterInfo] | None = None,
+        renew: Renew | None = None,
+        of_session: Parameters | None = None,
     ) -> None:  # fmt: skip
         self._gui, self._link, self._may, self._renew = server.gui, link, may_drive, renew
         self._of_session = dict(of_session or {})
-        self.known: Mapping[tuple[str, str], ParameterInfo] = {}
+        self.known: Parameters = {}
+        self._listeners: list[Callable[[Parameters], None]] = []
         self._wanted: dict[tuple[str, str], Setting] = {}
         self._told = self._gui.add_markdown("parameters are being asked for …")
         self._choice = self._gui.add_dropdown("show", ("most used",), hint="stage and group")
@@ -54,10 +59,14 @@ class SettingsPanel:
         self._choice.on_update(lambda _: self._show())
         begin.on_click(lambda event: self._begin(event.client_id))
 
+    def on_change(self, listener: Callable[[Parameters], None]) -> None:
+        """Call a function with all parameters whenever some of them are other ones."""
+        self._listeners.append(listener)
+
     def refresh(self) -> None:
         """Ask the nodes anew, and show what they say; takes a moment."""
         try:
-            self.known = {**self._of_session, **self._link.parameters()}
+            self._know({**self._of_session, **self._link.parameters()})
         except TeleopError as error:
             self._told.content = f"**{error}**"
             return
@@ -65,6 +74,11 @@ class SettingsPanel:
         self._choice.options = ("most used", *groups)
         self._told.content = f"{len(self.known)} parameters; hover over a name for its meaning"
         self._show()
+
+    def _know(self, known: Parameters) -> None:
+        self.known = known
+        for listener in self._listeners:
+            listener(known)
 
     def _show(self) -> None:
         chosen = self._choice.value
@@ -84,14 +98,15 @@ class SettingsPanel:
         """Control of one parameter, and under it, when needed, why a value was refused."""
         label = info.name.rpartition(".")[2] if not with_node else info.name
         arm = info.node.rpartition("/")[0]
-        control = _control(self._gui, f"{arm} {label}".strip(), info)
+        wanted = self._wanted.get((info.node, info.name), info.value)
+        control = _control(self._gui, f"{arm} {label}".strip(), replace(info, value=wanted))
         why = self._gui.add_markdown("", visible=False)
         self._controls += [control, why]
-        shown = info.value
+        key = info.node, info.name
 
         @control.on_update
         def _(event: viser.GuiEvent) -> None:  # type: ignore[type-arg]
-            nonlocal shown
+            shown = self._wanted.get(key, self.known[key].value)
             if event.client_id is None or control.value == _shown(shown):
                 return
             value = _parsed(control.value, info)
@@ -103,22 +118,31 @@ class SettingsPanel:
             why.content, why.visible = f"⚠ {refusal}", bool(refusal)
             if refusal:
                 control.value = _shown(shown)
-            elif value is not None:
-                shown = value
 
     def _set(self, info: ParameterInfo, value: Setting) -> str:
+        key = info.node, info.name
         if not info.is_fixed:
-            return self._link.change(info.node, info.name, value)
+            refusal = self._link.change(*key, value)
+            if not refusal:
+                self._know({**self.known, key: replace(self.known[key], value=value)})
+            return refusal
         if self._renew is None:
             return f"fixed while it runs: start it with --set {info.name}={_text(value)}"
-        self._wanted[info.node, info.name] = value
-        lines = [f"- `{n}.{p}` = {_text(v)}" for (n, p), v in self._wanted.items()]
-        self._list.content, self._pending.visible = "\n".join(lines), True
+        self._wanted[key] = value
+        self._tell_pending()
         return ""
 
+    def _tell_pending(self, refusal: str = "") -> None:
+        lines = [f"- `{n}.{p}` = {_text(v)}" for (n, p), v in self._wanted.items()]
+        lines += [f"\n⚠ {refusal}"] if refusal else []
+        self._list.content, self._pending.visible = "\n".join(lines), True
+
     def _begin(self, client: int | None) -> None:
-        if self._renew is not None and self._may(client):
-            self._renew(tuple(f"{n}.{p}={_text(v)}" for (n, p), v in self._wanted.items()))
+        if self._renew is None:
+            return
+        texts = tuple(f"{n}.{p}={_text(v)}" for (n, p), v in self._wanted.items())
+        is_allowed = self._may(client)
+        self._tell_pending(self._renew(texts) if is_allowed else "you watch; take control first")
 
 
 def _group(node: str, name: str) -> str:

@@ -1,10 +1,8 @@
 """Targets: the points to which a simulated operator goes, in the space of the hand."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from teleop_core.console.link import ParameterInfo
+from teleop_core.console.link import Parameters
 from teleop_core.geometry import Array
 from teleop_core.master.haptic_master import REST_POSITION
 
@@ -12,7 +10,7 @@ _POINTS = {"tour": "operator.tour.points", "points": "operator.points"}
 """Operators that go to points, and where these stand."""
 
 
-def targets_of(parameters: Mapping[tuple[str, str], ParameterInfo], arm: str) -> Array:
+def targets_of(parameters: Parameters, arm: str) -> Array:
     """Points (N, 3) [m] in master_base to which the operator of an arm goes; none for others.
 
     Args:

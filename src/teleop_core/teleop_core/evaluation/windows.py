@@ -12,6 +12,7 @@ from typing import TypeVar, cast
 import numpy as np
 
 from teleop_core.bags.reader import Bag, Series
+from teleop_core.bags.series import in_order
 from teleop_core.evaluation.state_history import NO_HISTORY, StateHistory, States
 from teleop_core.topics import Topic
 
@@ -122,17 +123,7 @@ def _joined(pending: dict[str, Series], waiting: list[dict[str, Series]]) -> dic
     for block in waiting:
         for name, series in block.items():
             parts.setdefault(name, []).append(series)
-    return {name: _in_order(stretches) for name, stretches in parts.items()}
-
-
-def _in_order(parts: list[Series]) -> Series:
-    stamps = np.concatenate([part.stamp_ns for part in parts])
-    logs = np.concatenate([part.log_ns for part in parts])
-    values = np.concatenate([part.values for part in parts])
-    if (np.diff(logs) < 0).any():
-        order = np.argsort(logs, kind="stable")
-        stamps, logs, values = stamps[order], logs[order], values[order]
-    return Series(stamps, logs, values, parts[0].names, parts[0].frame_id)
+    return {name: in_order(stretches) for name, stretches in parts.items()}
 
 
 def _since(series: Series, until_ns: int) -> Series:

@@ -8,7 +8,6 @@ import math
 import re
 import threading
 import time
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
@@ -23,9 +22,10 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import Layout, layout, read_any, read_numbers, read_reports
-from teleop_core.console.link import Arm, ArmView, ParameterInfo, Setting, View
+from teleop_core.console.link import Arm, ArmView, ParameterInfo, Parameters, Setting, View
 from teleop_core.errors import ParameterError, SessionError
 from teleop_core.geometry import Array
+from teleop_core.graph import RECORDER_NAME
 from teleop_core.nodes.display import SEEN, displayed
 from teleop_core.nodes.observer import WARNING, Status
 from teleop_core.nodes.operation import STOP_TOPIC
@@ -45,7 +45,7 @@ from teleop_core.topics import (
 
 PATIENCE = 5.0
 """Time in which an arm must be found, and answer [s]."""
-_LIST = "/list_parameters"
+_LIST, _SPLIT = "/list_parameters", "/split"
 _SILENCE = 1.0  # after which nothing is fresh [s]
 _PRESS = 0.12  # of a button [s]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
@@ -127,7 +127,7 @@ class LiveLink:
         except BaseException:
             self.close()
             raise
-        self.title = title or str(self._value("recorder", "scenario") or "session")
+        self.title = title or str(self._value(self._recorder(), "scenario") or "session")
 
     def __enter__(self) -> "LiveLink":
         return self
@@ -182,6 +182,12 @@ class LiveLink:
         geometry = self._value(slave, "geometry")
         return load_robot_set(name, geometry if isinstance(geometry, tuple) else ())  # type: ignore[arg-type]
 
+    def _recorder(self) -> str:
+        """Recorder of the session, in its namespace."""
+        services, end = self._node.get_service_names_and_types(), f"/{RECORDER_NAME}{_SPLIT}"
+        found = (name.removesuffix(_SPLIT) for name, _ in services if name.endswith(end))
+        return next(found, RECORDER_NAME).strip("/")
+
     def _value(self, node: str, name: str) -> Setting | None:
         try:
             return self._client.values(node, [name]).get(name)
@@ -226,7 +232,8 @@ class LiveLink:
                     is_new = True
         if not is_new:
             return
-        recorder = self._statuses.get("recorder")
+        named = (s for n, s in self._statuses.items() if n.rsplit("/", 1)[-1] == RECORDER_NAME)
+        recorder = next(named, None)
         if recorder is not None and recorder.values.get("out"):
             is_recording = recorder.number("is_recording") > 0
             view.recording = Path(recorder.values["out"]) if is_recording else None
@@ -273,7 +280,7 @@ class LiveLink:
         if self._is_pressed:
             self._button.publish(Bool(data=True))
 
-    def parameters(self) -> Mapping[tuple[str, str], ParameterInfo]:
+    def parameters(self) -> Parameters:
         """All parameters of all nodes, asked for anew."""
         found: dict[tuple[str, str], ParameterInfo] = {}
         services = [name for name, _ in self._node.get_service_names_and_types()]
@@ -317,7 +324,7 @@ class LiveLink:
         wanted = recording.with_name(name)
         if wanted.exists():
             raise ParameterError("name", name, f"a new one; {wanted} exists already")
-        is_done, text = self._trigger("/recorder/split")
+        is_done, text = self._trigger(f"/{self._recorder()}{_SPLIT}")
         if not is_done:
             raise SessionError(text)
         closed = Path(text.split(" is closed; ")[0])

@@ -4,11 +4,10 @@ A reader of a stream costs its sender a message a tick, in the loop that must no
 recorder has all of them already, and says again what people can see.
 """
 
-import time
 from dataclasses import replace
 
 from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.model import Newest
+from teleop_core.nodes.newest import Cadence, Newest
 from teleop_core.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
@@ -43,18 +42,15 @@ class LiveDisplay:
 
     def __init__(self, node: CoreNode, arm: str) -> None:
         topics = [topic.of_arm(arm) for topic in SEEN]
-        self._newest, self._sent_ns = Newest(tuple(topic.name for topic in topics)), 0
-        self._publishers = {topic.name: node.open_publisher(displayed(topic)) for topic in topics}
+        self._publishers = {topic: node.open_publisher(displayed(topic)) for topic in topics}
+        self._cadence, self._said = Cadence(PERIOD_NS), dict.fromkeys(topics, b"")
 
-    def take(self, came: list[tuple[int, Topic, bytes, int]]) -> None:
-        """Take what came, and say again what is due."""
-        for _, topic, data, _ in came:
-            self._newest.put(topic.name, data)
-        now_ns = time.monotonic_ns()
-        if now_ns - self._sent_ns < PERIOD_NS:
+    def show(self, newest: Newest) -> None:
+        """Say again what is due and new."""
+        if not self._cadence.is_due():
             return
-        self._sent_ns = now_ns
-        for name, publisher in self._publishers.items():
-            if (data := self._newest.data(name)) and publisher.get_subscription_count():
+        for topic, publisher in self._publishers.items():
+            data = newest.data(topic)
+            if data is not self._said[topic] and publisher.get_subscription_count():
                 publisher.publish(data)
-                self._newest.put(name, b"")
+                self._said[topic] = data

@@ -5,46 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.bags.layouts import layout
-from teleop_core.bags.messages import Refusal, read_any
 from teleop_core.bags.transforms import TF
-from teleop_core.geometry import Array
 from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.newest import Newest
 from teleop_core.session.model import ArmModel, Model
 from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_JS, Topic
 
 _NOWHERE = np.zeros(7)
-
-
-class Newest:
-    """Newest message of some topics, as bytes.
-
-    Args:
-        names: Names of the topics.
-    """
-
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self._data = dict.fromkeys(names, b"")
-
-    def put(self, name: str, data: bytes) -> bool:
-        """Take a message; whether it is of these topics."""
-        if name not in self._data:
-            return False
-        self._data[name] = data
-        return True
-
-    def data(self, name: str) -> bytes:
-        """Newest message of a topic; empty before the first."""
-        return self._data[name]
-
-    def values(self, topic: Topic, joint_names: tuple[str, ...] = ()) -> tuple[int, Array] | None:
-        """Stamp [ns] and values of the newest message; None without a sound one."""
-        data = self._data[topic.name]
-        if not data:
-            return None
-        found = layout(topic, joint_names).decode_one(data)
-        answer = read_any(topic.kind, data, joint_names) if found is None else found
-        return None if isinstance(answer, Refusal) else answer
 
 
 class LiveModel:
@@ -61,34 +28,26 @@ class LiveModel:
         self.topics = model.topics
         self._arms, self._period_ns, self._slot = model.arms, model.period_ns, -1
         self._described: set[str] = set()
-        ports = (_joints(arm) for arm in self._arms), (_stylus(arm) for arm in self._arms)
-        self._newest = Newest(tuple(topic.name for port in ports for topic in port))
+        self._read = [topic for arm in self._arms for topic in (_joints(arm), _stylus(arm))]
 
     def forget(self) -> None:
         """Describe the robots again, as at the beginning of a recording."""
         self._described.clear()
 
-    def messages(self, came: list[tuple[int, Topic, bytes, int]]) -> list[tuple[Topic, bytes, int]]:
-        """What is due after messages came: topic, bytes, and the time of their arrival [ns].
-
-        Args:
-            came: Time of arrival [ns], topic, bytes and time of sending [ns] of each, in order.
-        """
-        latest_ns = 0
-        for received_ns, topic, data, _ in came:
-            if self._newest.put(topic.name, data):
-                latest_ns = received_ns
+    def messages(self, newest: Newest) -> list[tuple[Topic, bytes, int]]:
+        """What is due: topic, bytes, and the time of arrival [ns] of the newest that is drawn."""
+        latest_ns = max(map(newest.received_ns, self._read), default=0)
         if not latest_ns or latest_ns // self._period_ns == self._slot:
             return []
         self._slot = latest_ns // self._period_ns
-        due = [message for arm in self._arms for message in self._due(arm)]
+        due = [message for arm in self._arms for message in self._due(arm, newest)]
         return [(topic, data, latest_ns) for topic, data in due]
 
-    def _due(self, arm: ArmModel) -> list[tuple[Topic, bytes]]:
-        joints = self._newest.values(_joints(arm), arm.robot.joint_names)
+    def _due(self, arm: ArmModel, newest: Newest) -> list[tuple[Topic, bytes]]:
+        joints = newest.values(_joints(arm), arm.robot.joint_names)
         if joints is None:
             return []
-        stylus = self._newest.values(_stylus(arm))
+        stylus = newest.values(_stylus(arm))
         stamp_ns, row = joints
         place = _NOWHERE if stylus is None else stylus[1]
         (data,) = arm.transforms(np.array([stamp_ns]), row[None, : arm.robot.n], place[None])

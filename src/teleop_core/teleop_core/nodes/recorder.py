@@ -20,6 +20,7 @@ from teleop_core.nodes.display import LiveDisplay
 from teleop_core.nodes.files import graph_of, session_of
 from teleop_core.nodes.markers import LiveMarkers
 from teleop_core.nodes.model import LiveModel, ModelTopics
+from teleop_core.nodes.newest import Arrival, Newest
 from teleop_core.nodes.recorder_services import serve
 from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Subscription
@@ -39,8 +40,6 @@ end of the process costs is this time and that of writing one chunk, together be
 _PAUSE = 5e-3
 _MOST = 20_000
 """Messages of one publisher a second at most: more are not taken for losses."""
-Arrival = tuple[int, Topic, bytes, int]
-"""Time of arrival [ns], topic, bytes, time of sending [ns]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +146,7 @@ class RecorderNode(CoreNode):
         self._path = Path(parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S"))
         topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
         self._model = self._model_of(configuration, parameters)
-        self._model_topics = ModelTopics(self, self._model.topics)
+        self._model_topics, self._newest = ModelTopics(self, self._model.topics), Newest()
         arms = ("/".join(filter(None, (self.arm, arm))) for arm in graph.namespaces)
         self._shown = [kind(self, arm) for arm in arms for kind in (LiveMarkers, LiveDisplay)]
         every = parameters.every_nth((*topics, *self._model.topics))
@@ -243,9 +242,10 @@ class RecorderNode(CoreNode):
             channel.drain(came)
         came.sort(key=lambda message: message[0])
         self._last.update({m[1]: m[2] for m in came if m[1].quality is Quality.LATCHED})
-        drawn = self._model.messages(came)
+        self._newest.take(came)
+        drawn = self._model.messages(self._newest)
         for shown in self._shown:
-            shown.take(came)
+            shown.show(self._newest)
         for topic, data, _ in drawn:
             self._model_topics.send(topic, data)
         if not self._is_recording:

@@ -1,0 +1,61 @@
+"""Newest: the last message of each topic that the recorder has, for those who show them."""
+
+import time
+
+from teleop_core.bags.layouts import layout
+from teleop_core.bags.messages import Refusal, read_any
+from teleop_core.geometry import Array
+from teleop_core.topics import Topic
+
+Arrival = tuple[int, Topic, bytes, int]
+"""Time of arrival [ns], topic, bytes, time of sending [ns]."""
+
+
+class Newest:
+    """Newest message of every topic, as bytes."""
+
+    def __init__(self) -> None:
+        self._messages: dict[str, Arrival] = {}
+
+    def take(self, came: list[Arrival]) -> None:
+        """Take what came, in its order."""
+        for message in came:
+            self._messages[message[1].name] = message
+
+    def data(self, topic: Topic) -> bytes:
+        """Newest message of a topic, the same object until the next comes; empty before any."""
+        message = self._messages.get(topic.name)
+        return b"" if message is None else message[2]
+
+    def received_ns(self, topic: Topic) -> int:
+        """When it came [ns]; 0 before any."""
+        message = self._messages.get(topic.name)
+        return 0 if message is None else message[0]
+
+    def values(self, topic: Topic, joint_names: tuple[str, ...] = ()) -> tuple[int, Array] | None:
+        """Stamp [ns] and values of the newest message; None without a sound one."""
+        data = self.data(topic)
+        if not data:
+            return None
+        found = layout(topic, joint_names).decode_one(data)
+        answer = read_any(topic.kind, data, joint_names) if found is None else found
+        return None if isinstance(answer, Refusal) else answer
+
+
+class Cadence:
+    """When it is time again.
+
+    Args:
+        period_ns: From one time to the next, at least [ns].
+    """
+
+    def __init__(self, period_ns: int) -> None:
+        self._period_ns, self._last_ns = period_ns, 0
+
+    def is_due(self) -> bool:
+        """Whether it is time; it is not again before the period is over."""
+        now_ns = time.monotonic_ns()
+        if now_ns - self._last_ns < self._period_ns:
+            return False
+        self._last_ns = now_ns
+        return True

@@ -1,0 +1,39 @@
+"""Console process: ``teleop console`` as people start it."""
+
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from browser import until
+
+STARTS = 180.0  # s; kernels may have to be compiled
+
+
+class ConsoleProcess:
+    """The command as a process; what it says is in ``text``, where its page is in ``url``.
+
+    Works in ``folder``; ``arguments`` are those of the command.
+    """
+
+    def __init__(self, folder: Path, *arguments: object) -> None:
+        self.folder, self._log = folder, folder / "console.log"
+        command = [sys.executable, "-m", "teleop_core.cli", "console", *map(str, arguments)]
+        with self._log.open("wb") as log:
+            self.process = subprocess.Popen(
+                [*command, "--port", "0", "--no-browser"], stdout=log, stderr=log, cwd=folder
+            )
+        told = until(lambda: re.search(r"http://\S+?/(?=;)", self.text), "an address", STARTS)
+        self.url = told[0]
+
+    @property
+    def text(self) -> str:
+        """What it has said so far."""
+        return self._log.read_text(errors="replace")
+
+    def end(self) -> int:
+        """Exit code after Ctrl-C."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        return self.process.wait(60)
