@@ -139,7 +139,7 @@ def live(seconds: float, *options: str) -> dict[str, float]:
             cpu = _watch(process)
         if process.returncode:
             raise SystemExit("teleop live failed")
-        return {**_score(bag), "cpu": cpu}
+        return {**score(bag), "cpu": cpu}
 
 
 def _watch(process: "subprocess.Popen[str]") -> float:
@@ -155,17 +155,25 @@ def _watch(process: "subprocess.Popen[str]") -> float:
     return 100.0 * (last - first) / (end - begin)
 
 
-def _score(bag: Path) -> dict[str, float]:
-    """Delay of commands [ms], samples lost [%] and steps of the slave from a recording."""
+def score(bag: Path, since_ns: int = 0, until_ns: int = 2**63 - 1) -> dict[str, float]:
+    """Delay of commands [ms], samples lost [%] and steps a second of the slave in a recording.
+
+    Args:
+        bag: The recording.
+        since_ns: What was stamped before [ns] does not count; nor does what was in the first 2 s.
+        until_ns: What was stamped later does not count.
+    """
     from teleop_core.bags.reader import Bag
 
     names = ("master/measured_cp", "slave/servo_jp", "slave/measured_js")
     master, command, slave = (Bag(bag).read_many(names)[name] for name in names)
     # Start-up is not what is measured: the nodes come up one after the other.
-    is_steady = command.stamp_ns > command.stamp_ns[0] + 2 * 10**9
+    since_ns = max(since_ns, command.stamp_ns[0] + 2 * 10**9)
+    is_steady = (command.stamp_ns > since_ns) & (command.stamp_ns < until_ns)
     delay = (command.log_ns - command.stamp_ns)[is_steady] * 1e-6
-    sent = (master.stamp_ns >= command.stamp_ns[is_steady][0]).sum()
-    steps = slave.stamp_ns[slave.stamp_ns > slave.stamp_ns[0] + 2 * 10**9]
+    first, last = command.stamp_ns[is_steady][[0, -1]]
+    sent = ((master.stamp_ns >= first) & (master.stamp_ns <= last)).sum()
+    steps = slave.stamp_ns[(slave.stamp_ns > since_ns) & (slave.stamp_ns < until_ns)]
     span = (steps[-1] - steps[0]) * 1e-9
     return {
         "median": float(np.median(delay)), "p99": float(np.percentile(delay, 99)),

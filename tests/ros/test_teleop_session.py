@@ -1,8 +1,11 @@
 """The composed session: all nodes in one process, and others in the place of some."""
 
+import ast
 import io
 import os
 import signal
+import subprocess
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +18,7 @@ from std_srvs.srv import Trigger
 from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.nodes.live import live
-from teleop_core.nodes.real_time import apply_options
+from teleop_core.nodes.real_time import apply_options, is_priority_granted
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.layers import RealTimeParameters
@@ -171,6 +174,32 @@ def test_real_time_options_are_taken_or_refused_in_one_line():
         assert apply_options(RealTimeParameters(cpus=tuple(allowed), freeze_gc=False)) == []
     finally:
         os.sched_setaffinity(0, allowed)
+
+
+def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_they_start():
+    if not is_priority_granted():
+        pytest.skip("the system grants no priority")
+    script = """
+import os, subprocess, sys, threading
+from teleop_core.nodes.real_time import apply_options, is_priority_granted
+from teleop_core.session.layers import RealTimeParameters
+threading.Thread(target=sys.stdin.read).start()
+assert apply_options(RealTimeParameters(priority=10, freeze_gc=False)) == []
+threads = sorted(map(int, os.listdir("/proc/self/task")))
+print([os.sched_getparam(thread).sched_priority for thread in threads])
+started = "import os; print(os.sched_getparam(0).sched_priority)"
+subprocess.run([sys.executable, "-c", started], check=True)
+"""
+    process = subprocess.Popen(
+        [sys.executable, "-uc", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    with process:
+        said = [process.stdout.readline().strip() for _ in range(2)]
+        process.stdin.close()
+    main, *others = ast.literal_eval(said[0])
+    assert main == 10
+    assert set(others) == {1}
+    assert said[1] == "0"
 
 
 def test_a_subscriber_that_never_reads_does_not_slow_the_session(peer, session):

@@ -25,6 +25,8 @@ The page is served to this machine alone. With --host others reach it, who need 
 printed with the address. One browser drives at a time; anybody may press the emergency stop.
 """
 _OWN = ("operator=remote", "teleop.duration=86400.0")
+_FIRST = "real_time.priority=20"
+"""A browser on the same processors must not make the session late, where the system grants that."""
 """What a session behind a page is beside its scenario: a person is the hand, until Ctrl-C."""
 
 
@@ -104,9 +106,11 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
 
     ros_module("console_session")
     from teleop_core.nodes.console_session import ConsoleSession
+    from teleop_core.nodes.real_time import is_priority_granted
 
     first = arguments.out or Path("bags") / time.strftime("console_%Y%m%d_%H%M%S")
-    texts, number, wanted = [*_OWN, *arguments.settings], 0, list[str]()
+    own = [*_OWN, _FIRST] if is_priority_granted() else _OWN
+    texts, number, wanted = [*own, *arguments.settings], 0, list[str]()
 
     def renew(more: tuple[str, ...]) -> str:
         try:

@@ -3,10 +3,15 @@
 import ctypes
 import gc
 import os
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 
 from teleop_core.session.layers import RealTimeParameters
 
 _EVERYTHING = 3  # MCL_CURRENT | MCL_FUTURE of mlockall(2)
+_LOWEST = 1
+"""Priority of the threads beside the loop: one that holds the interpreter's lock, for which the
+loop waits, must not itself wait for other processes."""
 
 
 def apply_options(options: RealTimeParameters) -> list[str]:
@@ -44,10 +49,30 @@ def _cpus(cpus: tuple[int, ...]) -> list[str]:
     return []
 
 
+def is_priority_granted() -> bool:
+    """Whether the system lets this process take a priority of SCHED_FIFO."""
+    with ThreadPoolExecutor(1) as pool:
+        return not pool.submit(_take, _LOWEST).result()
+
+
 def _priority(priority: int) -> list[str]:
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except OSError as error:
-        return [f"real_time.priority {priority} refused: {error.strerror}; allow it with an "
+    if refusal := _take(priority):
+        return [f"real_time.priority {priority} refused: {refusal}; allow it with an "
                 "rtprio line in /etc/security/limits.conf or CAP_SYS_NICE"]  # fmt: skip
+    for thread in map(int, os.listdir("/proc/self/task")):
+        with suppress(ProcessLookupError):
+            if os.sched_getscheduler(thread) == os.SCHED_OTHER:
+                _take(_LOWEST, thread)
     return []
+
+
+def _take(priority: int, thread: int = 0) -> str:
+    """Give a thread a priority, but not what it starts; why the system refuses, or nothing."""
+    try:
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(thread, policy, os.sched_param(priority))
+    except ProcessLookupError:
+        raise
+    except OSError as error:
+        return str(error.strerror)
+    return ""
