@@ -10,7 +10,6 @@ import struct
 import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from mcap.data_stream import RecordBuilder
@@ -46,15 +45,6 @@ def encode(*records: McapRecord) -> bytes:
     return bytes(builder.end())  # type: ignore[no-untyped-call]
 
 
-@dataclass(frozen=True)
-class _Written:
-    """A chunk in the file: its index record, messages per channel, and where it ends."""
-
-    index: ChunkIndex
-    counts: dict[int, int]
-    end: int
-
-
 class McapFile:
     """Append-only MCAP file of the profile ``ros2``.
 
@@ -81,7 +71,10 @@ class McapFile:
     ) -> None:
         self.path, self.schemas, self.channels = path, schemas, channels
         self._compression, self._compress = compression.encode(), compress
-        self._chunks: list[_Written] = []
+        # Of a long recording there are many chunks: their index is kept as the bytes it will be.
+        self._index, self._chunk_count = bytearray(), 0
+        self._counts = {channel.id: 0 for channel in channels}
+        self._start_ns, self._end_ns = 0, 0
         self._metadata: list[MetadataIndex] = []
         self._file = path.open("x+b", buffering=0)
         start = MAGIC + encode(Header("ros2", f"teleop_core {__version__}"), *schemas, *channels)
@@ -89,12 +82,8 @@ class McapFile:
             record = encode(Metadata(name, entries))
             self._metadata.append(MetadataIndex(len(start), len(record), name))
             start += record
-        self._data_start = len(start)
+        self._end = len(start)
         self._write(start)
-
-    @property
-    def _end(self) -> int:
-        return self._chunks[-1].end if self._chunks else self._data_start
 
     def _write(self, data: bytes) -> None:
         view = memoryview(data)
@@ -133,14 +122,18 @@ class McapFile:
         self._write(head + tail)
         self._write(data)
         self._write(index)
-        record = ChunkIndex(
+        self._index += encode(ChunkIndex(
             message_start_time=chunk.start_ns, message_end_time=chunk.end_ns,
             chunk_start_offset=begin, chunk_length=9 + length, message_index_offsets=offsets,
             message_index_length=len(index), compression=name.decode(),
             compressed_size=len(data), uncompressed_size=size,
-        )  # fmt: skip
-        counts = {channel: len(entries) for channel, entries in chunk.index.items()}
-        self._chunks.append(_Written(record, counts, at + len(index)))
+        ))  # fmt: skip
+        for channel, entries in chunk.index.items():
+            self._counts[channel] += len(entries)
+        is_first, self._end = not self._chunk_count, at + len(index)
+        self._start_ns = chunk.start_ns if is_first else min(self._start_ns, chunk.start_ns)
+        self._end_ns = max(self._end_ns, chunk.end_ns)
+        self._chunk_count += 1
 
     def sync(self) -> None:
         """Wait until what was appended is on the disk: it outlasts a loss of power then.
@@ -152,16 +145,12 @@ class McapFile:
 
     def statistics(self) -> Statistics:
         """Numbers and times of the messages in whole chunks."""
-        counts = {channel.id: 0 for channel in self.channels}
-        for chunk in self._chunks:
-            for channel, count in chunk.counts.items():
-                counts[channel] += count
         return Statistics(
-            attachment_count=0, channel_count=len(self.channels), channel_message_counts=counts,
-            chunk_count=len(self._chunks), message_count=sum(counts.values()),
-            message_start_time=min((c.index.message_start_time for c in self._chunks), default=0),
-            message_end_time=max((c.index.message_end_time for c in self._chunks), default=0),
-            metadata_count=len(self._metadata), schema_count=len(self.schemas),
+            attachment_count=0, channel_count=len(self.channels),
+            channel_message_counts=dict(self._counts), chunk_count=self._chunk_count,
+            message_count=sum(self._counts.values()), message_start_time=self._start_ns,
+            message_end_time=self._end_ns, metadata_count=len(self._metadata),
+            schema_count=len(self.schemas),
         )  # fmt: skip
 
     def finish(self) -> None:
@@ -212,7 +201,7 @@ class McapFile:
             Opcode.SCHEMA: encode(*self.schemas),
             Opcode.CHANNEL: encode(*self.channels),
             Opcode.STATISTICS: encode(self.statistics()),
-            Opcode.CHUNK_INDEX: encode(*(chunk.index for chunk in self._chunks)),
+            Opcode.CHUNK_INDEX: bytes(self._index),
             Opcode.METADATA_INDEX: encode(*self._metadata),
         }
         offsets, at = [], start

@@ -127,6 +127,7 @@ def replay(server: ConsoleServer, path: Path) -> None:
     controls = ReplayControls(server.viser, link)
     console.panel.settings.refresh()
     console.scene.remember(link.path)
+    console.panel.remember(link.view)
     console.stylus.show(is_shown=False)
     before = time.monotonic()
     while True:

@@ -1,6 +1,7 @@
 """Panel: what an operator's console has: state, commands, stop, save, settings, plots, scores."""
 
 import html
+import math
 import subprocess
 import sys
 import time
@@ -8,16 +9,19 @@ from collections.abc import Callable
 from functools import partial
 from typing import Literal
 
+import numpy as np
 import viser
 
-from teleop_core.console.history import History, LiveScores
+from teleop_core.console.history import SPAN, History, LiveScores
 from teleop_core.console.link import Link, Parameters, View
 from teleop_core.console.plots import Plots
 from teleop_core.console.settings import Renew, SettingsPanel
+from teleop_core.console.tails import is_jump
 from teleop_core.errors import TeleopError
 from teleop_core.operation import State
 
 _PERIOD = 0.2  # between two drawings of the texts [s]
+_RECALLED = 300  # points of a plot
 _PATIENCE = 3.0  # for an arm that must be at rest first [s]
 _WATCHING = "You watch. Take control first."
 _COLORS = {
@@ -58,6 +62,8 @@ class Panel:
         self._server, self._gui, self._link = server, server.gui, link
         self._may_drive, self._take, self._driver = may_drive, take, driver
         self._drawn, self._is_saving = 0.0, False
+        self._recorded: Callable[[float], View] | None = None
+        self._time = 0.0
         self.histories = {arm.name: History(arm) for arm in link.arms}
         self.scores = {arm.name: LiveScores() for arm in link.arms}
         self._plots: list[Plots] = []
@@ -212,8 +218,27 @@ class Panel:
 
     # -- drawing ---------------------------------------------------------------------------------
 
+    def remember(self, recorded: Callable[[float], View]) -> None:
+        """Take plots from a recording wherever time jumps; without that they begin anew there.
+
+        Args:
+            recorded: What was known at a time [s].
+        """
+        self._recorded = recorded
+
+    def _recall(self, recorded: Callable[[float], View], now: float) -> None:
+        """Fill the plots with what was before a time [s]."""
+        for history in self.histories.values():
+            history.clear()
+        for at in np.linspace(max(0.0, now - SPAN), now, _RECALLED, endpoint=False).tolist():
+            for name, arm in recorded(at).arms.items():
+                self.histories[name].add(at, arm, math.nan)
+
     def draw(self, view: View) -> None:
         """Take note of what is known now, and show it a few times a second."""
+        if self._recorded is not None and is_jump(self._time, view.time):
+            self._recall(self._recorded, view.time)
+        self._time = view.time
         for name, arm in view.arms.items():
             self.histories[name].add(view.time, arm, view.delay[0])
             self.scores[name].add(view.time, arm)

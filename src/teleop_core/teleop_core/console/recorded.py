@@ -58,9 +58,9 @@ class RecordedLink:
 
     # -- seeing ----------------------------------------------------------------------------------
 
-    def view(self) -> View:
-        """What was known at the present time of the replay."""
-        time = self._time
+    def view(self, time: float | None = None) -> View:
+        """What was known at a time of the replay [s]; None for the present one."""
+        time = self._time if time is None else time
         view = View(
             time=time, arms={arm.name: ArmView() for arm in self.arms}, is_fresh=True,
             news=self._news(), recording=self._bag.path,
