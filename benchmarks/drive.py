@@ -10,6 +10,7 @@ the published reference filter, which --set reference_filter.is_on=false leaves 
 """
 
 import argparse
+import signal
 import sys
 import tempfile
 import time
@@ -129,6 +130,8 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=1.0, help="how long to drive")
     parser.add_argument("--set", nargs="*", default=[], help="settings of the session")
     arguments = parser.parse_args()
+    # Where a shell runs this in the background, Ctrl-C would be ignored by what is started here.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         bag = folder / "session"
