@@ -15,6 +15,7 @@ from teleop_core.operation import State
 
 pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow]
 
+TIP = "/arm/robot/tip"
 GRIP, ARROW = "/arm/master/grip", 0.07  # the stylus' gizmo, and the heads of its arrows [m]
 DRIVER = "/browser [0-9]+ drives/.exec(document.body.innerText)?.[0]"
 PULLED = 0.012  # m
@@ -45,11 +46,14 @@ def page(console, tmp_path_factory):
 
 
 def ready(tab):
-    """Wait until the slave follows; where it paused because this machine stood still, resume."""
+    """Wait until the slave follows; where it paused because this machine stood still, resume.
+
+    A session begins enabled, on its way to where it starts: it follows nobody until it is there.
+    """
     tab.until("/ENABLED|PAUSED/.test(document.body.innerText)")
     if tab.value("document.body.innerText.includes('PAUSED')"):
         tab.click("Start")
-    tab.shows("ENABLED", 60)
+    tab.shows("ENABLED, homed", 60)
 
 
 def arrow(tab, axis, way=PULLED):
@@ -66,6 +70,20 @@ def pull(tab, axis, way=PULLED):
     tab.value("new Promise((done) => setTimeout(done, 200))")
     tab.pull(grip, goal, steps=10)
     return goal
+
+
+def rest(tab):
+    """Wait until the slave is drawn in one place for half a second."""
+    tab.value(f"""new Promise((done) => {{
+        let last = [], since = 0;
+        const look = () => {{
+            const now = performance.now(), place = {tab.place_of(TIP)};
+            if (!last.length || Math.hypot(...place.map((x, i) => x - last[i])) > {STILL})
+                [last, since] = [place, now];
+            now - since > 500 ? done() : setTimeout(look, 20);
+        }};
+        look();
+    }})""")
 
 
 def saved(page, console, name):
@@ -95,6 +113,7 @@ def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(page, console, a
         page.mouse("mouseReleased", *pull(page, axis))
     else:
         page.swipe(*arrow(page, axis, -PULLED))
+    rest(page)
     path = saved(page, console, f"pulled_{axis}_{by}")
     recording, origin = tc.open_recording(path), read_origin(Bag(path))
     hand, slave = way(recording["master/measured_cp"]), way(recording["slave/measured_cp"])

@@ -177,7 +177,7 @@ def test_real_time_options_are_taken_or_refused_in_one_line():
 
 
 def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_they_start():
-    if not is_priority_granted():
+    if not is_priority_granted(10):
         pytest.skip("the system grants no priority")
     script = """
 import os, subprocess, sys, threading

@@ -25,9 +25,9 @@ The page is served to this machine alone. With --host others reach it, who need 
 printed with the address. One browser drives at a time; anybody may press the emergency stop.
 """
 _OWN = ("operator=remote", "teleop.duration=86400.0")
-_FIRST = "real_time.priority=20"
-"""A browser on the same processors must not make the session late, where the system grants that."""
 """What a session behind a page is beside its scenario: a person is the hand, until Ctrl-C."""
+_PRIORITY = 20
+"""A browser on the same processors must not make the session late, where the system grants that."""
 
 
 def add(commands: Any) -> None:
@@ -109,8 +109,8 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
     from teleop_core.nodes.real_time import is_priority_granted
 
     first = arguments.out or Path("bags") / time.strftime("console_%Y%m%d_%H%M%S")
-    own = [*_OWN, _FIRST] if is_priority_granted() else _OWN
-    texts, number, wanted = [*own, *arguments.settings], 0, list[str]()
+    own = [f"real_time.priority={_PRIORITY}"] if is_priority_granted(_PRIORITY) else []
+    texts, number, wanted = [*_OWN, *own, *arguments.settings], 0, list[str]()
 
     def renew(more: tuple[str, ...]) -> str:
         try:

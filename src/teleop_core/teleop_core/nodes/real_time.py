@@ -49,10 +49,10 @@ def _cpus(cpus: tuple[int, ...]) -> list[str]:
     return []
 
 
-def is_priority_granted() -> bool:
+def is_priority_granted(priority: int) -> bool:
     """Whether the system lets this process take a priority of SCHED_FIFO."""
     with ThreadPoolExecutor(1) as pool:
-        return not pool.submit(_take, _LOWEST).result()
+        return not pool.submit(_take, priority).result()
 
 
 def _priority(priority: int) -> list[str]:
