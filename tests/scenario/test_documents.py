@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 import teleop_core
+from teleop_core.api import configuration
 from teleop_core.cli import _parser
 from teleop_core.session.configuration import parse_setting
+from teleop_core.session.virtual import VirtualTime
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("bags/*.md")]
@@ -69,6 +71,22 @@ def test_every_teleop_command_parses_with_its_settings(name):
         for setting in getattr(arguments, "settings", []):
             if not arguments.parts + arguments.more_parts:
                 assert parse_setting(setting)
+
+
+def test_every_session_of_a_documented_command_can_be_begun():
+    parsers = next(action.choices for action in _parser()._actions if action.dest == "command")
+    helps = "\n".join(parser.format_help() for parser in parsers.values())
+    shown = re.findall(r"^ +teleop (.+?)(?:  .*)?$", helps, re.MULTILINE)
+    begun = set()
+    for line in [*shown, *(line for name in NAMES for line in commands(text_of(name)))]:
+        words = [word for word in shlex.split(line, comments=True) if word != "..."]
+        arguments = _parser().parse_args(words)
+        settings = getattr(arguments, "settings", [])
+        needs_more = re.search(r"\.(py|yaml|csv)\b|=(gamepad|spacemouse|bags/)", line)
+        if settings and hasattr(arguments, "scenario") and not needs_more:
+            VirtualTime(configuration(arguments.scenario, texts=settings))
+            begun.add(line)
+    assert len(begun) > 5
 
 
 def test_commands_are_found_in_the_readme():

@@ -45,6 +45,13 @@ def test_a_time_that_goes_back_begins_history_anew():
     assert len(history.read("error")[0]) == 1
 
 
+def test_a_time_that_stands_still_as_in_a_paused_replay_leaves_history_as_it_is():
+    history = History(ARM)
+    for time in (5.0, 6.0, 6.0, 6.0):
+        history.add(time, seen((0, 0, 0), (0, 0, 0)), 0.0)
+    assert history.read("error")[0].tolist() == [-1.0, 0.0]
+
+
 def test_live_figures_are_those_of_all_samples_at_even_times():
     rng = np.random.default_rng(1)
     reference, place = rng.normal(0.0, 0.01, (2, 200, 3))

@@ -18,7 +18,7 @@ _EPILOG = """\
 starts a session and opens the page; drag the stylus with the mouse and the arm follows:
   teleop console
   teleop console --scenario fine_box --set slave_sim.plant=hardware
-  teleop console --set operator=tour           watch a simulated hand
+  teleop console --set operator=human          watch a simulated hand
   teleop console --attach                      a session that runs already
   teleop console bags/run_1                    replay a recording
 The page is served to this machine alone. With --host others reach it, who need the token that is

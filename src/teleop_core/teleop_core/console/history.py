@@ -40,9 +40,13 @@ class History:
         self._next = self._count = 0
 
     def add(self, time: float, view: ArmView, delay: float) -> None:
-        """Note what is known at a time [s]; a time that is not later begins anew."""
-        if self._count and time <= self._times[self._next - 1]:
-            self.clear()
+        """Note what is known at a time [s]; an earlier one begins anew, the same adds nothing."""
+        if self._count:
+            last = self._times[self._next - 1]
+            if time == last:
+                return
+            if time < last:
+                self.clear()
         row, n = self._rows[self._next], self.arm.robot.n
         row[:] = np.nan
         for name, topic, width in (

@@ -70,6 +70,7 @@ class Plots:
         axis = uplot.Axis(stroke=grey, grid=uplot.Axis_Grid(stroke="rgba(128,128,128,0.2)"))
         return gui.add_uplot(
             tuple(np.zeros(1) for _ in series), tuple(series), title=title, height=170,
+            padding=(10, 8, 0, 0),  # the uppermost number has room under the title
             scales={"x": uplot.Scale(time=False, auto=False, range=(-SPAN, 0.0)),
                     "y": uplot.Scale(auto=True)},
             axes=(axis, axis), legend=uplot.Legend(show=count > 1, live=False),

@@ -1,0 +1,91 @@
+"""Take the console's pictures in the documents anew, in a Chromium of this machine.
+
+python docs/pictures.py            half a minute; look at them before they are committed
+"""
+
+import base64
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import teleop_core as tc
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from browser import VIEWER, Tab  # noqa: E402
+from console_process import ConsoleProcess  # noqa: E402
+
+IMAGES = ROOT / "docs" / "images"
+SCENARIO = "coarse_box"
+AT_A_WALL = f"{VIEWER}.nodeRefFromName['/arm/master/force'].visible"
+NOTICE = "document.querySelector('.mantine-Notification-closeButton')?.click()"  # of the renderer
+SETTLE = 4.0  # the page fades and slides [s]
+
+
+def tidy(tab: Tab, *, is_dark: bool = False) -> None:
+    """Close what only software rendering has to say, and choose light or dark."""
+    tab.value(NOTICE)
+    if is_dark:
+        tab.click("View")
+        tab.click("dark")
+
+
+def keep(tab: Tab, name: str, when: str = "true") -> None:
+    """Write what is seen as soon as an expression is true."""
+    end = time.monotonic() + SETTLE
+    while time.monotonic() < end:  # headless, what slides moves only while it is pictured
+        tab.call("Page.captureScreenshot")
+    tab.until(when, 60)
+    shot = tab.call("Page.captureScreenshot")
+    (IMAGES / name).write_bytes(base64.b64decode(shot["data"]))
+    assert not tab.faults()
+    print(IMAGES / name)
+
+
+def live(folder: Path) -> None:
+    """Take the page of a session: wide and light at a wall, wide and dark, narrow with plots."""
+    console = ConsoleProcess(
+        folder, "--scenario", SCENARIO, "--out", folder / "session", "--set", "operator=human"
+    )
+    with Tab(folder / "wide", 1400, 900) as tab:
+        tab.visit(console.url)
+        tab.shows("follows · box on", 60)
+        tidy(tab)
+        keep(tab, "console.png", AT_A_WALL)
+        tidy(tab, is_dark=True)
+        tab.click("Settings")
+        keep(tab, "console_dark.png")
+    with Tab(folder / "narrow", 800, 900) as tab:
+        tab.visit(console.url)
+        tab.shows("ENABLED")
+        tidy(tab)
+        tab.click("View")
+        tab.click("dark")  # off: it is the page's, whoever looks
+        tab.click("Plots")
+        keep(tab, "console_800.png")
+    assert console.end() == 0
+
+
+def replay(folder: Path) -> None:
+    """Take the page of a recording of two arms, narrow and dark."""
+    settings = {"right/robot": "puma560", "right/haptic_master.seed": 2}
+    out = folder / "two_arms"
+    tc.run(SCENARIO, duration=12.0, out=out, arms=["left", "right"], settings=settings)
+    console = ConsoleProcess(folder, out)
+    with Tab(folder / "replay", 800, 900) as tab:
+        tab.visit(console.url)
+        tab.shows("Play")
+        tidy(tab, is_dark=True)
+        tab.fill("time", "9.5")
+        tab.key("Enter")
+        tab.click("Plots")
+        keep(tab, "console_replay.png")
+    assert console.end() == 0
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as place:
+        live(Path(place))
+        replay(Path(place))
