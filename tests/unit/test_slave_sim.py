@@ -469,6 +469,31 @@ def test_retuning_at_rest_moves_the_arm_by_a_few_counts_at_most(values):
     assert (np.abs(joints - MIDDLE) <= 16 * COUNT).all()
 
 
+@pytest.mark.parametrize("bandwidth", [(0.1,) * 6, tuple((0.5 * DRIVES.bandwidth).tolist())])
+def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth):
+    bench = Bench(start=tuple(MIDDLE.tolist()))
+    bench.go_to(MIDDLE)
+    way = np.array([0.05, 0.05, 0.01, 0.05, 0.05, 0.05])
+
+    def moved(count):
+        """Efforts (count, n) while all joints swing, which they begin where they are fastest."""
+        efforts = []
+        for _ in range(count):
+            bench.tick(MIDDLE + way * np.sin(np.pi * 1e-9 * (bench.now_ns - begin_ns)))
+            efforts.append(bench.slave.arm.effort.copy())
+        return np.array(efforts)
+
+    begin_ns = bench.now_ns
+    before = moved(4000)[-40:]
+    damping = bench.slave.arm.gains[:, 2].copy()
+    bench.slave.retune(
+        SlaveSimParameters(start=tuple(MIDDLE.tolist()), controller=pid(bandwidth=bandwidth))
+    )
+    step = np.abs(moved(3) - before.mean(axis=0)).max(axis=0)
+    # What the integrators held against the derivatives; steps of encoders are in the rest.
+    assert (step < 0.12 * damping * np.pi * way).all()
+
+
 @pytest.mark.parametrize("length", [1, 5, 7])
 @pytest.mark.parametrize("name", ["viscous", "coulomb"])
 def test_list_of_another_length_than_the_joints_is_refused(name, length):

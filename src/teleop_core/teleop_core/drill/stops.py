@@ -101,7 +101,7 @@ STOPS = (
         name="heartbeat", text="stop button falls silent (heartbeat 0.5 s)",
         inject=_miss_heartbeat, undo=_hear_again,
         states=(State.FAULT,), faults=(Fault.HEARTBEAT,), cures=(Cure.RESET,),
-        allowed=HEARTBEAT + 5e-3,
+        allowed=HEARTBEAT + 5e-3, watch=2.0 * HEARTBEAT,
     ),
     Exercise(
         name="disable", text="disabled by service", inject=_disable,

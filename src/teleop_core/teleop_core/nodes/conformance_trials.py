@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.conformance.rows import Verdict
+from teleop_core.errors import SessionError
 from teleop_core.geometry import Array
 from teleop_core.nodes.conformance_arm import Arm, numbers_of
 
@@ -72,6 +73,8 @@ class Trials:
     def _fresh(self, name: str) -> dict[str, Array]:
         tap = self.arm.tap(name)
         self.arm.wait(lambda: tap.take() > 0, 0.5)
+        if tap.newest is None and self.arm.newest(name) is None:
+            raise SessionError(f"{self.arm.path(name)} fell silent in the middle: is the arm gone?")
         return numbers_of(tap.newest)
 
     def go_back(self) -> None:

@@ -49,6 +49,8 @@ class CrtkSlave:
 
     def __init__(self, node: Any, stage: Any) -> None:
         self._node, self._stage, self._motion = node, stage, stage.motion
+        self._motion.load()
+        transform_from_pose(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.empty((4, 4)))
         self._names = stage.robot.joint_names
         self._refusals, self._source = Refusals(node), ""
         self._operation = stage.signals["slave_operation"]

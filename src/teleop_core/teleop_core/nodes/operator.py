@@ -111,8 +111,8 @@ class Operator:
             missing = [
                 name or "the arm" for name, a in self.arms.items() if not a.stopped_after >= 0
             ]
-            who = ", ".join(missing) or "no arm"
-            raise SessionError(f"{who} did not confirm the stop on ROS domain {self.domain}")
+            what = f"{', '.join(missing)} did not confirm" if missing else "no arm confirmed"
+            raise SessionError(f"{what} the stop on ROS domain {self.domain}")
         return self.arms
 
     def release(self) -> None:

@@ -122,6 +122,11 @@ class MotionCommands:
         short = f"the arm comes no nearer than {far:.3g} mm and {turned:.3g}°"
         return Answer.REFUSED, f"refused: out of reach, {short}"
 
+    def load(self) -> None:
+        """Compile what :meth:`solve` calls: beside running ticks a compiler is a bad neighbour."""
+        robot = self._slave.robot
+        self.solve(robot.fk(robot.home))
+
     # -- streams ---------------------------------------------------------------------------------
 
     def drive_joints(self, speed: object, now_ns: int) -> Told:

@@ -9,7 +9,7 @@ import numpy as np
 from teleop_core.controllers import CONTROLLERS, per_joint
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array, pose_from_transform
-from teleop_core.kernels import kernel, pointer
+from teleop_core.kernels import kernel, pointer, records
 from teleop_core.operation import (
     Answer,
     Event,
@@ -29,6 +29,7 @@ from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.robot import Robot
 from teleop_core.signals import DT, assign
 from teleop_core.slave.friction import bristle_damping
+from teleop_core.slave.handover import missing_effort
 from teleop_core.slave.motion import MotionCommands
 from teleop_core.slave.stability import check_stable
 from teleop_core.slave.step import SPEED_LAG, Arm, slave_records, slave_step
@@ -189,6 +190,8 @@ class SlaveSim(RunningStage):
         self.retune(parameters)
         self.reset()
         self._insist_on_stability(parameters)
+        self._gains_in_force = self.arm.gains.copy()
+        self._load_commands()
 
     def reset(self) -> None:
         """Back to home, at rest, with no command in force."""
@@ -214,7 +217,7 @@ class SlaveSim(RunningStage):
         pose_from_transform(transform, row["slave_setpoint_cp"])
 
     def retune(self, parameters: SlaveSimParameters) -> None:
-        """Take new parameters from the next tick on; the control law keeps the arm in balance.
+        """Take new parameters from the next tick on; the effort of the drives makes no step.
 
         Raises:
             ParameterError: A list has another length than the robot has joints, nothing changed; or
@@ -248,6 +251,15 @@ class SlaveSim(RunningStage):
         self._take_operation(parameters.operation)
         if self._stable is not None:
             self._insist_on_stability(parameters)
+            self._hand_over()
+
+    def _hand_over(self) -> None:
+        """Let the integrators take over what new gains give less, once these are in force."""
+        if not np.array_equal(self.arm.gains, self._gains_in_force):
+            speed = np.array(self.state["speed"])
+            missing = missing_effort(self.arm, speed, self._gains_in_force, self.dt)
+            self._law.shift(self.arm.memory, missing)
+            self._gains_in_force = self.arm.gains.copy()
 
     def _insist_on_stability(self, parameters: SlaveSimParameters) -> None:
         """Try the loop, unless it is the one that was tried last; see :func:`check_stable`."""
@@ -309,6 +321,13 @@ class SlaveSim(RunningStage):
         return effort
 
     # -- operation -------------------------------------------------------------------------------
+
+    def _load_commands(self) -> None:
+        """Compile what commands, faults and new gains call: no stop waits for a compiler."""
+        spare = records(self.state.dtype)[0]
+        missing_effort(self.arm, np.zeros(self.robot.n), self.arm.gains, self.dt)
+        _request(self.parameters, spare, int(Event.STOP))
+        _fail(self.parameters, spare, int(Fault.STALL), 0.0, 0.0)
 
     def _begin_operation(self) -> None:
         """Enabled and on the way to where it starts, or disabled and not homed."""

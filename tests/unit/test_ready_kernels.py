@@ -1,0 +1,62 @@
+"""Kernels of commands are there before the first tick: no stop waits for a compiler."""
+
+import subprocess
+import sys
+
+import pytest
+
+from teleop_core.kernels import IS_COMPILED
+
+# In a process of its own: here other tests have compiled them already.
+SCRIPT = """
+import gc
+import numpy as np
+from teleop_core.kernels import is_kernel
+from teleop_core.operation import Fault
+from teleop_core.operation.states import COMMANDS
+from teleop_core.parameters import build
+from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+
+
+def ready():
+    return {f"{k.py_func.__module__}.{k.py_func.__qualname__}"
+            for k in gc.get_objects() if is_kernel(k) and k.signatures}
+
+
+def tick(slave, count):
+    for _ in range(count):
+        slave.signals["now_ns"] += 10**6
+        slave.step()
+
+
+slave = SlaveSim(SlaveSimParameters(starts_at_home=True))
+slave.motion.load()
+tick(slave, 10)
+before = ready()
+slave.press(is_pressed=False, now_ns=0)
+slave.press(is_pressed=True, now_ns=0)
+slave.fail(Fault.STALL, 1.0, 0.5)
+for command in COMMANDS:
+    slave.request(command)
+    tick(slave, 10)
+home = slave.robot.home
+slave.motion.move(home - 0.01)
+slave.motion.move_by(0.0 * home)
+slave.motion.move_to_pose(slave.robot.fk(home))
+slave.motion.drive_joints(0.0 * home, 0)
+slave.motion.drive_tip(np.zeros(6), 0)
+soft = {"starts_at_home": True, "controller.pid.bandwidth": (20.0,) * 6}
+slave.retune(build(SlaveSimParameters, soft))
+tick(slave, 10)
+assert any(name.endswith("_request") for name in before), before
+print(*sorted(ready() - before))
+"""
+
+
+@pytest.mark.skipif(not IS_COMPILED, reason="nothing is compiled in pure Python")
+def test_commands_faults_and_new_gains_compile_nothing_once_a_slave_runs():
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == []
