@@ -48,6 +48,14 @@ def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path):
     assert (code == 0) is all(one["is_passed"] for one in outcomes.values())
 
 
+def test_a_composed_session_stops_where_nobody_presses_and_pauses_where_it_stood_still(tmp_path):
+    _, text, outcomes = run_drill(tmp_path, "--composed", "heartbeat", "freeze_session")
+    found = {name: (one["state"], one["told"]) for name, one in outcomes.items()}
+    assert found == {"heartbeat": ("FAULT", "heartbeat"), "freeze_session": ("PAUSED", "stall")}, (
+        text
+    )
+
+
 def test_a_fault_that_there_is_not_is_refused_in_one_line_before_anything_starts():
     command = [sys.executable, "-m", "teleop_core.cli", "drill", "kill_motion_scalin"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
