@@ -101,11 +101,15 @@ class SlaveSimNode(TickingNode):
             self._crtk.note(stamp_ns)
         values = self.stage.signals[SLAVE_OPERATION.field]
         state = int(values[0])
-        if state != self._told_state:
+        if state != self._told_state and self.executor is not None:
             self._told_state = state
             text = operation_text(self.stage.operation, self.stage.robot.joint_names)
-            log = self.get_logger()
-            log.error(text) if state == State.FAULT else log.info(text)
+            # A line in the log takes milliseconds, which the loop has not.
+            self.executor.create_task(self._tell, text, state == State.FAULT)
+
+    def _tell(self, text: str, is_bad: bool) -> None:
+        log = self.get_logger()
+        log.error(text) if is_bad else log.info(text)
 
     def concerns(self) -> list[str]:
         """A slave that holds still because nothing sound tells it where to go."""
