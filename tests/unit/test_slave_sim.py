@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
+from teleop_core.controllers import CONTROLLERS
 from teleop_core.errors import ParameterError
 from teleop_core.kernels import pointer
 from teleop_core.operation import OperationParameters
@@ -492,6 +493,23 @@ def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth):
     step = np.abs(moved(3) - before.mean(axis=0)).max(axis=0)
     # What the integrators held against the derivatives; steps of encoders are in the rest.
     assert (step < 0.12 * damping * np.pi * way).all()
+
+
+@pytest.mark.parametrize("law", CONTROLLERS.names())
+def test_gains_that_change_before_the_first_tick_count_from_the_begin(law):
+    soft = {"start": AT_HOME, "controller.kind": law}
+    soft |= {f"controller.{law}.bandwidth": tuple((0.5 * DRIVES.bandwidth).tolist())}
+    changed = SlaveSim(build(SlaveSimParameters, soft | {f"controller.{law}.bandwidth": ()}))
+    changed.retune(build(SlaveSimParameters, soft))
+    made = SlaveSim(build(SlaveSimParameters, soft))
+    for k in range(200):
+        for slave in (changed, made):
+            slave.signals["now_ns"] = slave.signals["slave_servo_jp_ns"] = (k + 1) * TICK_NS
+            slave.signals["slave_servo_jp"] = slave.robot.home - 1e-5 * k
+            slave.step()
+    assert (
+        changed.signals["slave_measured_js"].tolist() == made.signals["slave_measured_js"].tolist()
+    )
 
 
 @pytest.mark.parametrize("length", [1, 5, 7])

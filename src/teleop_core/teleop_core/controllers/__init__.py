@@ -55,7 +55,7 @@ class Controller:
         begin: ``begin(memory, measured, effort)`` prepares the memory for an arm at rest at
             ``measured`` that needs ``effort`` to stay there.
         shift: ``shift(memory, effort)`` lets it give so much more from now on, because the
-            feedforward gives so much less.
+            feedforward, or a law with new gains, gives so much less.
         uses_model: Whether the feedforward is (2 n + n²,): behind the gravity that is compensated
             the model's bias, Coriolis, centrifugal and all gravity effort (n,) at measured
             positions and speeds, and its inertia matrix (n, n), row by row. It is the model that is

@@ -20,7 +20,7 @@ _NO_LIMIT = 1e6  # times a drive's: what would be cut off counts as well
 _TICKS = 20  # after which a derivative's filter has forgotten the noise of one difference
 
 
-def missing_effort(arm: Arm, speed: Array, before: Array, dt: float) -> Array:
+def missing_effort(arm: Arm, speed: Array, before: Array, dt: float, ticks: int = _TICKS) -> Array:
     """Effort (n,) that the present gains of an arm give less than those ``before`` [N·m or N].
 
     Both are asked for an arm that goes on evenly as it moves; nothing of the arm is changed.
@@ -30,22 +30,23 @@ def missing_effort(arm: Arm, speed: Array, before: Array, dt: float) -> Array:
         speed: Of its joints, shape (n,) [rad/s or m/s].
         before: Gains until now, shape (n, k).
         dt: Tick [s].
+        ticks: How many it goes on; 0 compiles what is needed, and calls no law.
     """
     efforts = np.zeros((2, len(speed)))
     for gains, effort in zip((before, arm.gains), efforts, strict=True):
         spare = (arm.memory.copy(), arm.setpoint.copy(), arm.measured.copy())
         limit = _NO_LIMIT * arm.limit
-        _go_on(arm.control, gains, *spare, speed, arm.feedforward, limit, dt, effort)
+        _go_on(arm.control, gains, *spare, speed, arm.feedforward, limit, dt, ticks, effort)
     return np.array(efforts[0] - efforts[1])
 
 
 @kernel
 def _go_on(
     control: Any, gains: Array, memory: Array, setpoint: Array, measured: Array, speed: Array,
-    feedforward: Array, limit: Array, dt: float, effort: Array,
+    feedforward: Array, limit: Array, dt: float, ticks: int, effort: Array,
 ) -> None:  # fmt: skip
     """Write the effort for an arm that moved on evenly for some ticks."""
-    for _ in range(_TICKS):
+    for _ in range(ticks):
         for i in range(speed.shape[0]):
             setpoint[i] += speed[i] * dt
             measured[i] += speed[i] * dt

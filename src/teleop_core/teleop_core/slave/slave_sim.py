@@ -217,7 +217,7 @@ class SlaveSim(RunningStage):
         pose_from_transform(transform, row["slave_setpoint_cp"])
 
     def retune(self, parameters: SlaveSimParameters) -> None:
-        """Take new parameters from the next tick on; the effort of the drives makes no step.
+        """Take new parameters from the next tick on; of a law that can shift, effort makes no step.
 
         Raises:
             ParameterError: A list has another length than the robot has joints, nothing changed; or
@@ -255,11 +255,13 @@ class SlaveSim(RunningStage):
 
     def _hand_over(self) -> None:
         """Let the integrators take over what new gains give less, once these are in force."""
-        if not np.array_equal(self.arm.gains, self._gains_in_force):
+        if np.array_equal(self.arm.gains, self._gains_in_force):
+            return
+        if self.state["first_ns"] > 0:  # before the first tick nothing moves, or is compensated
             speed = np.array(self.state["speed"])
             missing = missing_effort(self.arm, speed, self._gains_in_force, self.dt)
             self._law.shift(self.arm.memory, missing)
-            self._gains_in_force = self.arm.gains.copy()
+        self._gains_in_force = self.arm.gains.copy()
 
     def _insist_on_stability(self, parameters: SlaveSimParameters) -> None:
         """Try the loop, unless it is the one that was tried last; see :func:`check_stable`."""
@@ -325,7 +327,7 @@ class SlaveSim(RunningStage):
     def _load_commands(self) -> None:
         """Compile what commands, faults and new gains call: no stop waits for a compiler."""
         spare = records(self.state.dtype)[0]
-        missing_effort(self.arm, np.zeros(self.robot.n), self.arm.gains, self.dt)
+        missing_effort(self.arm, np.zeros(self.robot.n), self.arm.gains, self.dt, ticks=0)
         _request(self.parameters, spare, int(Event.STOP))
         _fail(self.parameters, spare, int(Fault.STALL), 0.0, 0.0)
 
