@@ -9,6 +9,7 @@ from teleop_core.kernels import inner
 from teleop_core.operation.faults import FAULTS, Fault, Reaction
 from teleop_core.operation.parameters import MOST_EVENTS
 from teleop_core.operation.states import STATE_FIELDS, Event, State, change
+from teleop_core.signals import TICK_NS
 
 OPERATION_STATE = [
     *STATE_FIELDS, ("must_brake", "i8"), ("told", "i8"), ("played", "i8"), ("first_ns", "i8"),
@@ -69,6 +70,7 @@ def begin_tick(p: Any, s: Any, now_ns: int) -> None:
     if s.first_ns == 0:
         s.first_ns = now_ns
         s.heard_ns = max(s.heard_ns, now_ns)
+        s.pressed_ns = now_ns - TICK_NS  # no joint was pressed before the first tick
     while s.played < p.event_count and now_ns - s.first_ns >= p.event_ns[s.played]:
         if p.event[s.played] == _STOP:
             fail(p, s, _PRESSED, -1, 0.0, 0.0)
