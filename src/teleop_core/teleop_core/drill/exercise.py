@@ -23,7 +23,6 @@ class Motion(Enum):
 
     RESTS = "it comes to rest by itself"
     GOES_ON = "it goes on, within what the hand asks for"
-    DRIFTS = "nothing holds it: it drifts as far as the fault of its tip allows"
 
 
 class Cure(Enum):

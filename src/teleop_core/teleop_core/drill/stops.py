@@ -119,7 +119,7 @@ STOPS = (
     ),
     Exercise(
         name="slack_gains", text="gains that follow nothing", inject=_take_slack_gains,
-        undo=_take_good_gains, motion=Motion.DRIFTS, states=(State.ENABLED, State.FAULT),
+        undo=_take_good_gains, motion=Motion.GOES_ON, states=(State.ENABLED, State.FAULT),
         faults=(Fault.NONE, Fault.TRACKING, Fault.TIP), cures=(Cure.NOTHING, Cure.RESET), watch=2.0,
     ),
 )  # fmt: skip

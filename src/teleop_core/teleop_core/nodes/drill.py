@@ -87,11 +87,10 @@ def drill(
 
 @dataclass(frozen=True)
 class _Limits:
-    """What the slave's drives can do, and how far its tip may be off."""
+    """What the slave's drives can do."""
 
     speed: Array
     braking: Array
-    tip_error: float
 
 
 class _Drill:
@@ -106,9 +105,8 @@ class _Drill:
         slave = SlaveSim(self._configuration.group("slave_sim"))
         self._robot: Robot = slave.robot
         self._limits = _Limits(
-            np.array(slave.parameters["speed_limit"]), np.array(slave.parameters["braking"]),
-            float(slave.parameters["tip_error"]),
-        )  # fmt: skip
+            np.array(slave.parameters["speed_limit"]), np.array(slave.parameters["braking"])
+        )
         self._rig: LiveRig | None = None
         self._sessions = 0
         self._open: dict[Path, list[Outcome]] = {}
@@ -273,8 +271,6 @@ class _Drill:
             bound += speed * outcome.exercise.allowed
         else:  # the hand asks for no more than its circle, and may be aligned with it anew once
             bound += min(speed * 1e-9 * (end_ns - begin_ns), 4.0 * hand.RADIUS)
-        if outcome.exercise.motion is Motion.DRIFTS:
-            bound += self._limits.tip_error
         outcome.bound = bound
 
     # -- recovery --------------------------------------------------------------------------------

@@ -217,7 +217,7 @@ class SlaveSim(RunningStage):
         pose_from_transform(transform, row["slave_setpoint_cp"])
 
     def retune(self, parameters: SlaveSimParameters) -> None:
-        """Take new parameters from the next tick on; of a law that can shift, effort makes no step.
+        """Take new parameters from the next tick on; a law that can shift takes over what it gave.
 
         Raises:
             ParameterError: A list has another length than the robot has joints, nothing changed; or
