@@ -7,6 +7,8 @@ import base64
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import teleop_core as tc
@@ -24,16 +26,15 @@ NOTICE = "document.querySelector('.mantine-Notification-closeButton')?.click()" 
 SETTLE = 4.0  # the page fades and slides [s]
 
 
-def tidy(tab: Tab, *, is_dark: bool = False) -> None:
-    """Close what only software rendering has to say, and choose light or dark."""
-    tab.value(NOTICE)
-    if is_dark:
-        tab.click("View")
-        tab.click("dark")
+def toggle_dark(tab: Tab) -> None:
+    """Make a light page dark, or the other way round: it is the page's, whoever looks."""
+    tab.click("View")
+    tab.click("dark")
 
 
 def keep(tab: Tab, name: str, when: str = "true") -> None:
-    """Write what is seen as soon as an expression is true."""
+    """Write what is seen as soon as an expression is true, without the notice of the renderer."""
+    tab.value(NOTICE)
     end = time.monotonic() + SETTLE
     while time.monotonic() < end:  # headless, what slides moves only while it is pictured
         tab.call("Page.captureScreenshot")
@@ -44,28 +45,39 @@ def keep(tab: Tab, name: str, when: str = "true") -> None:
     print(IMAGES / name)
 
 
+@contextmanager
+def served(folder: Path, *arguments: object) -> Iterator[ConsoleProcess]:
+    """Run the command, and end it whatever happens."""
+    console = ConsoleProcess(folder, *arguments)
+    try:
+        yield console
+    finally:
+        code = console.end()
+    assert code == 0, console.text
+
+
 def live(folder: Path) -> None:
     """Take the page of a session: wide and light at a wall, wide and dark, narrow with plots."""
-    console = ConsoleProcess(
-        folder, "--scenario", SCENARIO, "--out", folder / "session", "--set", "operator=human"
-    )
+    arguments = ("--scenario", SCENARIO, "--out", folder / "session", "--set", "operator=human")
+    with served(folder, *arguments) as console:
+        wide_and_narrow(console.url, folder)
+
+
+def wide_and_narrow(url: str, folder: Path) -> None:
+    """Take the three."""
     with Tab(folder / "wide", 1400, 900) as tab:
-        tab.visit(console.url)
+        tab.visit(url)
         tab.shows("follows · box on", 60)
-        tidy(tab)
         keep(tab, "console.png", AT_A_WALL)
-        tidy(tab, is_dark=True)
+        toggle_dark(tab)
         tab.click("Settings")
         keep(tab, "console_dark.png")
     with Tab(folder / "narrow", 800, 900) as tab:
-        tab.visit(console.url)
+        tab.visit(url)
         tab.shows("ENABLED")
-        tidy(tab)
-        tab.click("View")
-        tab.click("dark")  # off: it is the page's, whoever looks
+        toggle_dark(tab)
         tab.click("Plots")
         keep(tab, "console_800.png")
-    assert console.end() == 0
 
 
 def replay(folder: Path) -> None:
@@ -73,16 +85,14 @@ def replay(folder: Path) -> None:
     settings = {"right/robot": "puma560", "right/haptic_master.seed": 2}
     out = folder / "two_arms"
     tc.run(SCENARIO, duration=12.0, out=out, arms=["left", "right"], settings=settings)
-    console = ConsoleProcess(folder, out)
-    with Tab(folder / "replay", 800, 900) as tab:
+    with served(folder, out) as console, Tab(folder / "replay", 800, 900) as tab:
         tab.visit(console.url)
         tab.shows("Play")
-        tidy(tab, is_dark=True)
+        toggle_dark(tab)
         tab.fill("time", "9.5")
         tab.key("Enter")
         tab.click("Plots")
         keep(tab, "console_replay.png")
-    assert console.end() == 0
 
 
 if __name__ == "__main__":
