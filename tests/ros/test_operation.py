@@ -1,13 +1,15 @@
 """Operation over real topics: who may move, how an arm is stopped, and how it goes on."""
 
+import signal
 import time
 
 import numpy as np
+import psutil
 import pytest
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.operation import STOP_TOPIC, StopButton
 from teleop_core.operation import State
 from teleop_core.robots import load_robot
 from teleop_core.topics import SLAVE_OPERATION, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS
@@ -144,3 +146,51 @@ def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer
             return not answer.success and "FAULT" in answer.message
 
         peer.wait(is_stopped, f"{arm} stopped")
+
+
+@pytest.fixture
+def button(peer):
+    """A stop button as anybody would write it, found by a slave that is enabled."""
+    peer.start("slave_sim")
+    plain = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
+    peer.wait(lambda: plain.get_subscription_count() == 2, "both readers of the stop")
+    plain.publish(Bool(data=False))
+    return plain
+
+
+def go_on(peer):
+    peer.wait(lambda: command(peer, "reset")[0] and command(peer, "enable")[0], "enabled again")
+
+
+def say(button, *, pressed, released):
+    """So many presses, and so many releases, as fast as they go."""
+    for is_pressed in (True,) * pressed + (False,) * released:
+        button.publish(Bool(data=is_pressed))
+
+
+def test_a_press_that_releases_follow_at_once_stops_the_arm(peer, button):
+    for released in (1, 12, 30, 100) * 3:
+        say(button, pressed=1, released=released)
+        peer.wait(lambda: state(peer) is State.FAULT, f"FAULT before {released} releases")
+        go_on(peer)
+
+
+@pytest.mark.parametrize("released", [35, 6000])
+def test_a_press_while_the_slave_stands_still_stops_the_arm(peer, button, released):
+    slave = psutil.Process(peer.nodes[0].process.pid)
+    slave.send_signal(signal.SIGSTOP)
+    peer.wait(lambda: slave.status() == psutil.STATUS_STOPPED, "a slave that stands still")
+    say(button, pressed=5, released=released)
+    slave.send_signal(signal.SIGCONT)
+    peer.wait(lambda: state(peer) is State.FAULT, "FAULT after the stall")
+    go_on(peer)
+
+
+def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer):
+    button = StopButton(peer.node)
+    button.say(is_pressed=True)
+    peer.start("slave_sim")
+    peer.wait(lambda: state(peer) is State.FAULT, "FAULT by a button that was pressed before")
+    assert not command(peer, "reset")[0]
+    button.say(is_pressed=False)
+    go_on(peer)

@@ -18,7 +18,6 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import Layout, layout, read_any, read_numbers, read_reports
@@ -28,7 +27,7 @@ from teleop_core.geometry import Array
 from teleop_core.graph import RECORDER_NAME
 from teleop_core.nodes.display import SEEN, displayed
 from teleop_core.nodes.observer import WARNING, Status
-from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.parameter_client import ParameterClient, call
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.operation import operation_text
@@ -115,7 +114,7 @@ class LiveLink:
         self._thread = threading.Thread(target=self._spin, name="console link", daemon=True)
         self._thread.start()
         self._lock = threading.Lock()
-        self._button = self._node.create_publisher(Bool, STOP_TOPIC, QoSProfile(depth=10))
+        self._button = StopButton(self._node)
         self._clients: dict[str, Any] = {}
         self._client = ParameterClient(self._node)
         self._known: dict[tuple[str, str], ParameterInfo] = {}
@@ -269,7 +268,7 @@ class LiveLink:
         """
         self._is_pressed = is_pressed
         for _ in range(1 if is_pressed else 3):
-            self._button.publish(Bool(data=is_pressed))
+            self._button.say(is_pressed=is_pressed)
 
     def _insist(self, view: View) -> None:
         """Say a stop again that some arm has not confirmed."""
@@ -278,7 +277,7 @@ class LiveLink:
                 arm.operation.get("is_stopped") for arm in view.arms.values()
             )
         if self._is_pressed:
-            self._button.publish(Bool(data=True))
+            self._button.say(is_pressed=True)
 
     def parameters(self) -> Parameters:
         """All parameters of all nodes, asked for anew."""

@@ -6,11 +6,9 @@ from dataclasses import dataclass, field
 
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from std_msgs.msg import Bool
 
 from teleop_core.bags.messages import read_reports
-from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription, Waiter
 from teleop_core.topics import DIAGNOSTICS
 
@@ -55,7 +53,7 @@ class Observer:
             "teleop_live", context=self._context, use_global_arguments=False, enable_rosout=False
         )
         self._reports = Subscription(self._node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
-        self._button = self._node.create_publisher(Bool, STOP_TOPIC, QoSProfile(depth=10))
+        self._button = StopButton(self._node)
         self._waiter = Waiter(self._context, self._reports)
 
     def __enter__(self) -> "Observer":
@@ -82,7 +80,7 @@ class Observer:
 
     def press(self, *, is_pressed: bool = True) -> None:
         """Press the emergency stop of all arms, or release it; from any thread."""
-        self._button.publish(Bool(data=is_pressed))
+        self._button.say(is_pressed=is_pressed)
 
     def is_active(self, name: str) -> bool:
         """Whether a node has reported that it is at work."""

@@ -8,6 +8,8 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.nodes.streams import Unattended
+from teleop_core.nodes.taking import Taker
+from teleop_core.operation.presses import Presses
 from teleop_core.operation.states import COMMANDS, Answer
 
 STOP_TOPIC = "/teleop/stop"
@@ -15,21 +17,50 @@ STOP_TOPIC = "/teleop/stop"
 _EVERY = 4
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""
+_RELIABLE, _BEST_EFFORT = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
+_VOLATILE, _LATCHED = DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL
+_READERS = ((_RELIABLE, _VOLATILE), (_RELIABLE, _LATCHED), (_BEST_EFFORT, _VOLATILE))
+"""Readers of the stop: for all who send reliably; for the state that a button had before it was
+found; for those who send at best effort, whom a reliable reader does not hear."""
 
 
-def stop_profile(reliability: ReliabilityPolicy) -> QoSProfile:
-    """Quality of a reader of the stop."""
+def stop_profile(
+    reliability: ReliabilityPolicy = _RELIABLE, durability: DurabilityPolicy = _VOLATILE
+) -> QoSProfile:
+    """QoS of a reader of the stop: it keeps all, for a press must not make room for a release."""
     return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=10, reliability=reliability,
-        durability=DurabilityPolicy.VOLATILE,
-    )  # fmt: skip
+        history=HistoryPolicy.KEEP_ALL, reliability=reliability, durability=durability
+    )
+
+
+class StopButton:
+    """Emergency stop button: says its state, and tells it to whoever comes later too.
+
+    Args:
+        node: Node that owns it.
+    """
+
+    def __init__(self, node: Any) -> None:
+        profile = QoSProfile(depth=1, reliability=_RELIABLE, durability=_LATCHED)
+        self._own = node.create_publisher(Bool, STOP_TOPIC, profile)
+
+    def say(self, *, is_pressed: bool) -> None:
+        """Say that it is pressed, or that it is not; from any thread."""
+        self._own.publish(Bool(data=is_pressed))
+
+    @property
+    def listeners(self) -> int:
+        """Readers that were found."""
+        return int(self._own.get_subscription_count())
 
 
 class StopInput:
-    """The emergency stop, looked at in every tick: 2 µs, and no executor on the way.
+    """The emergency stop, looked at in every tick: 1 µs, and no executor on the way.
 
-    Of a reliable sender no message is lost, but a reliable reader does not hear one that sends at
-    best effort; so there are two readers, the second of which is looked at in every fourth tick.
+    The reliable reader is looked at in every tick, the two others in every fourth. No press is lost:
+    readers keep all messages, a message that is missing counts as a press
+    (:class:`~teleop_core.operation.presses.Presses`), and a :class:`StopButton` that was pressed
+    before it was found tells so.
 
     Args:
         node: Node that owns it.
@@ -39,30 +70,41 @@ class StopInput:
         self._node = node
         self._own = [
             node.create_subscription(
-                Bool, STOP_TOPIC, _ignore, stop_profile(reliability), raw=True,
+                Bool, STOP_TOPIC, _ignore, stop_profile(*kind), raw=True,
                 callback_group=Unattended(),
                 event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             )
-            for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT)
+            for kind in _READERS
         ]  # fmt: skip
-        self._take = [own.handle.take_message for own in self._own]
-        self._ticks = 0
+        self._takers = [Taker(own) for own in self._own]
+        self._presses, self._ticks = Presses(), 0
 
     def take(self) -> list[bool]:
         """What was said since the last call, oldest first: pressed or not; mostly nothing."""
-        found = []
+        found: list[bool] = []
         self._ticks += 1
-        for take in self._take if self._ticks % _EVERY == 0 else self._take[:1]:
-            while (taken := take(Bool, True)) is not None:
-                data = taken[0]
-                if len(data) >= _BYTES:
-                    found.append(data[_BYTES - 1] != 0)
+        for taker in self._takers if self._ticks % _EVERY == 0 else self._takers[:1]:
+            while (taken := taker.take()) is not None:
+                data, sender, number = taken
+                if len(data) < _BYTES:
+                    continue
+                is_pressed = data[_BYTES - 1] != 0
+                if taker is not self._takers[-1]:
+                    found += self._presses.take(sender, number, is_pressed=is_pressed)
+                elif not self._presses.knows(sender):
+                    found.append(is_pressed)
         return found
+
+    @property
+    def lost(self) -> int:
+        """Messages of stop buttons that were lost; each counted as a press."""
+        return self._presses.lost
 
     def close(self) -> None:
         """Stop listening."""
-        for own in self._own:
+        for taker, own in zip(self._takers, self._own, strict=True):
             self._node.destroy_subscription(own)
+            taker.close()
 
 
 def _ignore(data: bytes) -> None:

@@ -8,13 +8,11 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import read_reports
 from teleop_core.errors import SessionError
-from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription
 from teleop_core.operation import State, operation_text
 from teleop_core.topics import OPERATION, SLAVE_OPERATION
@@ -62,7 +60,7 @@ class Operator:
         )  # fmt: skip
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._button = self._node.create_publisher(Bool, STOP_TOPIC, QoSProfile(depth=10))
+        self._button = StopButton(self._node)
         self._reports: dict[str, Subscription] = {}
 
     def __enter__(self) -> "Operator":
@@ -98,7 +96,7 @@ class Operator:
         begin = time.monotonic()
 
         def is_stopped() -> bool:
-            self._button.publish(Bool(data=True))
+            self._button.say(is_pressed=True)
             for arm in self.arms.values():
                 if arm.values.get("is_stopped") and arm.stopped_after < 0.0:
                     arm.stopped_after = time.monotonic() - begin
@@ -118,9 +116,9 @@ class Operator:
     def release(self) -> None:
         """Say that the emergency stop is not pressed; what it stopped stays stopped."""
         self.look()
-        self._until(lambda: self._button.get_subscription_count() > 0, must=False)
+        self._until(lambda: self._button.listeners > 0, must=False)
         for _ in range(5):
-            self._button.publish(Bool(data=False))
+            self._button.say(is_pressed=False)
             self._turn()
 
     def go_on(self) -> list[str]:

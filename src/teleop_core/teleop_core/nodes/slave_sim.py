@@ -61,9 +61,9 @@ class SlaveSimNode(TickingNode):
 
     def _look(self, due: tuple[int, ...]) -> None:
         """Take the emergency stop, and find the faults that only a node can see."""
-        for pressed in self._stop.take():
+        for is_pressed in self._stop.take():
             with self.lock:
-                self.stage.press(is_pressed=pressed, now_ns=due[0] + self.epoch_ns)
+                self.stage.press(is_pressed=is_pressed, now_ns=due[0] + self.epoch_ns)
         longest, counts = self.parameters.operation.longest_outage, self.counts
         # Composed, the ticks of one late wake-up come one by one: only its counts tell of them all.
         missed = (counts.missed - self._missed) * TICK_NS * 1e-9 if counts is self._seen else 0.0
@@ -131,4 +131,5 @@ class SlaveSimNode(TickingNode):
         """State, what moves the arm, how many commands were refused."""
         text = operation_text(self.stage.operation, self.stage.robot.joint_names)
         jumped = {"refused.slave/servo_jp.jump": str(self.stage.refused)}
-        return {**jumped, "operation": text, **self._crtk.values()}
+        lost = {"stop_messages_lost": str(self._stop.lost)}
+        return {**jumped, **lost, "operation": text, **self._crtk.values()}

@@ -1,0 +1,59 @@
+"""Presses: what the messages of stop buttons say when some are lost, late or doubled."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from teleop_core.operation.presses import Presses
+
+
+def told(presses, *messages, sender=b"a"):
+    """States that messages (number, is_pressed) of a sender add, in order."""
+    return [
+        said for number, is_pressed in messages
+        for said in presses.take(sender, number, is_pressed=is_pressed)
+    ]  # fmt: skip
+
+
+def test_every_message_of_an_unbroken_row_is_said_once():
+    assert told(Presses(), (1, False), (2, True), (3, False)) == [False, True, False]
+
+
+def test_a_message_that_arrives_through_two_readers_counts_once_in_whatever_order():
+    presses = Presses()
+    assert told(presses, (1, True), (2, False), (1, True), (2, False)) == [True, False]
+
+
+def test_a_missing_message_counts_as_a_press():
+    presses = Presses()
+    assert told(presses, (1, False), (3, False)) == [False, True, False]
+    assert presses.lost == 1
+
+
+def test_a_sender_that_is_found_late_has_lost_nothing():
+    presses = Presses()
+    assert told(presses, (5000, False), (5001, False)) == [False, False]
+    assert presses.lost == 0
+
+
+def test_senders_do_not_fill_the_gaps_of_each_other():
+    presses = Presses()
+    told(presses, (1, False))
+    told(presses, (1, False), (2, False), sender=b"b")
+    assert told(presses, (3, False)) == [True, False]
+
+
+def test_messages_without_numbers_are_all_taken():
+    presses = Presses()
+    assert told(presses, (0, True), (0, False), (0, True)) == [True, False, True]
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=50), st.data())
+def test_no_press_is_lost_whatever_is_lost_between_two_messages_that_arrive(states, data):
+    arrive = data.draw(st.lists(st.booleans(), min_size=len(states), max_size=len(states)))
+    arrive[0] = arrive[-1] = True  # the sender is known before, and heard again
+    messages = [(n + 1, s) for n, s in enumerate(states) if arrive[n]]
+    said = told(Presses(), *messages)
+    assert any(said) == (any(states) or not all(arrive))
+    assert said[-1] == states[-1]
+    assert np.count_nonzero(arrive) <= len(said)
