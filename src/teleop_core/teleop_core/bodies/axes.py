@@ -6,6 +6,7 @@ import numpy as np
 
 from teleop_core.bodies.body import Joint
 from teleop_core.geometry import Array
+from teleop_core.portable import dot, length
 
 # Sine between two axes under which they count as parallel.
 _PARALLEL = 1e-4
@@ -53,14 +54,14 @@ def axes_of(jacobian: Array, tip: Array) -> list[Axis] | None:
     axes = []
     for column in jacobian.T:
         speed, turn = column[:3], column[3:]
-        rate = float(np.linalg.norm(turn))
+        rate = float(length(turn))
         if rate < _UNIT:
-            if abs(np.linalg.norm(speed) - 1.0) > _UNIT:
+            if abs(length(speed) - 1.0) > _UNIT:
                 return None
             axes.append(Axis(Joint.PRISMATIC, np.zeros(3), speed))
             continue
         at_origin = speed + np.cross(tip, turn)
-        if abs(rate - 1.0) > _UNIT or abs(turn @ at_origin) > _UNIT:
+        if abs(rate - 1.0) > _UNIT or abs(dot(turn, at_origin)) > _UNIT:
             return None
         axes.append(Axis(Joint.REVOLUTE, np.cross(turn, at_origin) / rate**2, turn / rate))
     return axes
@@ -107,14 +108,14 @@ def _laid(axes: list[Axis], tip: Array) -> list[Axis]:
 
 
 def _are_parallel(a: Axis, b: Axis) -> bool:
-    return float(np.linalg.norm(np.cross(a.direction, b.direction))) < _PARALLEL
+    return float(length(np.cross(a.direction, b.direction))) < _PARALLEL
 
 
 def _foot(axis: Axis, point: Array) -> Array:
     """Point of an axis nearest to a point (3,); the point itself if the axis is laid nowhere."""
     if np.isnan(axis.point).any():
         return point
-    return np.asarray(axis.point + (point - axis.point) @ axis.direction * axis.direction)
+    return np.asarray(axis.point + dot(point - axis.point, axis.direction) * axis.direction)
 
 
 def _normal(before: Axis | None, end: Array, axis: Axis) -> tuple[Array, Array]:
@@ -125,8 +126,9 @@ def _normal(before: Axis | None, end: Array, axis: Axis) -> tuple[Array, Array]:
     if before is None or np.isnan(axis.point).any() or _are_parallel(before, axis):
         return end, _foot(axis, end)
     start = end if np.isnan(before.point).any() else before.point
-    cosine = float(before.direction @ axis.direction)
+    cosine = float(dot(before.direction, axis.direction))
     way = axis.point - start
-    along = (way @ before.direction - cosine * (way @ axis.direction)) / (1.0 - cosine**2)
+    ahead = dot(way, before.direction) - cosine * dot(way, axis.direction)
+    along = ahead / (1.0 - cosine**2)
     leave = start + along * before.direction
     return leave, _foot(axis, leave)

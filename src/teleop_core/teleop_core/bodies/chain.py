@@ -10,6 +10,7 @@ from teleop_core.bodies.body import HERE, Body, Joint
 from teleop_core.bodies.frames import inverse, moved, product, seen_from
 from teleop_core.bodies.solids import Role, Solid, along, ball, capsule, cylinder
 from teleop_core.geometry import Array
+from teleop_core.portable import length
 
 # Radius of links over the reach of the robot, at the base and at the tip.
 _THICK, _THIN = 0.03, 0.014
@@ -55,7 +56,7 @@ def length_of(chained: Sequence[Place], tip: Array) -> float:
     for place in chained:
         points += [place.seat, place.arrive, place.leave]
     steps = np.diff(np.array([*points, tip[:3]]), axis=0)
-    return max(float(np.linalg.norm(steps, axis=1).sum()), 1e-3)
+    return max(float(length(steps).sum()), 1e-3)
 
 
 def tip_of(bodies: Sequence[Body], frame: Array, tip: Array, reach: float) -> Body:
@@ -64,7 +65,7 @@ def tip_of(bodies: Sequence[Body], frame: Array, tip: Array, reach: float) -> Bo
     Both are those at the posture of reference.
     """
     # A tip in the middle of the last joint, as of a wrist without a tool, shows around it.
-    is_hidden = float(np.linalg.norm(tip[:3] - frame[:3])) < 3.0 * _THIN * reach
+    is_hidden = float(length(tip[:3] - frame[:3])) < 3.0 * _THIN * reach
     solids = (ball(np.zeros(3), (2.2 if is_hidden else 1.3) * _THIN * reach, "tool"),)
     return Body("tip", solids, len(bodies) - 1, Joint.FIXED, product(inverse(frame), tip))
 
@@ -91,7 +92,5 @@ def _link(
 
 def _run(points: Sequence[Array], radius: float, role: Role) -> tuple[Solid, ...]:
     return tuple(
-        capsule(a, b, radius, role)
-        for a, b in pairwise(points)
-        if np.linalg.norm(b - a) > 1e-6 * radius
+        capsule(a, b, radius, role) for a, b in pairwise(points) if length(b - a) > 1e-6 * radius
     )

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from teleop_core import portable
 from teleop_core.geometry import (
     Array,
     multiply_quaternions,
@@ -15,7 +16,7 @@ from teleop_core.geometry import (
 def product(a: Array, b: Array) -> Array:
     """Pose (7,) of ``b``, given in the frame of ``a``."""
     out = np.empty(7)
-    out[:3] = a[:3] + rotations_from_quaternions(a[3:]) @ b[:3]
+    out[:3] = a[:3] + portable.product(rotations_from_quaternions(a[3:]), b[:3])
     multiply_quaternions(a[3:].copy(), b[3:].copy(), out[3:])
     return out
 
@@ -24,7 +25,7 @@ def inverse(pose: Array) -> Array:
     """Pose (7,) of the base in the frame of ``pose``."""
     out = np.empty(7)
     out[3:] = pose[3:] * (1.0, -1.0, -1.0, -1.0)
-    out[:3] = -(rotations_from_quaternions(out[3:]) @ pose[:3])
+    out[:3] = -portable.product(rotations_from_quaternions(out[3:]), pose[:3])
     return out
 
 
@@ -39,7 +40,7 @@ def moved(pose: Array, kind: int, value: float) -> Array:
 
 def seen_from(pose: Array, point: Array) -> Array:
     """Point (3,) of the base in the frame of a pose (7,)."""
-    return np.asarray(rotations_from_quaternions(pose[3:]).T @ (point - pose[:3]))
+    return portable.product(rotations_from_quaternions(pose[3:]).T, point - pose[:3])
 
 
 def pose_of(transform: Array) -> Array:

@@ -12,6 +12,7 @@ from teleop_core.bodies.solids import ball, capsule, cylinder
 from teleop_core.bodies.tips import tips
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
+from teleop_core.portable import product
 from teleop_core.robots.robot import Robot
 from teleop_core.robots.scara_stewart_legs import layout
 
@@ -72,7 +73,7 @@ def _coordinates(robot: Robot, legs: Telescope, points: Array) -> Coordinates:
         places = poses.copy()
         places[:, :3] -= g["e_eff"] * transforms[:, :3, 2]
         rotations = transforms[:, :3, :3].swapaxes(1, 2)
-        ends = points[1] @ rotations + places[:, None, :3]
+        ends = product(points[1], rotations) + places[:, None, :3]
         heading = is_carried * turned
         c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
         x, y = points[0, :, 0], points[0, :, 1]

@@ -8,6 +8,7 @@ import numpy as np
 from teleop_core.bodies.body import Body, Joint
 from teleop_core.bodies.solids import Solid, along, ball, capsule, rim
 from teleop_core.geometry import Array
+from teleop_core.portable import arctangent, length
 
 _SHARE = 0.95  # of the shortest leg: length of a tube
 _THINNER = 0.72  # radius of a tube over that of the one around it
@@ -47,7 +48,7 @@ class Telescope:
         end, found = np.array([0.0, 0.0, self.tube]), []
         for leg in range(legs):
             for tube in range(self.tubes):
-                solid = capsule(np.zeros(3), end, self.radius * _THINNER**tube, "leg")
+                solid = capsule(np.zeros(3), end, self.radius * math.pow(_THINNER, tube), "leg")
                 place, name = first + leg * self.tubes + tube, f"leg{leg + 1}_tube{tube + 1}"
                 found.append(Body(name, (solid,), 0, Joint.FREE, coordinate=place))
         return found
@@ -55,7 +56,7 @@ class Telescope:
     def poses(self, starts: Array, ends: Array) -> Array:
         """Poses (N, k · tubes, 7) of legs from points (N, k, 3) to points (N, k, 3) [m]."""
         ways = ends - starts
-        lengths = np.linalg.norm(ways, axis=-1, keepdims=True)
+        lengths = length(ways)[..., None]
         units = np.divide(ways, lengths, out=np.zeros_like(ways), where=lengths > 0.0)
         shares = np.linspace(0.0, 1.0, self.tubes)[:, None]
         out = np.empty((*lengths.shape[:2], self.tubes, 7))
@@ -67,6 +68,6 @@ class Telescope:
 def plate(points: Array, radius: float, is_base: bool = False) -> tuple[Solid, ...]:
     """Rim of a plate through joint points (k, 3) [m] about its z axis, with a ball at each."""
     turned = points - points.mean(axis=0)
-    order = np.argsort(np.arctan2(turned[:, 1], turned[:, 0]))
+    order = np.argsort(arctangent(turned[:, 1], turned[:, 0]))
     balls = (ball(point, 1.8 * radius, "joint") for point in points)
     return (*rim(points[order], radius, "base" if is_base else "platform"), *balls)

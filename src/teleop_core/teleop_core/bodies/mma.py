@@ -15,6 +15,7 @@ from teleop_core.bodies.chain import chain, tip_of
 from teleop_core.bodies.frames import moved, pose, pose_of
 from teleop_core.bodies.planar import pivoted
 from teleop_core.geometry import Array
+from teleop_core.portable import product
 from teleop_core.robots.mma_models import SHORT_SIDE
 from teleop_core.robots.robot import Robot
 
@@ -32,7 +33,7 @@ def mma_bodies(robot: Robot) -> Bodies:
     for column, joint in enumerate((0, 1, 3, 2, 4, 5, 6)):
         mixing[joint, column] = 1.0
     mixing[2, 2] = 1.0  # θ3 = θ3' + (θ3 - θ3')
-    axes = axes_of(robot.jacobian(robot.home) @ mixing, tip[:3])
+    axes = axes_of(product(robot.jacobian(robot.home), mixing), tip[:3])
     assert axes is not None, "the MMA's joints all turn"
     chained = places(axes, np.zeros(7), tip[:3])
     bodies, reach = chain(chained, _NAMES, _CHAIN, reference[list(_CHAIN)], np.zeros(7), tip)

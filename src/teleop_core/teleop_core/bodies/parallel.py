@@ -7,6 +7,7 @@ from teleop_core.bodies.legs import Telescope, plate
 from teleop_core.bodies.solids import Solid, ball
 from teleop_core.bodies.tips import tips
 from teleop_core.geometry import Array
+from teleop_core.portable import length, product
 from teleop_core.robots.robot import Robot
 from teleop_core.robots.rps3_loop import COSINES, SINES
 
@@ -30,12 +31,12 @@ def _platform_on_legs(robot: Robot, base: Array, platform: Array) -> Bodies:
 
     Joint points (n, 3) [m] are those of the base in the base and of the platform in the platform.
     """
-    radius = _RADIUS * float(np.linalg.norm(platform, axis=1).max())
+    radius = _RADIUS * float(length(platform).max())
     legs = Telescope(float(robot.lower.min()), float(robot.upper.max()), radius)
 
     def coordinates(q: Array) -> tuple[Array, Array]:
         transforms, poses = tips(robot, q)
-        ends = platform @ transforms[:, :3, :3].swapaxes(1, 2) + transforms[:, None, :3, 3]
+        ends = product(platform, transforms[:, :3, :3].swapaxes(1, 2)) + transforms[:, None, :3, 3]
         starts = np.broadcast_to(base, ends.shape)
         return q, np.concatenate((legs.poses(starts, ends), poses[:, None]), axis=1)
 
@@ -44,7 +45,7 @@ def _platform_on_legs(robot: Robot, base: Array, platform: Array) -> Bodies:
     bodies.append(Body("platform", plate(platform, radius), 0, Joint.FREE, HERE, count))
     bodies.append(Body("tip", _tool(radius), 0, Joint.FREE, HERE, count))
     moved = tuple((leg + 1) * legs.tubes for leg in range(robot.n))
-    size = float(np.linalg.norm(base, axis=1).max() + robot.upper.max())
+    size = float(length(base).max() + robot.upper.max())
     return Bodies(tuple(bodies), robot.n, coordinates, moved, size)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.geometry import Array
+from teleop_core.portable import length
 
 Kind = Literal["capsule", "box", "sphere", "cylinder"]
 Role = Literal["base", "link", "joint", "leg", "platform", "tool"]
@@ -51,9 +52,9 @@ class Solid:
 def capsule(start: Array, end: Array, radius: float, role: Role) -> Solid:
     """Capsule whose ends are about two points (3,) [m] of the body."""
     way = end - start
-    length = float(np.linalg.norm(way))
+    size = float(length(way))
     pose = np.concatenate((0.5 * (start + end), along(way[None])[0]))
-    return Solid("capsule", (radius, length), pose, role)
+    return Solid("capsule", (radius, size), pose, role)
 
 
 def cylinder(center: Array, direction: Array, radius: float, length: float, role: Role) -> Solid:
@@ -71,7 +72,7 @@ def rim(points: Array, radius: float, role: Role) -> tuple[Solid, ...]:
     """Capsules around a polygon (k, 3) [m] of the body."""
     ends = np.roll(points, -1, axis=0)
     pairs = zip(points, ends, strict=True)
-    return tuple(capsule(a, b, radius, role) for a, b in pairs if np.linalg.norm(b - a) > 0.0)
+    return tuple(capsule(a, b, radius, role) for a, b in pairs if length(b - a) > 0.0)
 
 
 def along(directions: Array) -> Array:
@@ -79,11 +80,11 @@ def along(directions: Array) -> Array:
 
     A direction of length zero keeps z; the opposite of z turns about x.
     """
-    lengths = np.linalg.norm(directions, axis=-1, keepdims=True)
+    lengths = length(directions)[:, None]
     unit = np.divide(directions, lengths, out=np.zeros_like(directions), where=lengths > 0.0)
     unit[lengths[:, 0] == 0.0, 2] = 1.0
     turns = np.stack((1.0 + unit[:, 2], -unit[:, 1], unit[:, 0], np.zeros(len(unit))), axis=-1)
-    sizes = np.linalg.norm(turns, axis=-1)
+    sizes = length(turns)
     is_opposite = sizes < 1e-9
     turns[is_opposite] = (0.0, 1.0, 0.0, 0.0)
     sizes[is_opposite] = 1.0

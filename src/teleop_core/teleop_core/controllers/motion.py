@@ -25,6 +25,7 @@ import numpy as np
 
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
+from teleop_core.portable import exponential
 from teleop_core.robots.robot import Robot
 from teleop_core.signals import DT
 
@@ -182,16 +183,16 @@ def fading_of(
         middle = 0.5 * (slow + fast)
         is_quiet = _per_count(middle, pole, stiffness, damping, rejection) <= allowed
         slow, fast = np.where(is_quiet, middle, slow), np.where(is_quiet, fast, middle)
-    return np.asarray(np.exp(-np.where(if_fast, high, slow) * DT), dtype=np.float64)
+    return exponential(-np.where(if_fast, high, slow) * DT)
 
 
 def _per_count(
     bandwidth: Array, pole: Array, stiffness: float, damping: float, rejection: float
 ) -> Array:
     """Acceleration (n,) asked for when a position jumps by one, at once [1/s²]."""
-    fading = np.exp(-bandwidth * DT)
+    fading = exponential(-bandwidth * DT)
     speed = 1.5 * (1.0 - fading) ** 2 * (1.0 + fading) / DT
-    unexplained = (1.0 - fading) ** 3 / DT**2
+    unexplained = (1.0 - fading) * (1.0 - fading) ** 2 / DT**2
     return np.asarray(
         stiffness * pole**2 + damping * pole * speed + rejection * unexplained, dtype=np.float64
     )

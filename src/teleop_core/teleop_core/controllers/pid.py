@@ -58,7 +58,7 @@ def critically_damped_gains(
         Åström and Hägglund 1995, PID Controllers, section 3.4 (setpoint weighting).
     """
     kp = 3.0 * bandwidth**2 * inertia
-    ki = bandwidth**3 * inertia
+    ki = bandwidth * bandwidth**2 * inertia
     kd = (3.0 * bandwidth * inertia - viscous).clip(min=0.0)
     return kp, ki, kd
 

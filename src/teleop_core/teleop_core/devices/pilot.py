@@ -8,6 +8,7 @@ from teleop_core.devices import Reading
 from teleop_core.geometry import Array, turn_by
 from teleop_core.operators.remote import RemoteHand
 from teleop_core.parameters import parameter
+from teleop_core.portable import length
 
 _LONGEST = 0.05  # a reader that slept longer has lost time, not made way [s]
 
@@ -66,7 +67,7 @@ class Pilot:
         low, high = self._hand.room
         pose[:3] = np.clip(pose[:3] + time * p.speed * rates[:3], low, high)
         turn_by(time * p.turn_speed * rates[3:], pose[3:])
-        pose[3:] /= np.linalg.norm(pose[3:])
+        pose[3:] /= length(pose[3:])
         self._hand.want(pose)
 
     def let_go(self) -> None:

@@ -12,6 +12,7 @@ from teleop_core.exchange.options import LENGTHS, ImportOptions
 from teleop_core.exchange.source import Presses, Source
 from teleop_core.exchange.spool import Spool
 from teleop_core.exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, joined_ns
+from teleop_core.portable import dot, length
 
 SAMPLE = 1000
 """Times of a block, and blocks, from which the unit is guessed."""
@@ -190,10 +191,10 @@ def bridge(gathered: Gathered, longest_ns: int) -> int:
         if not 0 < end - begin <= longest_ns or not ((begin < inside) & (inside < end)).all():
             continue
         a, b = gathered.spool.chosen(np.array([first - 1, last]))
-        b[3:] *= 1.0 if a[3:] @ b[3:] >= 0.0 else -1.0
+        b[3:] *= 1.0 if dot(a[3:], b[3:]) >= 0.0 else -1.0
         share = ((inside - begin) / (end - begin))[:, None]
         rows = (1.0 - share) * a + share * b
-        rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1)[:, None]
+        rows[:, 3:] /= length(rows[:, 3:])[:, None]
         gathered.spool.put(first, rows)
         usable[first:last] = True
         filled += last - first

@@ -21,6 +21,7 @@ from teleop_core.exchange.opening import open_source
 from teleop_core.exchange.options import ImportOptions
 from teleop_core.exchange.spool import Spool
 from teleop_core.exchange.times import is_constant
+from teleop_core.portable import length
 from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
 
 
@@ -84,7 +85,7 @@ def is_sound(bag: Bag, prefix: str) -> bool:
     for block in bag.blocks([name]):
         if (series := block.get(name)) is None or not len(series):
             continue
-        lengths = np.linalg.norm(series.values[:, 3:], axis=1)
+        lengths = length(series.values[:, 3:])
         first = int(series.stamp_ns[0]) if first < 0 else first
         is_rising = series.stamp_ns[0] >= last and (np.diff(series.stamp_ns) >= 0).all()
         is_unit = (np.abs(lengths - 1.0) <= QUATERNION_TOLERANCE).all()  # NaN is not

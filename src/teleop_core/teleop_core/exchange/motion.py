@@ -14,6 +14,7 @@ from teleop_core.exchange.orientation import continuous, from_matrices, products
 from teleop_core.exchange.times import SECOND_NS, Stamps, gaps, ordered
 from teleop_core.geometry import Array
 from teleop_core.mapping.parameters import axis_map
+from teleop_core.portable import product
 
 ROWS = 20_000
 """Rows of a block."""
@@ -161,7 +162,7 @@ class Motion:
         for begin in range(0, len(self._rows), ROWS):
             part = slice(begin, begin + ROWS)
             rows = self._gathered.spool.chosen(self._rows[part])
-            place = self._options.scale * (rows[:, :3] @ self._turn.T) - self._origin
+            place = self._options.scale * product(rows[:, :3], self._turn.T) - self._origin
             turns = continuous(products(self._quaternion, rows[:, 3:]), last)
             last = turns[-1]
             yield self.stamp_ns[part], np.column_stack((place, turns))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from teleop_core.geometry import Array, multiply_quaternions
 from teleop_core.kernels import kernel
+from teleop_core.portable import dot, length, product
 
 TOLERANCE = 0.1
 """How far a quaternion's length, or a matrix from being a rotation, may be off."""
@@ -64,7 +65,7 @@ class Attitudes:
         return from_rotation_vectors(angles)
 
     def _unit(self, quaternions: Array) -> Array:
-        lengths = np.linalg.norm(quaternions, axis=1)
+        lengths = length(quaternions)
         missing = lengths < _MISSING
         strange = np.abs(lengths - 1.0) > TOLERANCE
         self.strange += int((strange & ~missing).sum())
@@ -75,10 +76,10 @@ class Attitudes:
         return unit
 
     def _of_matrices(self, matrices: Array) -> Array:
-        squares = np.einsum("nij,nkj->nik", matrices, matrices)
+        squares = product(matrices, matrices.transpose(0, 2, 1))
         missing = np.abs(matrices).max(axis=(1, 2), initial=0.0) < _MISSING
         off = np.abs(squares - np.eye(3)).max(axis=(1, 2), initial=0.0) > TOLERANCE
-        mirror = np.linalg.det(matrices) < 0.0
+        mirror = dot(np.cross(matrices[:, 0], matrices[:, 1]), matrices[:, 2]) < 0.0
         self.strange += int(((off | mirror) & ~missing).sum())
         self.mirrored += int((mirror & ~off).sum())
         quaternions = from_matrices(matrices)
@@ -87,7 +88,7 @@ class Attitudes:
 
     def _of_directions(self, directions: Array) -> Array:
         """By parallel transport: from each direction to the next by the shortest turn."""
-        lengths = np.linalg.norm(directions, axis=1)
+        lengths = length(directions)
         lengths[lengths < _MISSING] = math.nan
         quaternions = np.empty((len(directions), 4))
         transport(directions / lengths[:, None], self._last, quaternions)
@@ -154,13 +155,13 @@ def from_matrices(matrices: Array) -> Array:
     candidates[3] = np.column_stack((wz, xz, yz, 1.0 - x - y + z))
     chosen = candidates[largest, np.arange(len(matrices))]
     with np.errstate(invalid="ignore"):
-        unit: Array = chosen / np.linalg.norm(chosen, axis=1)[:, None]
+        unit: Array = chosen / length(chosen)[:, None]
     return unit
 
 
 def from_rotation_vectors(vectors: Array) -> Array:
     """Unit quaternions (N, 4) of rotation vectors (N, 3) [rad]."""
-    half = 0.5 * np.linalg.norm(vectors, axis=1)
+    half = 0.5 * length(vectors)
     share = 0.5 * np.sinc(half / math.pi)
     return np.column_stack((np.cos(half), share[:, None] * vectors))
 

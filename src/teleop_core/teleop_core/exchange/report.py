@@ -10,6 +10,7 @@ import numpy as np
 from teleop_core.exchange.motion import Counts, Motion
 from teleop_core.exchange.times import spread_ms
 from teleop_core.geometry import Array
+from teleop_core.portable import dot, length
 
 if TYPE_CHECKING:
     from teleop_core.recording import Recording
@@ -148,7 +149,7 @@ class _Figures:
         self._first = poses[0, 3:].copy() if self._first is None else self._first
         self.low = np.minimum(self.low, poses[:, :3].min(axis=0))
         self.high = np.maximum(self.high, poses[:, :3].max(axis=0))
-        cosine = np.clip(np.abs(poses[:, 3:] @ self._first), 0.0, 1.0).min()
+        cosine = np.clip(np.abs(dot(poses[:, 3:], self._first)), 0.0, 1.0).min()
         self.rotation = max(self.rotation, 2.0 * math.acos(cosine))
 
     def _jumps(self, stamps: "np.ndarray[tuple[int], np.dtype[np.int64]]", places: Array,
@@ -179,7 +180,7 @@ def _speeds(
 ) -> tuple[Array, Array]:
     """Periods [s] and speeds [m/s] between rows."""
     steps = np.diff(stamps) * 1e-9
-    speeds: Array = np.linalg.norm(np.diff(places, axis=0), axis=1) / steps
+    speeds: Array = length(np.diff(places, axis=0)) / steps
     return steps, speeds
 
 

@@ -15,6 +15,7 @@ from teleop_core.exchange.source import Block, Presses
 from teleop_core.exchange.tables import Numbers, Table, column_of
 from teleop_core.exchange.times import SECOND_NS
 from teleop_core.geometry import Array
+from teleop_core.portable import length
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ class TableSource:
 
     def _are_unit(self, columns: Sequence[int]) -> bool:
         rows = np.column_stack([self._table.sample(c).astype(np.float64) for c in columns])
-        lengths = np.linalg.norm(rows[np.isfinite(rows).all(axis=1)], axis=1)
+        lengths = length(rows[np.isfinite(rows).all(axis=1)])
         return len(lengths) > 0 and bool((np.abs(lengths - 1.0) < TOLERANCE).mean() > 0.9)
 
     def _in_degrees(self, kind: str, columns: Sequence[int]) -> bool:

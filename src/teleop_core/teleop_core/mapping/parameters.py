@@ -11,6 +11,7 @@ from teleop_core.geometry import Array, quaternion_from_rotation, rotation
 from teleop_core.mapping.plausibility import PlausibilityParameters
 from teleop_core.mapping.walls import WALLS
 from teleop_core.parameters import Choice, choice, parameter
+from teleop_core.portable import dot, product
 
 MODES = ("coarse", "fine")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -121,7 +122,7 @@ def axis_map(name: str, axes: tuple[str, ...]) -> Array:
     matrix = np.zeros((3, 3))
     for row, axis in enumerate(axes):
         matrix[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
-    if not math.isclose(float(np.linalg.det(matrix)), 1.0):
+    if not math.isclose(float(dot(np.cross(matrix[0], matrix[1]), matrix[2])), 1.0):
         raise ParameterError(name, axes, "three axes at right angles that do not mirror")
     return matrix
 
@@ -132,7 +133,9 @@ def tool_maps(parameters: MotionScalingParameters) -> tuple[Array, Array]:
     Source:
         Vongbunyong 2008, section 6.2.
     """
-    tool = axis_map("tool_axes", parameters.tool_axes).T @ rotation("z", parameters.tool_roll)
+    tool = product(
+        axis_map("tool_axes", parameters.tool_axes).T, rotation("z", parameters.tool_roll)
+    )
     found = np.empty(4), np.empty(4)
     for matrix, quaternion in zip((axis_map("axes", parameters.axes), tool), found, strict=True):
         quaternion_from_rotation(np.ascontiguousarray(matrix), quaternion)

@@ -15,6 +15,7 @@ from teleop_core.geometry import (
 )
 from teleop_core.kernels import inner, kernel
 from teleop_core.parameters import parameter
+from teleop_core.portable import inverse_motion, product
 from teleop_core.robots import load_robot_set
 
 _OMNI = "published: Vongbunyong 2008, table 5.1"
@@ -173,10 +174,10 @@ def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Handle | No
     if not parameters.handle:
         return None
     robot = load_robot_set(parameters.handle, parameters.handle_geometry)
-    T_base_handle = T_base_rest @ np.linalg.inv(robot.fk(robot.home))
+    T_base_handle = product(T_base_rest, inverse_motion(robot.fk(robot.home)))
     step = np.full(robot.n, 1e-5) if robot.drives is None else robot.drives.encoder_step.copy()
     return Handle(
         robot.ik_pointer, robot.fk_pointer, robot.limits(), robot.geometry_row.copy(),
-        T_base_handle, np.linalg.inv(T_base_handle), step, robot.home.copy(),
+        T_base_handle, inverse_motion(T_base_handle), step, robot.home.copy(),
         np.eye(4), np.eye(4), np.zeros(robot.n), np.zeros(2),
     )  # fmt: skip

@@ -20,6 +20,7 @@ from teleop_core.operators import Motion, Operator, Setting
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.shapes import minimum_jerk
 from teleop_core.parameters import parameter
+from teleop_core.portable import dot, length
 
 _TRIES = 50  # targets that are drawn before one anywhere in the region is taken
 _LINES = 16  # sines that tremor is made of, per axis
@@ -168,7 +169,7 @@ def _next_target(p: HumanParameters, room: Array, place: Array, rng: np.random.G
     turn = np.clip(place[3:] + p.turn * largest * rng.standard_normal(3), -largest, largest)
     for _ in range(_TRIES):
         way = half * rng.standard_normal(3)
-        way *= _spread(p.reach, p.reach_spread, rng) / max(float(np.linalg.norm(way)), 1e-12)
+        way *= _spread(p.reach, p.reach_spread, rng) / max(float(length(way)), 1e-12)
         if (np.abs(place[:3] + way) <= half).all():
             return np.concatenate((place[:3] + way, turn))
     return np.concatenate((rng.uniform(-half, half), turn))
@@ -185,7 +186,7 @@ def _reach(
     """
     for number in range(p.corrections + 1):
         way = target - place
-        distance = float(np.linalg.norm(way[:3]))
+        distance = float(length(way[:3]))
         is_first = number == 0
         if distance <= p.tolerance and not is_first:
             return
@@ -202,13 +203,13 @@ def _blurred(p: HumanParameters, way: Array, duration: float, rng: np.random.Gen
     """A wanted way and turn (6,) with the noise of its execution; no way, no noise."""
     out = way.copy()
     for part in (slice(0, 3), slice(3, 6)):
-        length = float(np.linalg.norm(way[part]))
-        if length > 0.0:
-            along = way[part] / length
+        size = float(length(way[part]))
+        if size > 0.0:
+            along = way[part] / size
             noise = rng.standard_normal(3)
-            ahead = along * (along @ noise)
+            ahead = along * dot(along, noise)
             off = p.noise_along * ahead + p.noise_across * (noise - ahead)
-            out[part] += length / duration * off
+            out[part] += size / duration * off
     return out
 
 

@@ -21,6 +21,7 @@ from teleop_core.operators import Motion, Operator, Setting
 from teleop_core.operators.shapes import minimum_jerk
 from teleop_core.parameters import parameter
 from teleop_core.plain_yaml import check_regular
+from teleop_core.portable import arctangent, length
 from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
 
 COLUMNS = ("t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode")
@@ -200,7 +201,7 @@ def between(samples: Samples, times: Array, longest: float) -> tuple[Array, Arra
     share = share[:, None]
     moves = (1.0 - share) * samples.moves[left] + share * samples.moves[right]
     turns = (1.0 - share) * samples.turns[left] + share * samples.turns[right]
-    return moves, turns / np.linalg.norm(turns, axis=1)[:, None]
+    return moves, turns / length(turns)[:, None]
 
 
 def held(samples: Samples, times: Array) -> Array:
@@ -214,8 +215,8 @@ def _in_axes_of(rest: Array, turns: Array) -> Array:
     from teleop_core.exchange.orientation import products
 
     own = products(products(rest * (1.0, -1.0, -1.0, -1.0), turns), rest)
-    sine = np.linalg.norm(own[:, 1:], axis=1)
-    angle = 2.0 * np.arctan2(sine, own[:, 0])
+    sine = length(own[:, 1:])
+    angle = 2.0 * arctangent(sine, own[:, 0])
     return np.asarray(own[:, 1:] * (angle / np.where(sine > 0.0, sine, 1.0))[:, None])
 
 

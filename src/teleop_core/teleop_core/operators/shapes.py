@@ -8,6 +8,7 @@ import numpy as np
 from teleop_core.geometry import Array
 from teleop_core.operators import Motion, Operator, Setting
 from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.portable import dot
 
 
 def minimum_jerk(share: Array) -> Array:
@@ -17,7 +18,7 @@ def minimum_jerk(share: Array) -> Array:
         Flash and Hogan 1985, eq. 6.
     """
     x = np.clip(share, 0.0, 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+    return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
 
 
 # Parts of random motion: cycles per period, incommensurate so that it does not repeat.
@@ -59,7 +60,7 @@ def random_unit(p: OperatorParameters, phases: Array, times: Array) -> Array:
     """Smooth random motion within [-1, 1] on three axes, (N, 3), of phases (3, 4)."""
     rate = 2.0 * math.pi * _CYCLES / p.period
     waves = np.sin(times[:, None, None] * rate + phases)
-    return np.sin(0.5 * math.pi * (waves @ _SHARES))
+    return np.sin(0.5 * math.pi * dot(waves, _SHARES))
 
 
 def _random(p: OperatorParameters, phases: Array, times: Array) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 
 from teleop_core.errors import ShapeError
 from teleop_core.geometry import Array, checked_array, rotation, transform
+from teleop_core.portable import product
 from teleop_core.robots import dh_kernels
 from teleop_core.robots.dh_drives import drives_of
 from teleop_core.robots.drives import independent_axes
@@ -95,7 +96,7 @@ class DhTable:
                 amount = row.constants.get(symbol, 0.0)
                 if row.joint and symbol == row.joint.symbol:
                     amount += value
-                out[i] = out[i] @ elementary(kind, axis, amount)
+                out[i] = product(out[i], elementary(kind, axis, amount))
         return out
 
     def robot(self) -> Robot:
@@ -132,7 +133,7 @@ class DhTable:
         for row in self.rows:
             for kind, axis, symbol in CONVENTIONS[self.convention]:
                 amount = row.constants.get(symbol, 0.0)
-                fixed[-1] = fixed[-1] @ elementary(kind, axis, amount)
+                fixed[-1] = product(fixed[-1], elementary(kind, axis, amount))
                 reach += abs(amount) if kind == "slide" else 0.0
                 if row.joint and symbol == row.joint.symbol:
                     kinds.append(row.joint.sign * (1.0 if kind == "turn" else 2.0))

@@ -18,6 +18,7 @@ import numpy as np
 
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
+from teleop_core.portable import arctangent
 
 _ROUNDING = 1e-12
 
@@ -66,8 +67,9 @@ class FourBar:
         radius = np.hypot(A, B)
         is_open = np.abs(C) > radius * (1.0 + _ROUNDING)
         cosine = np.clip(-C / np.where(radius > 0.0, radius, 1.0), -1.0, 1.0)
-        phi1 = np.arctan2(B, A) + np.array([1.0, -1.0]) * np.arccos(cosine)
-        coupler = np.arctan2(self.l3 * np.sin(phi1) - y, self.l0 + self.l3 * np.cos(phi1) - x)
+        half = arctangent(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
+        phi1 = arctangent(B, A) + np.array([1.0, -1.0]) * half
+        coupler = arctangent(self.l3 * np.sin(phi1) - y, self.l0 + self.l3 * np.cos(phi1) - x)
         angles = (phi1, coupler - theta, phi1 + math.pi - coupler)
         return Closure(np.where(is_open, 1, 0)[..., 0], *(_principal(angle) for angle in angles))
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.geometry import Array
+from teleop_core.portable import dot
 
 # Share of the largest moment by which rounding may break the triangle inequality: of a plate, or
 # of numbers that a source gives to some digits.
@@ -90,7 +91,7 @@ class LinkInertia:
     def central(self) -> Array:
         """Tensor (3, 3) about the centre of mass [kg·m²], in the same axes (parallel axes)."""
         c = self.center
-        return self.inertia - self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+        return self.inertia - self.mass * (dot(c, c) * np.eye(3) - np.outer(c, c))
 
     @property
     def pseudo(self) -> Array:

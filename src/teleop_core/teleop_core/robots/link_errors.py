@@ -22,6 +22,7 @@ Source:
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,7 @@ import numpy as np
 
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array, rotation, transform
+from teleop_core.portable import inverse_motion, product
 from teleop_core.robots import dh_kernels
 from teleop_core.robots.drives import read_only
 
@@ -141,7 +143,7 @@ class Chain:
         for i in range(self.n):
             before, after = _errors_of_link(errors, i)
             S = next_axis_motion(self.fixed[i + 1])
-            link = before @ self.fixed[i + 1] @ np.linalg.inv(S) @ after @ S
+            link = reduce(product, (before, self.fixed[i + 1], inverse_motion(S), after, S))
             is_drawn = not any(getattr(errors, name)[i] for name in SYMBOLS)
             at = self.n + 7 + 12 * (i + 1)
             row[at : at + 12] = (self.fixed[i + 1] if is_drawn else link)[:3].ravel()
@@ -175,7 +177,7 @@ def next_axis_motion(F: Array) -> Array:
     if abs(turn) > 0.5 * math.pi + _PARALLEL:  # the normal the other way round
         turn, sine = turn - math.copysign(math.pi, turn), -sine
     # The first column of Rz(theta) is that of R turned back.
-    normal = R @ rotation("z", -turn)[:, 0]
+    normal = product(R, rotation("z", -turn)[:, 0])
     slide = (normal[1] * p[0] - normal[0] * p[1]) / sine
     return transform(rotation("z", turn), np.array([0.0, 0.0, slide]))
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array
+from teleop_core.portable import product
 from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
 from teleop_core.robots.kinematics import Kernels
 from teleop_core.robots.mma_balance import ShoulderSpring, shoulder_load
@@ -107,6 +108,6 @@ def holding_torques(
         ParameterError: NaN or infinity.
     """
     push, joints = vector("wrench", wrench, 6), vector("q", q, 7)
-    torques: Array = robot.jacobian(joints).T @ push
+    torques = product(robot.jacobian(joints).T, push)
     torques[1] -= shoulder_load(joints[1], spring).residual
     return torques

@@ -21,6 +21,7 @@ import numpy as np
 
 from teleop_core.errors import ShapeError, UnknownNameError
 from teleop_core.geometry import Array, checked_array
+from teleop_core.portable import product
 from teleop_core.robots.dh import DhJoint, DhRow, DhTable
 
 # Half of d5: the thesis only gives the sum of the two equal symbols a3 + a4'.
@@ -148,7 +149,7 @@ def frames(table: DhTable, joints: object) -> dict[str, Array]:
         ShapeError: Another shape.
         ParameterError: NaN or infinity.
     """
-    steps = accumulate(table.link_transforms(joints), np.matmul)
+    steps = accumulate(table.link_transforms(joints), product)
     return dict(zip(FRAMES[table.name], steps, strict=True))
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
+from teleop_core.portable import product
 
 
 def tendon_motor_angles(
@@ -33,15 +34,15 @@ def tendon_motor_angles(
     Source:
         Vongbunyong 2008, eqs. 3.5-3.7, completed by the balance of tendon travel.
     """
-    return np.asarray(joints) @ _tendon_matrix(ratio5, ratio6, coupling).T
+    return product(joints, _tendon_matrix(ratio5, ratio6, coupling).T)
 
 
 def tendon_joint_angles(
     motors: Array, *, ratio5: float = 1.0, ratio6: float = 1.0, coupling: float = 0.0
 ) -> Array:
     """Joint angles 5 and 6, (..., 2) [rad]: the inverse of :func:`tendon_motor_angles`."""
-    inverse = np.linalg.inv(_tendon_matrix(ratio5, ratio6, coupling))
-    return np.asarray(motors) @ inverse.T
+    (r5, _), (c, r6) = _tendon_matrix(ratio5, ratio6, coupling)
+    return product(motors, np.array([[1.0 / r5, 0.0], [-c / (r5 * r6), 1.0 / r6]]).T)
 
 
 def _tendon_matrix(ratio5: float, ratio6: float, coupling: float) -> NDArray[np.float64]:

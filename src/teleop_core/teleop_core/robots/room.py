@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from teleop_core.geometry import Array, rotations_from_quaternions
 from teleop_core.kernels import raise_pending
+from teleop_core.portable import length, product
 from teleop_core.robots import kinematics
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.robot import Robot
@@ -70,7 +71,7 @@ def lever(robot: Robot) -> float:
     The reach is the largest distance of the tip from the base's origin over the postures that are
     looked at.
     """
-    return float(np.linalg.norm(_poses(robot, samples(robot))[:, :3, 3], axis=1).max()) / math.pi
+    return float(length(_poses(robot, samples(robot))[:, :3, 3]).max()) / math.pi
 
 
 def samples(robot: Robot) -> Array:
@@ -81,8 +82,9 @@ def samples(robot: Robot) -> Array:
     """
     root = 2.0
     for _ in range(60):
-        root = (1.0 + root) ** (1.0 / (robot.n + 1))
-    shares = np.arange(1, SAMPLES + 1)[:, None] * root ** -np.arange(1.0, robot.n + 1) + 0.5
+        root = math.pow(1.0 + root, 1.0 / (robot.n + 1))
+    steps = [math.pow(root, -1.0 - i) for i in range(robot.n)]
+    shares = np.arange(1, SAMPLES + 1)[:, None] * np.array(steps) + 0.5
     return robot.lower + (shares % 1.0) * (robot.upper - robot.lower)
 
 
@@ -161,7 +163,7 @@ def _directions(controlled: NDArray[np.bool_]) -> Array:
     """Unit vectors (k, 3) along the axes that are controlled and halfway between them."""
     every = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
     kept = every[(every != 0.0).any(axis=1) & (every[:, ~controlled] == 0.0).all(axis=1)]
-    return kept / np.linalg.norm(kept, axis=1)[:, None]
+    return kept / length(kept)[:, None]
 
 
 def _walk(robot: Robot, postures: Array, directions: Array, *, is_turn: bool) -> Array:
@@ -192,9 +194,9 @@ def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
     """Poses (N k, 4, 4): each of N moved by each of k offsets (k, 3) [m], or turned [rad]."""
     poses = np.repeat(begin, len(offsets), axis=0).reshape(len(begin), -1, 4, 4)
     if is_turn:
-        angle = np.linalg.norm(offsets, axis=1)[:, None]
+        angle = length(offsets)[:, None]
         quaternions = np.hstack((np.cos(angle / 2), offsets / angle * np.sin(angle / 2)))
-        poses[..., :3, :3] = rotations_from_quaternions(quaternions) @ poses[..., :3, :3]
+        poses[..., :3, :3] = product(rotations_from_quaternions(quaternions), poses[..., :3, :3])
     else:
         poses[..., :3, 3] += offsets
     return poses.reshape(-1, 4, 4)

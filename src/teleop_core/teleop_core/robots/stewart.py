@@ -27,6 +27,7 @@ import numpy as np
 from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.geometry import Array, checked_array, is_rigid
 from teleop_core.kernels import inner, kernel
+from teleop_core.portable import length
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.damped import is_near_singular
 from teleop_core.robots.drives import electric_cylinders, independent_axes
@@ -95,7 +96,7 @@ class Layout:
     @property
     def size(self) -> float:
         """Largest distance of a platform joint from the platform's origin [m]."""
-        return float(np.linalg.norm(self.platform, axis=1).max())
+        return float(length(self.platform).max())
 
     def symbols(self) -> dict[str, float]:
         """Geometry for ``load_robot``: b1x ... b6z, m1x ... m6z [m]."""

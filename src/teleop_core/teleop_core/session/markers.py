@@ -8,6 +8,7 @@ import numpy as np
 from teleop_core.bags.markers import Color, Marker, Shape
 from teleop_core.fixtures.sphere import SPHERE
 from teleop_core.geometry import Array
+from teleop_core.portable import length
 from teleop_core.session.model import MASTER, SLAVE
 
 TAIL = 200
@@ -59,7 +60,7 @@ class ArmMarkers:
     def force(self, stylus: Array, force: Array) -> Marker:
         """Force (3,) [N] on the hand at a stylus (7,), in master_base; no arrow for none."""
         ends = np.stack((stylus[:3], stylus[:3] + FORCE_SCALE * force))
-        is_shown = float(np.linalg.norm(force)) > _TOUCH
+        is_shown = float(length(force)) > _TOUCH
         scale = (0.004, 0.009, 0.01)
         return Marker("force", self._master, Shape.ARROW, scale=scale, color=_FORCE,
                       points=ends, is_shown=is_shown)  # fmt: skip

@@ -22,6 +22,7 @@ from teleop_core.operation.states import answer_text, change
 from teleop_core.operation.watch import fail
 from teleop_core.parameters import Choice, choice, parameter
 from teleop_core.plants import PER_JOINT, PLANTS, Physics
+from teleop_core.portable import length
 from teleop_core.robots import dh_kernels, load_robot_set
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.kinematics import FK
@@ -355,7 +356,7 @@ class SlaveSim(RunningStage):
         assert drives is not None
         p["braking"] = drives.effort_limit / drives.inertia
         p["acceleration"] = p["braking"] * given.acceleration_share
-        reach = np.linalg.norm(robot.jacobian(robot.home)[:3], axis=0)
+        reach = length(robot.jacobian(robot.home)[:3].T)
         p["tool_speed"] = given.tool_speed or np.max(reach * drives.speed_limit)
         p["tool_acceleration"] = given.tool_acceleration or np.max(reach * p["acceleration"])
         p["lag"] = drives.speed_limit * given.longest_lag

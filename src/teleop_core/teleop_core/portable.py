@@ -1,0 +1,70 @@
+"""Portable arithmetic: products, lengths and functions with the same bits on every processor.
+
+NumPy hands ``@``, ``np.dot`` and ``np.linalg`` to OpenBLAS, which adds in an order of its own on
+each processor. Most of its functions, such as ``exp`` and ``x**3``, come from vector code that
+rounds otherwise with AVX-512 than without. Whatever decides the bits of a session is computed with
+what stands here, in compiled kernels, or with NumPy's sums, ``sin``, ``cos``, ``sqrt`` and
+``hypot``, which do not differ. What is left is the C library: its sines differ from version to
+version, and on processors without fused multiply-add (before 2013).
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from teleop_core.kernels import kernel
+
+Array = NDArray[np.float64]
+
+
+def dot(a: ArrayLike, b: ArrayLike) -> Array:
+    """Sum of a times b along the last axis, (..., n) and (..., n) to (...), from the first on."""
+    products = np.moveaxis(np.asarray(a) * b, -1, 0)
+    total = np.zeros(products.shape[1:])
+    for term in products:
+        total = total + term
+    return total
+
+
+def length(vectors: ArrayLike) -> Array:
+    """Euclidean length of vectors (..., n) along the last axis, (...)."""
+    return np.sqrt(dot(vectors, vectors))
+
+
+def product(a: ArrayLike, b: ArrayLike) -> Array:
+    """Product of matrices (..., n, m) and (..., m, k), as ``a @ b``; vectors (n,) as there."""
+    a, b = np.asarray(a), np.asarray(b)
+    if b.ndim == 1:
+        return dot(a, b)
+    if a.ndim == 1:
+        return dot(np.swapaxes(b, -1, -2), a)
+    return dot(a[..., :, None, :], np.swapaxes(b, -1, -2)[..., None, :, :])
+
+
+def inverse_motion(transform: Array) -> Array:
+    """Rigid transform (4, 4) back: of the rotation R and the place p, Rᵀ and -Rᵀ p."""
+    out = np.eye(4)
+    out[:3, :3] = transform[:3, :3].T
+    out[:3, 3] = -product(out[:3, :3], transform[:3, 3])
+    return out
+
+
+def exponential(values: ArrayLike) -> Array:
+    """Exponential of each value of an array of any shape."""
+    wanted = np.asarray(values, dtype=np.float64)
+    return np.reshape([math.exp(value) for value in wanted.ravel().tolist()], wanted.shape)
+
+
+def arctangent(y: ArrayLike, x: ArrayLike) -> Array:
+    """Angle [rad] of each point x, y, within ±π; arrays of any shapes that broadcast."""
+    ys, xs = (np.array(each, dtype=np.float64) for each in np.broadcast_arrays(y, x))
+    out = np.empty(ys.shape)
+    _arctangents(ys.reshape(-1), xs.reshape(-1), out.reshape(-1))
+    return out
+
+
+@kernel
+def _arctangents(y: Array, x: Array, out: Array) -> None:
+    for i in range(len(out)):
+        out[i] = math.atan2(y[i], x[i])

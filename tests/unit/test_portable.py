@@ -1,0 +1,135 @@
+"""Portable: what decides the bits of a session calls nothing that a processor may round anew."""
+
+import ast
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import teleop_core
+from teleop_core.portable import arctangent, dot, exponential, inverse_motion, length, product
+
+PACKAGE = Path(teleop_core.__file__).parent
+ROOMS = (
+    "bodies", "controllers", "devices", "exchange", "fixtures", "kernels", "mapping", "master",
+    "operators", "plants", "robots", "session", "slave", "geometry.py", "portable.py", "signals.py",
+)  # fmt: skip
+"""What computes the values of a session's streams, or of its drawings."""
+ELSEWHERE = {
+    "robots/dexterity.py": "measures of dexterity, printed and plotted",
+    "robots/hand_grasp.py": "grasps, which no session solves",
+    "robots/inertias.py": "asks for signs alone",
+    "robots/mma_balance.py": "springs of the handle, printed and plotted",
+    "robots/mobility.py": "asks for a rank alone",
+    "robots/rps3_modes.py": "all ways to assemble it, which no session asks for",
+    "robots/stewart.py": "asks for ranks and signs alone",
+}
+"""Files of these rooms that decide no bits of a session, and why."""
+BLAS = {"linalg", "dot", "matmul", "inner", "vdot", "tensordot", "einsum", "cov", "corrcoef"}
+VECTORISED = {
+    "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "power", "float_power", "cbrt", "tan",
+    "sinh", "cosh", "tanh", "arcsin", "arccos", "arctan", "arctan2", "arcsinh", "arccosh",
+    "arctanh", "asin", "acos", "atan", "atan2", "pow",
+}  # fmt: skip
+NUMPY = {f"{module}.{name}" for module in ("np", "numpy") for name in BLAS | VECTORISED}
+PLAIN_POWERS = {2, 0.5, -1}  # NumPy squares, takes roots and divides for these
+
+
+def mistakes(text: str, file: str = "text") -> list[str]:
+    """Every call of the kinds above, as ``file:line: what``."""
+    found: list[str] = []
+    _look(ast.parse(text), file, is_compiled=False, found=found)
+    return found
+
+
+def _look(node: ast.AST, file: str, *, is_compiled: bool, found: list[str]) -> None:
+    if isinstance(node, ast.FunctionDef):
+        decorators = {ast.unparse(each) for each in node.decorator_list}
+        is_compiled = is_compiled or bool(decorators & {"kernel", "inner"})
+    if what := _mistake(node, is_compiled):
+        found.append(f"{file}:{node.lineno}: {what}")
+    for child in ast.iter_child_nodes(node):
+        _look(child, file, is_compiled=is_compiled, found=found)
+
+
+def _mistake(node: ast.AST, is_compiled: bool) -> str:
+    if isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult):
+        return "@"
+    if isinstance(node, ast.Import | ast.ImportFrom) and "scipy" in ast.unparse(node):
+        return "scipy"
+    if isinstance(node, ast.Attribute) and ast.unparse(node) in NUMPY:
+        return ast.unparse(node)
+    if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(".dot"):
+        return ".dot()"
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow) and not is_compiled:
+        powers = {ast.unparse(ast.Constant(power)) for power in PLAIN_POWERS}
+        is_plain = ast.unparse(node.right) in powers or isinstance(node.left, ast.Constant)
+        return "" if is_plain else "** (multiply, or math.pow of numbers)"
+    return ""
+
+
+def test_nothing_that_decides_bits_calls_blas_or_a_vectorised_function():
+    files = [file for room in ROOMS for file in sorted((PACKAGE / room).glob("**/*.py"))]
+    files += [PACKAGE / room for room in ROOMS if room.endswith(".py")]
+    names = [file.relative_to(PACKAGE).as_posix() for file in files]
+    assert not set(ELSEWHERE) - set(names)
+    found = [
+        mistake
+        for file, name in zip(files, names, strict=True)
+        if name not in ELSEWHERE
+        for mistake in mistakes(file.read_text(), name)
+    ]
+    assert not found, "\n".join(["use teleop_core.portable in place of:", *found])
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("a = b @ c", "@"),
+        ("a @= c", "@"),
+        ("n = np.linalg.norm(v)", "np.linalg"),
+        ("n = np.einsum('i,i', v, v)", "np.einsum"),
+        ("from scipy.linalg import solve", "scipy"),
+        ("n = v.dot(v)", ".dot()"),
+        ("y = np.exp(x)", "np.exp"),
+        ("y = x**3", "**"),
+        ("@kernel\ndef f(x):\n    return np.dot(x, x)", "np.dot"),
+    ],
+)
+def test_the_rule_finds_what_it_is_for(text, what):
+    assert any(what in mistake for mistake in mistakes(text))
+
+
+@pytest.mark.parametrize(
+    "text", ["y = x**2 + x**0.5", "@kernel\ndef f(x):\n    return x**3", "@cache\ndef f(): pass"]
+)
+def test_the_rule_lets_pass_what_rounds_alike(text):
+    assert mistakes(text) == []
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [((3,), (3,)), ((4, 3), (3,)), ((3,), (3, 5)), ((7, 2, 3), (7, 3, 4)), ((2, 3), (7, 3, 3))],
+)
+def test_products_are_those_of_numpy(a, b):
+    rng = np.random.default_rng(1)
+    left, right = rng.normal(size=a), rng.normal(size=b)
+    np.testing.assert_allclose(product(left, right), left @ right, rtol=0.0, atol=1e-14)
+
+
+def test_lengths_dots_and_functions_are_those_of_numpy():
+    rng = np.random.default_rng(2)
+    x, y = rng.normal(size=(2, 5, 4))
+    np.testing.assert_allclose(length(x), np.linalg.norm(x, axis=1), rtol=1e-15)
+    np.testing.assert_allclose(dot(x, y), (x * y).sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(exponential(x), np.exp(x), rtol=1e-15)
+    np.testing.assert_allclose(arctangent(x, y), np.arctan2(x, y), rtol=1e-15)
+    assert arctangent(1.0, np.zeros(2)).tolist() == [0.5 * math.pi] * 2
+
+
+def test_an_inverse_motion_leads_back():
+    from teleop_core.geometry import rotation, transform
+
+    there = transform(rotation("x", 0.7), np.array([0.1, -0.2, 0.3]))
+    np.testing.assert_allclose(product(inverse_motion(there), there), np.eye(4), atol=1e-15)
