@@ -33,13 +33,25 @@ USUAL = 20_000
 CASES = int(os.environ.get("TELEOP_FUZZ_CASES", USUAL))
 SHARES = {
     "CDR": 0.29,
-    "chunks": 0.20,
+    "chunks": 0.19,
+    "command calibrate": 0.01,
+    "command console": 0.01,
+    "command evaluate": 0.01,
+    "command export": 0.01,
+    "command import": 0.01,
+    "command play": 0.01,
+    "command reach": 0.01,
+    "command recover": 0.01,
+    "command replay": 0.01,
     "configurations": 0.03,
-    "metadata": 0.08,
-    "recordings": 0.15,
-    "settings": 0.10,
-    "state commands": 0.10,
-    "stored configurations": 0.05,
+    "imports": 0.06,
+    "metadata": 0.06,
+    "recordings": 0.08,
+    "robot tables": 0.01,
+    "settings": 0.08,
+    "state commands": 0.08,
+    "stored configurations": 0.02,
+    "table of rests": 0.01,
 }
 """Part of all cases that each target gets; less where a case takes long."""
 TIME = 60
@@ -148,13 +160,16 @@ TEXTS = st.one_of(
 """Values as a user, or nobody in his right mind, would write them."""
 
 
+KINDS = ("flip", "flip", "cut", "repeat", "put", "number", "length", "end")
+
+
 @st.composite
 def damaged(draw: st.DrawFn, whole: bytes, most: int = 4) -> bytes:
-    """Bytes of which some are flipped, cut out, put in twice or replaced, or the end is missing."""
+    """Bytes of which some are flipped, cut out, repeated or replaced, or whose end is missing."""
     data = bytearray(whole)
     for _ in range(draw(st.integers(1, most))):
         at = draw(st.integers(0, max(0, len(data) - 1)))
-        kind = draw(st.sampled_from(("flip", "flip", "cut", "repeat", "put", "number", "end")))
+        kind = draw(st.sampled_from(KINDS))
         count = draw(st.integers(1, 40))
         if kind == "flip" and data:
             data[at] ^= 1 << draw(st.integers(0, 7))
@@ -167,6 +182,10 @@ def damaged(draw: st.DrawFn, whole: bytes, most: int = 4) -> bytes:
         elif kind == "number":  # what lengths and times must not be believed in
             value = draw(st.sampled_from((0, 1, 2**31 - 1, 2**32 - 1, 2**62, 2**63, 2**64 - 1)))
             data[at : at + 8] = value.to_bytes(8, "little")
+        elif kind == "length":  # the same of four bytes, or one that is nearly right
+            by = draw(st.sampled_from((1, -1, 2**16, 2**31 - 1, 2**31, -(2**16))))
+            value = (int.from_bytes(data[at : at + 4], "little") + by) % 2**32
+            data[at : at + 4] = value.to_bytes(4, "little")
         elif kind == "end":
             del data[at:]
     return bytes(data)

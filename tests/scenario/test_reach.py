@@ -254,6 +254,7 @@ def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop):
     bag = saved("da_vinci_30", 2.0, tmp_path)
     for arguments, expected in (
         (["nothing"], "recording or scenario is 'nothing'"),
+        (["bags/missing"], "bags/missing: does not exist; give a recording"),
         ([bag, "--robot", "nobody"], "must be one of: rcrt1"),
         ([bag, "--share", "0"], "--share 0 must be above 0"),
         ([bag, bag, "--out", tmp_path / "x.yaml"], "--out takes the proposal of one"),

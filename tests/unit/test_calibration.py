@@ -25,7 +25,7 @@ from teleop_core.calibration.model import Frame, aligned
 from teleop_core.calibration.poses import optimal_poses, random_poses
 from teleop_core.calibration.report import correction_file
 from teleop_core.calibration.simulate import ruled, tracked, true_errors
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.robots import dh_kernels, load_robot, robot_from_table
 from teleop_core.robots.link_errors import true_chain
 
@@ -430,10 +430,17 @@ def test_tables_that_lack_something_are_refused_with_what_it_is(tmp_path):
         with pytest.raises(CalibrationError, match=pattern):
             read_measured(path, RCRT1)
     path.write_text("")
-    with pytest.raises(CalibrationError, match="no table"):
+    with pytest.raises(RecordingError, match="no table"):
         read_measured(path, RCRT1)
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(RecordingError, match="No such file"):
         read_measured(tmp_path / "none.csv", RCRT1)
+
+
+def test_poses_without_one_axis_have_a_total_too(tmp_path):
+    table, _ = poses_table()
+    table.assign(x=np.nan).to_csv(tmp_path / "poses.csv", index=False)
+    found = calibrate(RCRT1, read_measured(tmp_path / "poses.csv", RCRT1), "offsets")
+    assert "total RMS" in str(found)
 
 
 def test_a_pose_that_was_misread_is_named(tmp_path):

@@ -7,7 +7,13 @@ import pytest
 import roboticstoolbox as rtb
 import sympy
 
-from teleop_core.errors import ParameterError, ShapeError, TeleopError, UnknownNameError
+from teleop_core.errors import (
+    ParameterError,
+    RecordingError,
+    ShapeError,
+    TeleopError,
+    UnknownNameError,
+)
 from teleop_core.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import CONVENTIONS, elementary, load_table, parse_table
@@ -248,6 +254,8 @@ def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit():
         ([{"theta": "q", "a": [1]}], "row 1 a"),
         ([{"theta": "p"}], "row 1 theta"),
         ([{"theta": "2 q"}], "row 1 theta"),
+        ([{"theta": "q + ."}], "row 1 theta"),
+        ([{"theta": "q - 1e"}], "row 1 theta"),
         ([{"alpha": "q"}], "row 1 alpha"),
         ([{"theta": "q", "d": "q"}], "row 1 d"),
         ([{"d": "q"}], "row 1 lower"),
@@ -291,11 +299,10 @@ def test_unknown_conventions_list_the_known_ones():
 def test_files_that_are_not_yaml_or_not_there_are_refused(tmp_path):
     broken = tmp_path / "broken.yaml"
     broken.write_text("rows: [", encoding="utf-8")
-    with pytest.raises(ParameterError) as caught:
-        load_table(broken)
-    assert caught.value.value == str(broken)
-    with pytest.raises(FileNotFoundError):
-        load_table(tmp_path / "missing.yaml")
+    for path in (broken, tmp_path / "missing.yaml"):
+        with pytest.raises(RecordingError) as caught:
+            load_table(path)
+        assert caught.value.path == path
 
 
 def test_joint_vectors_of_another_length_are_refused():

@@ -111,6 +111,21 @@ def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path):
         Bag(bag)
 
 
+def test_a_length_that_a_file_claims_is_never_allocated(tmp_path, little_memory, capsys):
+    recorded(tmp_path / "bag")
+    file = tmp_path / "bag" / "bag_0.mcap"
+    whole = bytearray(file.read_bytes())
+    start = struct.unpack_from("<Q", whole, len(whole) - 28)[0]  # of the index, by the footer
+    struct.pack_into("<Q", whole, start + 1, 3 * GIGABYTE)
+    file.write_bytes(whole)
+    with pytest.raises(RecordingError, match="its index is damaged"):
+        Bag(file)
+    ros1 = tmp_path / "old.bag"
+    ros1.write_bytes(b"#ROSBAG V2.0\n" + struct.pack("<I", 3 * GIGABYTE) + bytes(5000))
+    assert cli.main(["import", str(ros1), "--out", str(tmp_path / "out")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
 def recorded(path: Path, **metadata: str) -> Path:
     times = np.arange(1, 1500) * MS
     values = np.zeros((len(times), 7))

@@ -99,6 +99,15 @@ def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path):
         assert taken == placement
 
 
+def test_a_placement_that_needs_no_change_is_written_too(tmp_path):
+    found = tc.reach(tc.run("fine_box", duration=2.0), share=0.01)
+    assert found.is_given
+    file = tmp_path / "reach.yaml"
+    file.write_text(found.parameter_file())
+    start = found.given.placement.start
+    assert tc.configuration(files=[file]).group("slave_sim").start == tuple(start)
+
+
 def test_a_placement_of_an_arm_leaves_the_other_arms_alone():
     settings = GIVEN.settings("left") | {"left/motion_scaling.coarse_gain": 0.5}
     made = tc.configuration(arms=["right", "left"], robot="puma560", settings=settings)

@@ -37,9 +37,8 @@ def mcap_files(path: Path) -> list[Path]:
 
 def _listed(path: Path, index: Path) -> list[Path]:
     """Files that the index lists; they are beside it, whatever folder it names."""
-    information = _information(index)
-    mode = information.get("compression_mode") or "none"
-    if str(mode).lower() != "none":
+    information, mode = _information(index), compression_mode(index)
+    if mode != "none":
         reason = f"is compressed by {shown(mode)}; `ros2 bag convert` it to plain mcap"
         raise RecordingError(path, reason)
     names = information.get("relative_file_paths")
@@ -52,6 +51,15 @@ def _listed(path: Path, index: Path) -> list[Path]:
     if missing:
         raise RecordingError(path, f"lacks its files {', '.join(missing)}")
     return [path / name for name in plain]
+
+
+def compression_mode(index: Path) -> str:
+    """What a recording's metadata says is compressed: ``none``, ``file`` or ``message``.
+
+    Raises:
+        RecordingError: The metadata is not what it must be.
+    """
+    return str(_information(index).get("compression_mode") or "none").lower()
 
 
 def _is_file(path: Path) -> bool:

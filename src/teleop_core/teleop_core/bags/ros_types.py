@@ -1,5 +1,6 @@
 """ROS types: definitions, hashes and serialisation of Jazzy messages without a ROS installation."""
 
+import struct
 from functools import cache
 from typing import Any
 
@@ -7,6 +8,9 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 DISTRIBUTION = "jazzy"
+_UNREADABLE = (SerdeError, AssertionError, IndexError, ValueError, OverflowError, MemoryError,
+               struct.error)  # fmt: skip
+"""What the rosbags library raises about bytes that are no such message."""
 
 
 @cache
@@ -40,7 +44,7 @@ def deserialise(data: bytes, ros_type: str) -> Any:
             return typestore().deserialize_cdr(data, ros_type)
         except SerdeError:
             return typestore().deserialize_cdr(data[:-4], ros_type)  # it takes three alone
-    except (SerdeError, AssertionError, IndexError, ValueError, OverflowError) as error:
+    except _UNREADABLE as error:
         raise ValueError(f"{len(data)} bytes are no {ros_type}: {error}") from error
 
 

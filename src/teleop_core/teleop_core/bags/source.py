@@ -5,7 +5,6 @@ import zlib
 from collections import Counter, deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -13,32 +12,30 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
-from mcap.reader import SeekingReader
-from mcap.records import Channel, Chunk, Metadata, Schema
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    Footer,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
 
 from teleop_core.bags import walk
-from teleop_core.bags.compression import DamagedError, decompress
+from teleop_core.bags.compression import decompress
 from teleop_core.bags.layouts import Bytes, Stamps
 from teleop_core.bags.mcap_file import MAGIC
+from teleop_core.damage import damage_told
 from teleop_core.errors import RecordingError
-from teleop_core.plain_yaml import UnreadableError, check_regular
 
 CUT_OFF = "was cut off while being recorded; `teleop recover {path}` saves what is there"
 _FOOTER_SIZE = 9 + 20
 _WINDOW = 4 << 20
 _LOOK_AHEAD = 3
-_Damage = (
-    McapError,
-    EndOfFile,
-    struct.error,
-    UnicodeDecodeError,
-    KeyError,
-    *DamagedError,
-    OverflowError,
-    MemoryError,
-)
+_UNREAD = "{} is damaged ({{}}); `teleop recover` saves the whole parts"
 
 
 class Records(NamedTuple):
@@ -74,16 +71,6 @@ class Contents:
     end: int = 0
 
 
-@contextmanager
-def damage_told(path: Path, what: str) -> Iterator[None]:
-    """Tell damage found by the libraries as a :class:`RecordingError`."""
-    try:
-        yield
-    except _Damage as error:
-        hint = "`teleop recover` saves the whole parts"
-        raise RecordingError(path, f"{what} is damaged ({error}); {hint}") from error
-
-
 class McapSource:
     """An MCAP file.
 
@@ -97,18 +84,9 @@ class McapSource:
 
     def __init__(self, path: Path, *, is_whole: bool = True) -> None:
         self.path = path
-        try:
-            check_regular(path)
-            with path.open("rb") as file:
-                self._check_magic(file, is_whole)
-                with damage_told(path, "its index"):
-                    self.contents = (is_whole and self._summary(file)) or self._scan(
-                        is_whole=is_whole
-                    )
-        except OSError as error:
-            raise RecordingError(path, f"cannot be read: {error.strerror}") from error
-        except UnreadableError as error:
-            raise RecordingError(path, str(error)) from error
+        with damage_told(path, _UNREAD.format("its index")), path.open("rb") as file:
+            self._check_magic(file, is_whole)
+            self.contents = (is_whole and self._summary()) or self._scan(is_whole=is_whole)
 
     def _check_magic(self, file: BinaryIO, is_whole: bool) -> None:
         begin = file.read(len(MAGIC))
@@ -123,25 +101,33 @@ class McapSource:
         if is_whole and not has_end:
             raise RecordingError(self.path, CUT_OFF.format(path=self.path))
 
-    def _summary(self, file: BinaryIO) -> Contents | None:
-        """Contents by the file's index; None if it has none."""
-        file.seek(0)
-        reader = SeekingReader(file)
-        summary = reader.get_summary()
-        if summary is None or summary.statistics is None or not summary.chunk_indexes:
+    def _summary(self) -> Contents | None:
+        """Contents by the file's index; None if it has none.
+
+        The index is walked as any other stretch of the file: no length in it leads beyond its end.
+        """
+        data = self.mapped()
+        footer = len(data) - len(MAGIC) - _FOOTER_SIZE
+        start = Footer.read(_stream(data, footer + 9, 20)).summary_start
+        if not len(MAGIC) <= start < footer:
             return None
-        places = [
-            Place(
-                index.chunk_start_offset, index.message_start_time, index.message_end_time,
-                frozenset(index.message_index_offsets) or None,
-            )
-            for index in summary.chunk_indexes
-        ]  # fmt: skip
-        counts = Counter(summary.statistics.channel_message_counts)
-        if counts.total() != summary.statistics.message_count:
+        rows, end = walk.walk(data, start, footer)
+        if end != footer:
+            raise ValueError(f"it ends at byte {end}, must end at {footer}")
+        found, statistics = Contents(), None
+        _note_cold(found, data, rows)
+        for opcode, begin, size in rows[:, :3].tolist():
+            if opcode == Opcode.STATISTICS:
+                statistics = Statistics.read(_stream(data, begin, size))
+            elif opcode == Opcode.CHUNK_INDEX:
+                found.places.append(_place(ChunkIndex.read(_stream(data, begin, size))))
+            elif opcode == Opcode.METADATA_INDEX:
+                index = MetadataIndex.read(_stream(data, begin, size))
+                found.metadata.append(Metadata.read(_stream(data, index.offset + 9, index.length)))
+        if statistics is None or not found.places:
             return None
-        metadata = list(reader.iter_metadata()) if summary.metadata_indexes else []
-        return Contents(summary.schemas, summary.channels, metadata, places, counts)
+        found.counts = Counter(statistics.channel_message_counts)
+        return found if found.counts.total() == statistics.message_count else None
 
     # -- files without an index ------------------------------------------------------------------
 
@@ -152,10 +138,11 @@ class McapSource:
         rows, found.end = walk.walk(data, len(MAGIC), len(data))
         _note_cold(found, data, rows)
         for begin, size in rows[rows[:, walk.OPCODE] == Opcode.CHUNK, 1:3].tolist():
-            stream = ReadDataStream(BytesIO(data[begin : begin + size].tobytes()))
             try:
-                _note_chunk(found, _uncompressed(Chunk.read(stream)), begin - 9)
-            except _Damage:
+                with damage_told(self.path, _UNREAD.format(f"the chunk at byte {begin - 9}")):
+                    chunk = Chunk.read(_stream(data, begin, size))
+                    _note_chunk(found, _uncompressed(chunk), begin - 9)
+            except RecordingError:
                 if is_whole:
                     raise
         found.places += _loose(found, rows)
@@ -191,8 +178,21 @@ class McapSource:
     def _load(self, file: BinaryIO, place: Place) -> Bytes:
         if place.end:
             return self.mapped()
-        with damage_told(self.path, f"the chunk at byte {place.offset}"):
+        with damage_told(self.path, _UNREAD.format(f"the chunk at byte {place.offset}")):
             return _uncompressed(_chunk_at(file, place.offset))
+
+
+def _stream(data: Bytes, begin: int, size: int) -> ReadDataStream:
+    """Stream of some bytes of a file, as the mcap library reads records from."""
+    return ReadDataStream(BytesIO(data[begin : begin + size].tobytes()))
+
+
+def _place(index: ChunkIndex) -> Place:
+    """Where a chunk is, by the file's index."""
+    channels = frozenset(index.message_index_offsets) or None
+    return Place(
+        index.chunk_start_offset, index.message_start_time, index.message_end_time, channels
+    )
 
 
 def _chunk_at(file: BinaryIO, offset: int) -> Chunk:
@@ -239,7 +239,7 @@ def _note_cold(found: Contents, data: Bytes, rows: walk.Rows) -> None:
     """Note schemas, channels and metadata among records."""
     is_cold = np.isin(rows[:, walk.OPCODE], (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA))
     for opcode, begin, size in rows[is_cold, :3].tolist():
-        stream = ReadDataStream(BytesIO(data[begin : begin + size].tobytes()))
+        stream = _stream(data, begin, size)
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
             found.schemas[schema.id] = schema

@@ -48,14 +48,18 @@ class Accuracy:
 
 
 def of_points(errors: Array) -> dict[str, Spread]:
-    """Spreads of errors (N, 3), NaN where not read; the total is of their lengths."""
+    """Spreads of errors (N, 3), NaN where not read, of which some are.
+
+    The total is of their lengths; if no point was read along all three axes, of all readings.
+    """
     out = {}
     for axis, column in zip(AXES, errors.T, strict=True):
         read = column[np.isfinite(column)]
         if len(read):
             out[axis] = spread(read)
     whole = errors[np.isfinite(errors).all(axis=1)]
-    return out | ({TOTAL: spread(np.linalg.norm(whole, axis=1))} if len(whole) else {})
+    total = np.linalg.norm(whole, axis=1) if len(whole) else errors[np.isfinite(errors)]
+    return out | {TOTAL: spread(total)}
 
 
 def of_distances(errors: Array, labels: tuple[str, ...]) -> dict[str, Spread]:

@@ -1,6 +1,5 @@
 """Measured: what an instrument says of the tip, pose by pose, and where such tables come from."""
 
-import csv
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from teleop_core.damage import damage_told
 from teleop_core.errors import ParameterError, ShapeError, TeleopError
 from teleop_core.exchange.names import without_unit
 from teleop_core.geometry import Array, checked_array
@@ -105,16 +105,14 @@ def read_measured(path: Path, robot: Robot) -> Measured:
     are left out.
 
     Raises:
-        CalibrationError: No such table, columns that are missing, cells that are no numbers, or
-            joints far beyond their limits, which are in another unit as a rule.
-        OSError: It cannot be read.
+        RecordingError: It cannot be read, or is no table of text.
+        CalibrationError: Columns are missing, cells are no numbers, or joints are far beyond their
+            limits, which are in another unit as a rule.
     """
     import pandas as pd
 
-    try:
+    with damage_told(path, "is no table of text with a head ({})"):
         frame = pd.read_csv(path, sep=None, engine="python", comment="#", skipinitialspace=True)
-    except (csv.Error, ValueError) as e:  # pandas' own errors are ValueErrors
-        raise CalibrationError(f"{path}: is no table of text with a head ({e})") from e
     found = {_plain(name): name for name in map(str, frame.columns)}
     joints, slides = np.empty((len(frame), robot.n)), _slides(robot)
     for i, name in enumerate(robot.joint_names):

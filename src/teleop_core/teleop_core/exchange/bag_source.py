@@ -1,16 +1,14 @@
 """Bag source: recordings of ROS 1 and 2 whose topics are the motion and the buttons of a hand."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.highlevel import AnyReader, AnyReaderError
-from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_typestore
 
 from teleop_core.bags.reader import Bag
+from teleop_core.damage import damage_told
 from teleop_core.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.exchange.bag_messages import (
     JOY,
@@ -18,21 +16,18 @@ from teleop_core.exchange.bag_messages import (
     TRANSFORMS,
     JoyReader,
     PoseReader,
-    Raw,
     frames,
     plain,
 )
 from teleop_core.exchange.options import BUTTONS, ImportOptions, button_map
 from teleop_core.exchange.orientation import Attitudes
+from teleop_core.exchange.ros_bags import OurBag, RosBag, is_plain_mcap, opened_by_rosbags
 from teleop_core.exchange.source import Block, Presses
-from teleop_core.exchange.tables import first_line
 from teleop_core.geometry import Array
 from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind
 
 _LOOKED_AT = 1000
 """Messages of transforms whose frames are listed."""
-_Damage = (AnyReaderError, SerdeError, OSError, ValueError, KeyError, IndexError, AssertionError,
-           EOFError, RuntimeError, NotImplementedError, UnicodeDecodeError)  # fmt: skip
 _TABLE_OPTIONS = ("time", "rate", "position", "quaternion", "matrix", "euler", "rotation_vector",
                   "forward", *BUTTONS)  # fmt: skip
 
@@ -60,54 +55,30 @@ class BagSource:
         if given := [name for name in _TABLE_OPTIONS if getattr(options, name)]:
             text = "left out: a recording of ROS has topics, not columns (--topic, --buttons)"
             raise ParameterError(f"--{given[0].replace('_', '-')}", "given", text)
-        self._bag = self._our_reader()
-        with self._opened() as reader:
-            self._types = {
-                plain(name): str(info.msgtype)
-                for name, info in reader.topics.items()
-                if info.msgcount
-            }
+        self._bag = Bag(path) if is_plain_mcap(path) else None
+        with self._opened() as bag:
+            self._types = bag.types
             self._topic = self._pose_topic()
-            self._frame = self._child_frame(reader)
+            self._frame = self._child_frame(bag)
             self._joy = self._joy_topic()
-            self._numbers = self._button_numbers(reader)
-
-    def _our_reader(self) -> Bag | None:
-        """Our reader of MCAP, which is faster; None for what it does not read."""
-        if not _holds(self.path, ".mcap"):
-            return None
-        with suppress(RecordingError):
-            return Bag(self.path)
-        return None
+            self._numbers = self._button_numbers(bag)
 
     @contextmanager
-    def _opened(self) -> Iterator[AnyReader]:
-        """Reader of rosbags.
+    def _opened(self) -> Iterator[RosBag]:
+        """The recording, to be read message by message.
 
         Raises:
             RecordingError: It cannot be read.
         """
-        if self.path.is_dir() and not _holds(self.path, ".mcap", ".db3", ".zstd"):
-            reason = "is no recording: it holds no .mcap and no .db3; of ROS 1 give the .bag file"
-            raise RecordingError(self.path, reason)
-        try:
-            types = get_typestore(Stores.ROS2_JAZZY)
-            with AnyReader([self.path], default_typestore=types) as reader:
-                yield reader
-        except RecordingError:
-            raise
-        except _Damage as error:
-            if isinstance(error, ParameterError):  # a ValueError too
-                raise
-            raise self._refusal(error) from error
-
-    def _refusal(self, error: Exception) -> RecordingError:
-        if self._bag is None and _holds(self.path, ".mcap"):
-            try:  # our reader's text says what to do about a recording that was cut off
-                Bag(self.path)
-            except RecordingError as known:
-                return known
-        return RecordingError(self.path, f"cannot be read: {first_line(error)}")
+        with damage_told(self.path):
+            if self._bag is not None:
+                yield OurBag(self._bag)
+                return
+            if self.path.is_dir() and not _holds(self.path, ".db3", ".mcap", ".zstd"):
+                reason = "is no recording: it holds no .mcap and no .db3; of ROS 1 give the .bag"
+                raise RecordingError(self.path, f"{reason} file")
+            with opened_by_rosbags(self.path) as bag:
+                yield bag
 
     # -- which topics ----------------------------------------------------------------------------
 
@@ -134,12 +105,12 @@ class BagSource:
                 return few[0]
         raise UnknownNameError("--topic", "", sorted(found))
 
-    def _child_frame(self, reader: AnyReader) -> str:
+    def _child_frame(self, bag: RosBag) -> str:
         if self._types[self._topic] not in TRANSFORMS:
             return ""
-        poses = self._pose_reader(reader)
+        poses = self._pose_reader(bag)
         known: dict[str, None] = {}
-        for number, (_, data) in enumerate(self._raw(reader, self._topic)):
+        for number, (_, data) in enumerate(bag.raw(self._topic)):
             known |= dict.fromkeys(frames(poses.message(data)))
             if number >= _LOOKED_AT:
                 break
@@ -169,12 +140,12 @@ class BagSource:
             raise ParameterError("--buttons", self._options.buttons, "left out: there is no Joy")
         return ""
 
-    def _button_numbers(self, reader: AnyReader) -> tuple[int, ...]:
+    def _button_numbers(self, bag: RosBag) -> tuple[int, ...]:
         """Numbers of clutch, fixture and mode among the buttons; -1 for those that are not."""
         if not self._joy:
             return ()
-        joy = JoyReader(reader.typestore, is_ros2=reader.is2, numbers=())
-        _, first = next(self._raw(reader, self._joy))
+        joy = JoyReader(bag.typestore, is_ros2=bag.is_ros2, numbers=())
+        _, first = next(bag.raw(self._joy))
         count = len(joy.message(first).buttons)
         named = button_map(self._options.buttons) if self._options.buttons else {}
         named = named or {name: i for i, name in enumerate(BUTTONS) if i < count}
@@ -187,20 +158,10 @@ class BagSource:
 
     # -- messages --------------------------------------------------------------------------------
 
-    def _pose_reader(self, reader: AnyReader) -> PoseReader:
+    def _pose_reader(self, bag: RosBag) -> PoseReader:
         frame = getattr(self, "_frame", "")
         kind = self._types[self._topic]
-        return PoseReader(reader.typestore, kind, is_ros2=reader.is2, frame=frame)
-
-    def _raw(self, reader: AnyReader, topic: str) -> Iterator[Raw]:
-        if self._bag is not None:
-            for _, _, log, data in self._bag.raw([topic]):
-                yield log, data
-            return
-        chosen = [c for c in reader.connections if plain(c.topic) == topic]
-        # There is one file: its own reader need not be merged with others.
-        for _, log, data in reader.readers[0].messages(connections=chosen):
-            yield log, data
+        return PoseReader(bag.typestore, kind, is_ros2=bag.is_ros2, frame=frame)
 
     def blocks(self) -> Iterator[Block]:
         """As of any source.
@@ -214,9 +175,9 @@ class BagSource:
                     series = found[self._topic]
                     yield self._block(series.stamp_ns, series.log_ns, series.values)
             return
-        with self._opened() as reader:
-            poses = self._pose_reader(reader)
-            for rows in poses.blocks(self._raw(reader, self._topic)):
+        with self._opened() as bag:
+            poses = self._pose_reader(bag)
+            for rows in poses.blocks(bag.raw(self._topic)):
                 yield self._block(*rows)
 
     def _block(self, stamps: Any, logs: Any, poses: Array) -> Block:
@@ -227,9 +188,9 @@ class BagSource:
         """As of any source."""
         if not self._joy:
             return None
-        with self._opened() as reader:
-            joy = JoyReader(reader.typestore, is_ros2=reader.is2, numbers=self._numbers)
-            return Presses(*joy.read(self._raw(reader, self._joy)))
+        with self._opened() as bag:
+            joy = JoyReader(bag.typestore, is_ros2=bag.is_ros2, numbers=self._numbers)
+            return Presses(*joy.read(bag.raw(self._joy)))
 
     def check(self, finite: Array) -> None:
         """As of any source."""
@@ -239,6 +200,5 @@ class BagSource:
 
 
 def _holds(path: Path, *ends: str) -> bool:
-    """Whether a path is, or a directory has, a file with one of these ends."""
-    files = path.iterdir() if path.is_dir() else (path,)
-    return any(file.suffix in ends for file in files)
+    """Whether a directory has a file with one of these ends."""
+    return any(file.suffix in ends for file in path.iterdir())

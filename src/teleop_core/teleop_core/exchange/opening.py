@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from teleop_core.damage import damage_told
 from teleop_core.errors import RecordingError
 from teleop_core.exchange.options import ImportOptions
 from teleop_core.exchange.source import Source
-from teleop_core.plain_yaml import UnreadableError, check_regular
 
 if TYPE_CHECKING:
     from teleop_core.exchange.tables import Table
@@ -28,10 +28,6 @@ def open_source(path: Path, options: ImportOptions) -> Source:
     """
     if not path.exists():
         raise RecordingError(path, "does not exist")
-    try:
-        check_regular(path)
-    except UnreadableError as error:
-        raise RecordingError(path, str(error)) from error
     if is_bag(path):
         from teleop_core.exchange.bag_source import BagSource
 
@@ -45,6 +41,6 @@ def _table(path: Path, options: ImportOptions) -> "Table":
     from teleop_core.exchange.tables import ParquetTable
     from teleop_core.exchange.text_table import TextTable
 
-    with path.open("rb") as file:
+    with damage_told(path), path.open("rb") as file:
         magic = file.read(4)
     return ParquetTable(path) if magic == b"PAR1" else TextTable(path, options.skip)

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from teleop_core.damage import damage_told
 from teleop_core.errors import RecordingError, UnknownNameError
 
 Numbers = NDArray[np.float64] | NDArray[np.int64]
@@ -98,13 +99,11 @@ class ParquetTable:
 
     def __init__(self, path: Path) -> None:
         self.path, self.is_named, self.bad_rows = path, True, 0
-        try:
+        with damage_told(path, "is no sound Parquet file: {}"):
             # Read as it is asked for: a file may be one single group of rows.
             self._file = pq.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20)
-        except (pa.ArrowInvalid, OSError) as error:
-            raise RecordingError(path, f"is no sound Parquet file: {first_line(error)}") from error
-        self._first = self._head()
-        self.names = unique(self._first.schema.names)
+            self._first = self._head()
+            self.names = unique(self._first.schema.names)
 
     def _head(self) -> pa.RecordBatch:
         for batch in self._file.iter_batches(batch_size=SAMPLE):
@@ -127,12 +126,10 @@ class ParquetTable:
         wanted = {self._first.schema.names[column].partition(".")[0] for column in columns}
         kept = [name for name in self._file.schema_arrow.names if name.partition(".")[0] in wanted]
         names = [self._first.schema.names[column] for column in columns]
-        try:
+        with damage_told(self.path):
             for batch in self._file.iter_batches(batch_size=ROWS, columns=kept):
                 whole = flat(batch)
                 yield [numbers(whole.column(whole.schema.names.index(name))) for name in names]
-        except (pa.ArrowInvalid, pa.ArrowNotImplementedError, OSError, ValueError) as error:
-            raise RecordingError(self.path, f"cannot be read: {first_line(error)}") from error
 
 
 def flat(batch: pa.RecordBatch) -> pa.RecordBatch:
@@ -165,8 +162,3 @@ def _parts(name: str, column: pa.Array) -> Iterator[tuple[str, pa.Array]]:
 
 def _every(first: int, step: int, length: int) -> pa.Array:
     return pa.array(np.arange(first, length, step))
-
-
-def first_line(error: Exception) -> str:
-    """Text of a library's error as one line."""
-    return " ".join(str(error).split())[:200]

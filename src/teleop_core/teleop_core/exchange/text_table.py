@@ -12,8 +12,9 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.csv as pc
 
+from teleop_core.damage import damage_told
 from teleop_core.errors import RecordingError
-from teleop_core.exchange.tables import ROWS, SAMPLE, Numbers, first_line, numbers, unique
+from teleop_core.exchange.tables import ROWS, SAMPLE, Numbers, numbers, unique
 
 _HEAD_BYTES = 1 << 18
 _PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\x28\xb5\x2f\xfd": "zstd"}
@@ -58,11 +59,12 @@ class TextTable:
 
     def __init__(self, path: Path, skip: int = 0) -> None:
         self.path, self.bad_rows = path, 0
-        with path.open("rb") as file:
-            magic = file.read(4)
-        self._packed = next((n for sign, n in _PACKED.items() if magic.startswith(sign)), None)
-        text, self._encoding = self._beginning()
-        self._form = recognised(path, text, skip)
+        with damage_told(path):
+            with path.open("rb") as file:
+                magic = file.read(4)
+            self._packed = next((n for sign, n in _PACKED.items() if magic.startswith(sign)), None)
+            text, self._encoding = self._beginning()
+            self._form = recognised(path, text, skip)
         self.is_named = bool(self._form.names)
         self.names = unique(self._form.names or [""] * self._form.width)
 
@@ -71,11 +73,8 @@ class TextTable:
 
     def _beginning(self) -> tuple[str, str]:
         """The first lines, and how letters are encoded."""
-        try:
-            with self._stream() as stream:
-                data = stream.read(_HEAD_BYTES)
-        except (OSError, pa.ArrowInvalid) as error:
-            raise RecordingError(self.path, f"cannot be read: {first_line(error)}") from error
+        with self._stream() as stream:
+            data = stream.read(_HEAD_BYTES)
         if not data.strip():
             raise RecordingError(self.path, "is empty")
         if b"\x00" in data:
@@ -105,7 +104,12 @@ class TextTable:
         """As of any table."""
         self.bad_rows = 0
         read = self._by_pandas if self._form.separator == _BLANK else self._by_arrow
-        yield from read(columns)
+        with damage_told(self.path):
+            try:
+                yield from read(columns)
+            except ValueError as error:
+                self._refuse_cell(error)
+                raise
 
     def _by_arrow(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
         form = self._form
@@ -120,12 +124,9 @@ class TextTable:
             quoted_strings_can_be_null=True, decimal_point=form.decimal,
             column_types={names[c]: self._type(c) for c in columns},
         )  # fmt: skip
-        try:
-            with self._stream() as stream, pc.open_csv(stream, read, parse, convert) as reader:
-                for batch in reader:
-                    yield [numbers(batch.column(names[column])) for column in columns]
-        except (pa.ArrowInvalid, OSError, ValueError) as error:
-            raise self._refusal(error) from error
+        with self._stream() as stream, pc.open_csv(stream, read, parse, convert) as reader:
+            for batch in reader:
+                yield [numbers(batch.column(names[column])) for column in columns]
 
     def _type(self, column: int) -> pa.DataType:
         if self.is_clock(column):
@@ -141,28 +142,29 @@ class TextTable:
         names = [f"c{i}" for i in range(form.width)]
         wanted = sorted(dict.fromkeys(columns))
         types = {names[c]: "float64" if self._type(c) == pa.float64() else "Int64" for c in wanted}
-        try:
-            reader = pd.read_csv(
-                self.path, sep=_BLANK, header=None, names=names, usecols=[names[c] for c in wanted],
-                skiprows=form.head, chunksize=ROWS, engine="c",
-                dtype=types, na_values=list(_MISSING), decimal=form.decimal, index_col=False,
-                encoding=self._encoding, compression=self._packed, on_bad_lines="skip",
-            )  # fmt: skip
-            with reader:
-                for frame in reader:
-                    yield [_numbers(frame[names[column]]) for column in columns]
-        except (ValueError, OSError) as error:
-            raise self._refusal(error) from error
+        reader = pd.read_csv(
+            self.path, sep=_BLANK, header=None, names=names, usecols=[names[c] for c in wanted],
+            skiprows=form.head, chunksize=ROWS, engine="c",
+            dtype=types, na_values=list(_MISSING), decimal=form.decimal, index_col=False,
+            encoding=self._encoding, compression=self._packed, on_bad_lines="skip",
+        )  # fmt: skip
+        with reader:
+            for frame in reader:
+                yield [_numbers(frame[names[column]]) for column in columns]
 
-    def _refusal(self, error: Exception) -> RecordingError:
-        """Error in words: which column holds what."""
-        text = first_line(error)
+    def _refuse_cell(self, error: ValueError) -> None:
+        """Say which column holds what, if a library's error tells it.
+
+        Raises:
+            RecordingError: It does.
+        """
+        text = " ".join(str(error).split())
         for pattern in (r"column #(\d+).*?invalid value '([^']*)'", r"to float.*?(): '([^']*)'"):
             if found := re.search(pattern, text):
                 name = self._name_at(found[1])
                 needed = "which is no number; choose other columns, or mark it as NaN"
-                return RecordingError(self.path, f"{name} holds {found[2]!r}, {needed}")
-        return RecordingError(self.path, f"cannot be read: {text}")
+                reason = f"{name} holds {found[2]!r}, {needed}"
+                raise RecordingError(self.path, reason) from error
 
     def _name_at(self, number: str) -> str:
         return f"column {self.names[int(number)]!r}" if number else "a column"

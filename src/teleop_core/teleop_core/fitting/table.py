@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from teleop_core.damage import damage_told
 from teleop_core.errors import TeleopError
 from teleop_core.geometry import Array
 from teleop_core.robots.robot import Robot
@@ -53,10 +54,8 @@ def read_rests(file: Path, robot: Robot) -> RestTable:
         TeleopError: It cannot be read, columns or numbers are missing, or a point has one run
             alone or several targets.
     """
-    try:
+    with damage_told(file):
         table = pd.read_csv(file)
-    except (OSError, ValueError) as error:
-        raise TeleopError(f"{file}: cannot be read: {' '.join(str(error).split())}") from error
     columns = ["point", *(f"target_{name}" for name in robot.joint_names), *robot.joint_names]
     if missing := [name for name in columns if name not in table]:
         text = f"{file}: lacks {', '.join(missing)}; it has {', '.join(map(str, table.columns))}"

@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from teleop_core.damage import damage_told
 from teleop_core.errors import ParameterError, RecordingError
 from teleop_core.exchange.options import ImportOptions
 from teleop_core.geometry import Array
 from teleop_core.operators import Motion, Operator, Setting
 from teleop_core.operators.shapes import minimum_jerk
 from teleop_core.parameters import parameter
-from teleop_core.plain_yaml import check_regular
 from teleop_core.portable import arctangent, length
 from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
 
@@ -110,10 +110,9 @@ def _approach(setting: Setting) -> float:
 def columns_of(path: Path) -> ImportOptions | None:
     """Columns of a table that are called as :data:`COLUMNS`; None for other tables."""
     try:
-        check_regular(path)
-        with path.open(newline="", encoding="utf-8") as file:
+        with damage_told(path), path.open(newline="", encoding="utf-8") as file:
             head = [name.strip() for name in next(csv.reader(file), [])]
-    except (OSError, ValueError, csv.Error):
+    except RecordingError:  # whoever reads all of it says what is wrong
         return None
     if not set(COLUMNS[:4]) <= set(head):
         return None

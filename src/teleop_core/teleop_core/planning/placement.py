@@ -54,7 +54,7 @@ class Placement:
         )
 
     def settings(self, arm: str = "") -> dict[str, Setting]:
-        """Parameters by name, as ``settings=`` of sessions takes them.
+        """Parameters by name, as ``settings=`` of sessions takes them; no number is of NumPy.
 
         Args:
             arm: Namespace of the arm that they are for; empty for the default one.
@@ -66,13 +66,13 @@ class Placement:
             if self.geometry:
                 robot[f"{prefix}{stage}.geometry"] = list(self.geometry)
         return robot | {
-            f"{prefix}slave_sim.start": list(self.start),
+            f"{prefix}slave_sim.start": list(map(float, self.start)),
             f"{prefix}motion_scaling.axes": list(self.axes),
-            f"{prefix}motion_scaling.coarse_gain": self.coarse_gain,
-            f"{prefix}motion_scaling.fine_gain": self.fine_gain,
-            f"{prefix}motion_scaling.rotation_gain": self.rotation_gain,
+            f"{prefix}motion_scaling.coarse_gain": float(self.coarse_gain),
+            f"{prefix}motion_scaling.fine_gain": float(self.fine_gain),
+            f"{prefix}motion_scaling.rotation_gain": float(self.rotation_gain),
             f"{prefix}motion_scaling.tool_axes": list(self.tool_axes),
-            f"{prefix}motion_scaling.tool_roll": self.tool_roll,
+            f"{prefix}motion_scaling.tool_roll": float(self.tool_roll),
         }
 
     def texts(self, arm: str = "") -> list[str]:

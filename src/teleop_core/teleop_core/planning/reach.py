@@ -7,7 +7,7 @@ from pathlib import Path
 from teleop_core.api import run
 from teleop_core.bags.arms import of_arm
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.exchange import as_master_bag
 from teleop_core.planning.aim import Aim
 from teleop_core.planning.asked import AskedPath, asked_path
@@ -190,6 +190,9 @@ def _changes(
 def _configured(source: Recording | Path | str, changes: list[Layer]) -> tuple[Configuration, Bag]:
     """Configuration with the changes, and the recording; of a scenario one that is made now."""
     if isinstance(source, str) and not Path(source).exists():
+        if Path(source).name != source or Path(source).suffix:
+            reason = "does not exist; give a recording, or one of `teleop scenarios`"
+            raise RecordingError(source, reason)
         if source not in list_scenarios():
             raise UnknownNameError("recording or scenario", source, list_scenarios())
         made = _of_scenario(source, changes)

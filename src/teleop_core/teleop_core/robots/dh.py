@@ -43,6 +43,7 @@ from pathlib import Path
 from typing import Any
 
 from teleop_core import plain_yaml
+from teleop_core.damage import damage_told
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.robots.dh_chain import (
     CONVENTIONS,
@@ -66,7 +67,9 @@ __all__ = [
     "parse_table",
     "robot_from_table",
 ]
-_EXPRESSION = re.compile(r"([+-]?)\s*q\s*(?:([+-])\s*([0-9.eE]+))?")
+_EXPRESSION = re.compile(
+    r"([+-]?)\s*q\s*(?:([+-])\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?))?", re.A
+)
 _JOINT_KEYS = ("name", "lower", "upper", "home", "start")
 
 
@@ -74,15 +77,12 @@ def load_table(path: Path | str) -> DhTable:
     """Table from a YAML file.
 
     Raises:
-        ParameterError: Not YAML, or an entry that is missing or not possible.
+        RecordingError: The file cannot be read, or is not YAML.
+        ParameterError: An entry that is missing or not possible.
         UnknownNameError: A convention, direction or entry that does not exist.
-        OSError: The file cannot be read.
     """
-    try:
-        content = plain_yaml.read(Path(path))
-    except plain_yaml.UnreadableError as error:
-        raise ParameterError("table", str(path), f"a YAML file ({error})") from error
-    return parse_table(content)
+    with damage_told(Path(path)):
+        return parse_table(plain_yaml.read(Path(path)))
 
 
 def robot_from_table(content: object) -> Robot:
