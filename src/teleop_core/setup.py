@@ -29,6 +29,7 @@ setup(
     package_data={
         "teleop_core": [
             "py.typed",
+            "console/page.js",
             "evaluation/report/*",
             "fitting/*.csv",
             "nodes/profiles/*.xml",
@@ -50,7 +51,7 @@ setup(
         "scipy",
     ],
     extras_require={
-        "console": ["viser>=1.1,<1.2", "pygame-ce", "hidapi"],
+        "console": ["viser>=1.1,<1.2", "msgspec", "pygame-ce", "hidapi"],
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "test": [
             "coverage",

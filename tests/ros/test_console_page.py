@@ -136,7 +136,7 @@ def test_emergency_stop_stops_by_button_and_key_until_it_is_released(page, conso
     path = saved(page, console, f"stopped_{way_in}")
     states = tc.open_recording(path)["slave/operation"]["state"]
     assert states[-1] in {State.FAULT, State.DISABLED}
-    page.click("release")
+    page.click("Release")
     page.click("Initialize")
     page.shows("ENABLED", 60)
 
@@ -145,7 +145,7 @@ def test_page_that_is_loaded_again_goes_on_driving(page):
     page.reload()
     page.shows("drives", 60)
     ready(page)
-    page.click("Stop")
+    page.click("Pause")
     page.shows("PAUSED")
     ready(page)
     assert not page.faults()

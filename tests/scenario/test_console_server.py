@@ -12,7 +12,7 @@ import viser
 from viser import _messages
 
 from browser import Tab, handshake, until
-from teleop_core.console import hooks
+from teleop_core.console import connection
 from teleop_core.console.server import ConsoleServer
 from teleop_core.errors import SessionError
 
@@ -128,6 +128,7 @@ def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab, 
     with ConsoleServer(0) as server:
         take = server.viser.gui.add_button("Take control")
         take.on_click(lambda event: server.drivers.take(event.client_id))
+        server.viser.make_public(take)
         tab.visit(server.url)
         until(lambda: is_driven(server), "the first page is there")
         other.visit(server.url)
@@ -173,7 +174,7 @@ def gizmo_tip(tab):
 def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_served(
     tab, monkeypatch
 ):
-    monkeypatch.setattr(hooks, "STUCK", 1.0)
+    monkeypatch.setattr(connection, "STUCK", 1.0)
     with ConsoleServer(0) as server:
         scene = server.viser.scene
         body = scene.add_frame("/body")

@@ -130,3 +130,9 @@ def test_page_that_is_gone_cannot_take_control():
     drivers.take(7)
     assert drivers.driver == 0
     assert changes == []
+
+
+def test_every_page_drives_where_nothing_can_be_harmed():
+    drivers, _ = pages(3)
+    drivers.is_for_all = True
+    assert all(drivers.may_drive(page) for page in drivers.pages)

@@ -9,7 +9,7 @@ from teleop_core.console.guard import Guard, Request, is_loopback, is_wildcard
 
 def ask(guard, path="/", is_socket=False, **headers):
     """Why a request with some headers is refused; lists are headers that come several times."""
-    told = {"host": "localhost:8080"} | headers
+    told = {"host": "localhost:8080"} | {n.replace("_", "-"): v for n, v in headers.items()}
     given = {name: [value] if isinstance(value, str) else value for name, value in told.items()}
     return guard.refusal(Request(path, is_socket, lambda name: given.get(name.lower(), [])))
 
@@ -43,6 +43,14 @@ def test_name_that_is_not_ours_is_refused_though_it_leads_here(host):
 def test_page_of_another_origin_is_refused(origin):
     assert "own page" in ask(LOCAL, is_socket=True, origin=origin)
     assert "own page" in ask(LOCAL, origin=origin)
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+def test_what_another_page_fetches_is_refused_but_a_link_to_ours_is_followed(site):
+    for mode in ("no-cors", "cors", "websocket"):
+        assert "own page" in ask(LOCAL, sec_fetch_site=site, sec_fetch_mode=mode)
+    assert not ask(LOCAL, sec_fetch_site=site, sec_fetch_mode="navigate")
+    assert not ask(LOCAL, sec_fetch_site="same-origin", sec_fetch_mode="cors")
 
 
 def test_socket_needs_an_origin_and_a_page_none():

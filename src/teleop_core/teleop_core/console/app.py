@@ -1,5 +1,6 @@
 """Console: the page of one session, from its opening to its end."""
 
+import logging
 import os
 import threading
 import time
@@ -7,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from teleop_core.console.answers import Situation
 from teleop_core.console.insets import Insets
 from teleop_core.console.link import Link, Parameters
 from teleop_core.console.panel import Panel
@@ -14,6 +16,7 @@ from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
 from teleop_core.console.settings import Renew
+from teleop_core.console.status import situation
 from teleop_core.console.steps import Steps
 from teleop_core.console.stylus import Stylus
 from teleop_core.console.view_tab import ViewTab, theme
@@ -47,12 +50,12 @@ class Console:
             server.viser, self.scene, on_hold=link.hold, on_let_go=self._let_go,
             may_drive=drivers.hold,
         )  # fmt: skip
-        self.panel = Panel(
-            server.viser, link, drivers.may_drive, drivers.take, lambda: drivers.driver, renew,
-            of_session,
-        )  # fmt: skip
+        drivers.is_for_all = not link.is_live
+        self._failed = set[str]()
+        self.panel = Panel(server.viser, link, drivers, renew, of_session)
         self.panel.settings.on_change(self.scene.retune)
         self._visitors = Visitors(server.viser, drivers, self.scene)
+        server.answers.stop = self._stop if link.is_live else None
         if link.is_live:
             with self.panel.stylus_folder:
                 arms = tuple(arm.name for arm in link.arms)
@@ -60,6 +63,9 @@ class Console:
         with self.panel.view_tab:
             ViewTab(server.viser, self.scene)
             Insets(server.viser, self.scene)
+
+    def _stop(self) -> None:
+        self._link.press(is_pressed=True)
 
     def _let_go(self, arm: str) -> None:
         drivers = self._server.drivers
@@ -70,10 +76,22 @@ class Console:
     def draw(self) -> None:
         """Show what is known now."""
         view = self._link.view()
+        if self._link.is_live:
+            shown = self._server.answers.situation = situation(view)
+            self.stylus.show(is_shown=not shown.is_stopped)
         self.scene.draw(view)
         self.stylus.draw(view)
         self.panel.draw(view)
         self._visitors.look()
+
+    def _try_to_draw(self) -> None:
+        """Draw; what fails is said once, and costs this drawing and not the session."""
+        try:
+            self.draw()
+        except Exception as error:
+            if (kind := repr(error)) not in self._failed:
+                self._failed.add(kind)
+                logging.getLogger("teleop_core.console").exception("the page could not be drawn")
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Draw until something is over; time that was lost is not made up for."""
@@ -83,9 +101,10 @@ class Console:
         threading.Thread(target=self.panel.settings.refresh, daemon=True).start()
         due = time.monotonic()
         while not is_over():
-            self.draw()
+            self._try_to_draw()
             due = max(due + 1.0 / RATE, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
+        self._server.answers.stop, self._server.answers.situation = None, Situation()
         self._visitors.close()
 
 

@@ -19,6 +19,9 @@ class Drivers:
 
     Methods may be called from any thread.
 
+    Attributes:
+        is_for_all: Whether every page drives, as where nothing can be harmed: in a replay.
+
     Args:
         patience: Time without a sign of life after which a held stylus is lost [s].
         clock: Monotonic time [s].
@@ -31,7 +34,7 @@ class Drivers:
         self._lock = threading.RLock()
         self._heard: dict[int, float] = {}
         self._driver: int | None = None
-        self._holds = False
+        self._holds, self.is_for_all = False, False
         self._listeners: list[Callable[[int | None], None]] = []
 
     @property
@@ -47,7 +50,7 @@ class Drivers:
 
     def may_drive(self, page: int) -> bool:
         """Whether commands of a page count."""
-        return page == self._driver
+        return self.is_for_all or page == self._driver
 
     def role(self, page: int) -> str:
         """What to tell the people at a page about it."""

@@ -1,8 +1,9 @@
 """Guard: which requests the page's server answers; no page from elsewhere may drive an arm.
 
 Three things protect it. *Host*: a name that leads here but is not one of ours was made to (DNS
-rebinding). *Origin*: browsers tell which page opens a WebSocket; only our own may. *Token*: where
-others can reach the port, a secret in the address which the browser then keeps as a cookie.
+rebinding). *Origin*: browsers tell which page opens a WebSocket, or fetches anything; only our own
+may. *Token*: where others can reach the port, a secret in the address which the browser then keeps
+as a cookie.
 """
 
 import ipaddress
@@ -79,7 +80,8 @@ class Guard:
         hosts, origins = request.header("Host"), request.header("Origin")
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
             return "this page is not known by that name"
-        if (request.is_socket or origins) and not _is_same(origins, hosts[0]):
+        is_foreign = (request.is_socket or bool(origins)) and not _is_same(origins, hosts[0])
+        if is_foreign or not _is_visit(request):
             return "only the console's own page may do this"
         if not self._has_token(request):
             return "the token is missing or wrong: open the address that was printed at the start"
@@ -115,6 +117,12 @@ class Guard:
 
 def _is_same(origins: Sequence[str], host: str) -> bool:
     return len(origins) == 1 and origins[0].lower() == f"http://{host.lower()}"
+
+
+def _is_visit(request: Request) -> bool:
+    """Whether a request comes from our own page or from none, or opens ours where one was."""
+    sites, modes = request.header("Sec-Fetch-Site"), request.header("Sec-Fetch-Mode")
+    return set(sites) <= {"same-origin", "none"} or list(modes) == ["navigate"]
 
 
 def _is_address(name: str) -> bool:

@@ -3,8 +3,8 @@
 viser 1.1 opens its port itself, answers every request, counts ports up where one is taken, prints a
 banner and offers to lead the page out through a tunnel. It has no settings for these. What it is
 given here instead is the function with which it opens its server: ours hands a socket that listens
-already to the same library, asks the guard before viser sees a request, and drops connections that
-take nothing. The version bound in ``setup.py`` belongs to this module.
+already to the same library, asks the guard before viser sees a request, and the filter before it
+sees a message. The version bound in ``setup.py`` belongs to this module.
 """
 
 import http
@@ -12,10 +12,10 @@ import logging
 import threading
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from socket import socket
 from types import SimpleNamespace
-from typing import TypedDict, Unpack
-from urllib.parse import parse_qs, urlsplit
+from typing import Any, TypedDict, Unpack
 
 import rich
 import viser
@@ -25,22 +25,18 @@ from viser import _messages
 from viser.infra import _infra
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
-from websockets.typing import DataLike, Subprotocol
+from websockets.typing import Data, Subprotocol
 
+from teleop_core.console.answers import Answers
+from teleop_core.console.connection import Connection, Gate
 from teleop_core.console.drivers import Drivers
+from teleop_core.console.filter import FLOOD, LARGEST, NO_VALUE, WATCHES, Filter, Sets, decode
 from teleop_core.console.guard import HEADERS, Guard
 from teleop_core.console.guard import Request as Asked
 from teleop_core.errors import SessionError
 
-LARGEST = 8 * 1024 * 1024
-"""Largest message of a page [bytes]; a large rendered view is the largest that is meant."""
-STUCK = 10.0
-"""Time in which a page must have taken something of what waits for it [s]."""
-_ALIVE = "/alive"
-_HEARTBEAT = (
-    "window.teleopPage = {page}; window.teleopAlive ??= setInterval(() => "
-    "fetch('" + _ALIVE + "?page=' + window.teleopPage).catch(() => null), 1000);"
-)
+PAGES = 16
+"""Pages that may be open at once; the youngest that does not drive gives way."""
 _STARTING = threading.Lock()
 
 Answer = Callable[[ws.ServerConnection, Request], Response | None]
@@ -55,77 +51,49 @@ class ServeOptions(TypedDict, total=False):
     select_subprotocol: Callable[[ws.ServerConnection, Sequence[Subprotocol]], Subprotocol | None]
 
 
-class Connection(ws.ServerConnection):
-    """A connection that ends when the other side takes nothing for :data:`STUCK` seconds.
-
-    Of each of viser's two queues one message can wait here, and the newest of each kind wait in the
-    queues: so what a slow page costs is bounded, and what a dead one costs ends.
-    """
-
-    async def send(self, message: DataLike, text: bool | None = None) -> None:  # type: ignore[override]
-        """Send, and wait until the other side has taken most of it."""
-        watch = _Watch(self)
-        try:
-            await super().send(message, text)
-        finally:
-            watch.end()
-
-
-class _Watch:
-    """Looks whether what waits in a connection becomes less."""
-
-    def __init__(self, connection: Connection) -> None:
-        self._connection, self._waited = connection, float("inf")
-        self._again()
-
-    def end(self) -> None:
-        self._timer.cancel()
-
-    def _again(self) -> None:
-        self._timer = self._connection.loop.call_later(STUCK, self._look)
-
-    def _look(self) -> None:
-        waits = self._connection.transport.get_write_buffer_size()
-        if waits >= self._waited:
-            self._connection.transport.abort()
-            return
-        self._waited = waits
-        self._again()
-
-
 class Server(viser.ViserServer):
-    """viser's server behind a guard, at a socket that listens already, without a way out.
+    """viser's server behind a guard and a filter, at a socket that listens already.
 
     Args:
         opened: Listening socket; it is closed with the server.
         guard: Decides about requests.
         drivers: Hears which pages are open and alive, and which hold a gizmo.
+        answers: What is answered beside viser's page.
         label: Heading of the panel.
+
+    Attributes:
+        filter: Decides about messages.
     """
 
-    def __init__(self, opened: socket, guard: Guard, drivers: Drivers, label: str) -> None:
+    def __init__(
+        self, opened: socket, guard: Guard, drivers: Drivers, answers: Answers, label: str
+    ) -> None:
         host, port = opened.getsockname()[:2]
+        self._drivers, self._public = drivers, set[str]()
+        self.filter = Filter(self, drivers.may_drive, _logger().warning)
         rich.get_console().quiet = True  # which viser alone writes to here
-        with _STARTING, _opening(_server_at(opened, guard, drivers)):
+        with _STARTING, _opening(_server_at(opened, guard, answers, self)):
             super().__init__(host=host, port=port, label=label, verbose=False)
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             self._websock_server.unregister_handler(message)
         self.gui.configure_theme(show_logo=False, show_share_button=False)
-        self._tell(drivers)
+        self._tell(answers)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Never: it would lead whoever knows the address around the guard."""
         raise SessionError("the console is not led out of this machine by others")
 
-    def _tell(self, drivers: Drivers) -> None:
+    def _tell(self, answers: Answers) -> None:
         """Let the drivers hear of pages: in the order of events, hence on the server's loop."""
+        drivers = self._drivers
 
         async def come(client: viser.ClientHandle) -> None:
-            script = _HEARTBEAT.format(page=client.client_id)
+            script = f"window.teleopPage = '{answers.name(client.client_id)}';"
             client._websock_connection.queue_message(_messages.RunJavascriptMessage(script))
             drivers.join(client.client_id)
 
         async def go(client: viser.ClientHandle) -> None:
+            answers.forget(client.client_id)
             drivers.leave(client.client_id)
 
         self.on_client_connect(come)
@@ -136,6 +104,72 @@ class Server(viser.ViserServer):
             (_messages.TransformControlsDragEndMessage, drivers.let_go),
         ):
             self._websock_server.register_handler(message, _telling(tell))
+
+    # -- what the filter asks ----------------------------------------------------------------------
+
+    def make_public(self, handle: viser.GuiButtonHandle) -> None:
+        """Let pages that watch use an element too."""
+        self._public.add(handle._impl.uuid)
+
+    def is_public(self, uuid: str) -> bool:
+        """Whether pages that watch may use an element."""
+        return uuid in self._public
+
+    def control(self, page: int, uuid: str) -> Any | None:
+        """Handle of an input that is on a page; None if there is none."""
+        handle = self.gui._gui_input_handle_from_uuid.get(uuid)
+        return None if handle is None or handle._impl.removed else handle
+
+    def has_command(self, uuid: str) -> bool:
+        """Whether there is such a command."""
+        return uuid in self.gui._command_handle_from_uuid
+
+    def has_gizmo(self, name: str) -> bool:
+        """Whether there is such a gizmo; one that is hidden now may still be let go."""
+        return name in self.scene._handle_from_transform_controls_name
+
+    def is_asked(self, page: int) -> bool:
+        """Whether a page has been asked for a picture."""
+        client = self._connected_clients.get(page)
+        if client is None:
+            return False
+        handlers = client._websock_connection._incoming_handlers
+        return bool(handlers.get(_messages.GetRenderResponseMessage))
+
+    # -- what connections ask ----------------------------------------------------------------------
+
+    def passed(self, connection: Connection, data: Data) -> bytes:
+        """What of a message goes on to viser; a page that may not do something sees that."""
+        page = self._page(connection)
+        passed, reason = self.filter.judge(page, data)
+        if reason in {WATCHES, NO_VALUE}:
+            self._put_back(page, data)
+        return passed
+
+    def cut(self, connection: Connection) -> None:
+        """Take note of a connection that is cut for a flood."""
+        self.filter.refuse(self._page(connection), FLOOD)
+
+    def come(self, connection: Connection) -> None:
+        """Let the youngest page that does not drive give way to a new one if there are too many."""
+        live = self._websock_server._live_connections
+        watchers = [page for page in live if not self._drivers.may_drive(page)]
+        if len(live) >= PAGES and watchers:
+            live[watchers[-1]].transport.abort()
+
+    def _page(self, connection: Connection) -> int:
+        live = self._websock_server._live_connections
+        return next((page for page, known in live.items() if known is connection), -1)
+
+    def _put_back(self, page: int, data: Data) -> None:
+        """Show the value of an element again that a page could not change."""
+        client, sets = self._connected_clients.get(page), decode(data)
+        if client is None or not isinstance(sets, Sets):
+            return
+        handle = self.control(page, sets.uuid)
+        if handle is not None and not handle._impl.is_button:
+            message = _messages.GuiUpdateMessage(sets.uuid, {"value": handle.value})
+            client._websock_connection.queue_message(message)
 
     def forget(self) -> None:
         """Drop what is kept of removed elements; viser does so only when a page comes."""
@@ -164,7 +198,9 @@ def _telling(tell: Callable[[int], object]) -> Callable[[int, _messages.Message]
     return handler
 
 
-def _server_at(opened: socket, guard: Guard, drivers: Drivers) -> Callable[..., ws.serve]:
+def _server_at(
+    opened: socket, guard: Guard, answers: Answers, gate: Gate
+) -> Callable[..., ws.serve]:
     """A function that opens a server at the socket, whatever address it is told."""
 
     def serve(
@@ -176,11 +212,12 @@ def _server_at(opened: socket, guard: Guard, drivers: Drivers) -> Callable[..., 
         **options: Unpack[ServeOptions],
     ) -> ws.serve:
         options["max_size"] = LARGEST
+        opening: dict[Connection, None] = {}
         return ws.serve(
             handler,
             sock=opened,
-            process_request=_guarded(process_request, guard, drivers),
-            create_connection=Connection,
+            process_request=_guarded(process_request, guard, answers),
+            create_connection=partial(Connection, gate=gate, opening=opening),  # type: ignore[arg-type]
             logger=_logger(),
             **options,
         )
@@ -188,29 +225,21 @@ def _server_at(opened: socket, guard: Guard, drivers: Drivers) -> Callable[..., 
     return serve
 
 
-def _guarded(answer: Answer, guard: Guard, drivers: Drivers) -> Answer:
-    """Answer of viser to a request, or a refusal."""
+def _guarded(answer: Answer, guard: Guard, answers: Answers) -> Answer:
+    """Answer of viser to a request, our own, or a refusal."""
 
     def guarded(connection: ws.ServerConnection, request: Request) -> Response | None:
         headers = request.headers
-        is_socket = bool(headers.get_all("Upgrade"))
-        if reason := guard.refusal(Asked(request.path, is_socket, headers.get_all)):
+        asked = Asked(request.path, bool(headers.get_all("Upgrade")), headers.get_all)
+        if reason := guard.refusal(asked):
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
-        if urlsplit(request.path).path == _ALIVE:
-            _hear(request.path, drivers)
-            return Response(http.HTTPStatus.NO_CONTENT, "No Content", Headers())
-        response = answer(connection, request)
+        response = answers.to(asked) or answer(connection, request)
         if response is not None:
+            answers.furnish(asked, response)
             _harden(response.headers, headers["Host"], guard)
         return response
 
     return guarded
-
-
-def _hear(path: str, drivers: Drivers) -> None:
-    page = parse_qs(urlsplit(path).query).get("page", [""])[0]
-    if page.isascii() and page.isdecimal():
-        drivers.heard(int(page[:9]))
 
 
 def _harden(headers: Headers, host: str, guard: Guard) -> None:

@@ -12,11 +12,11 @@ import numpy as np
 import viser
 
 from teleop_core.console.cameras import FIELD, Camera
+from teleop_core.console.filter import PICTURE
 from teleop_core.console.scene import Scene
 
 PERIOD = 0.5
 """Time between two pictures of an inset [s]."""
-_SIZE = (180, 240)  # height and width [px]
 _PATIENCE = 10.0  # for a browser that does not answer [s]
 
 
@@ -33,7 +33,7 @@ class Insets:
         self._cameras: Mapping[str, Callable[[], Camera]] = {
             "from the tool": scene.tool, "microscope": scene.microscope
         }  # fmt: skip
-        blank = np.full((*_SIZE, 3), 128, np.uint8)
+        blank = np.full((*PICTURE, 3), 128, np.uint8)
         self._ends = threading.Event()
         self._thread: threading.Thread | None = None
         with gui.add_folder("picture in picture"):
@@ -68,10 +68,10 @@ class Insets:
                 camera = find()
                 try:
                     picture = client.get_render(
-                        *_SIZE, wxyz=camera.quaternion, position=camera.position, fov=FIELD,
-                        timeout=_PATIENCE,
+                        *PICTURE, wxyz=camera.quaternion, position=camera.position, fov=FIELD,
+                        timeout=_PATIENCE, transport_format="png",
                     )  # fmt: skip
-                except (TimeoutError, RuntimeError, ConnectionError):
-                    break  # the browser sleeps or has gone
+                except (TimeoutError, RuntimeError, OSError, ValueError, SyntaxError):
+                    break  # the browser sleeps, has gone, or sends no picture
                 if not ends.is_set():
                     self._images[name].image = picture

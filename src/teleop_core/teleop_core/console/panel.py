@@ -4,6 +4,7 @@ import html
 import math
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from functools import partial
@@ -12,29 +13,23 @@ from typing import Literal
 import numpy as np
 import viser
 
+from teleop_core.console.drivers import Drivers
 from teleop_core.console.history import SPAN, History, LiveScores
+from teleop_core.console.hooks import Server
 from teleop_core.console.link import Link, Parameters, View
 from teleop_core.console.plots import Plots
 from teleop_core.console.settings import Renew, SettingsPanel
+from teleop_core.console.status import alive, fixture_text, mode_text, next_button, status_html
 from teleop_core.console.tails import is_jump
 from teleop_core.errors import TeleopError
-from teleop_core.operation import State
 
 _PERIOD = 0.2  # between two drawings of the texts [s]
 _RECALLED = 300  # points of a plot
 _PATIENCE = 3.0  # for an arm that must be at rest first [s]
-_WATCHING = "You watch. Take control first."
-_COLORS = {
-    State.ENABLED: "#2f9e44", State.PAUSED: "#e8a100", State.DISABLED: "#868e96",
-    State.FAULT: "#e03131",
-}  # fmt: skip
-_BUTTONS: dict[str, Literal["blue", "teal", "green", "orange"]] = {
-    "Take control": "blue", "Initialize": "teal", "Start": "green", "Stop": "orange",
-}  # fmt: skip
 _ACTIONS = (
     ("Initialize", "release, reset, enable and home", ("reset", "enable", "home")),
     ("Start", "follow the stylus", ("enable",)),
-    ("Stop", "pause: hold still until Start", ("pause",)),
+    ("Pause", "hold still until Start", ("pause",)),
     ("Home", "move smoothly to the home posture", ("home",)),
 )
 
@@ -45,31 +40,27 @@ class Panel:
     Args:
         server: The page.
         link: The session.
-        may_drive: Whether a browser may command the arm.
-        take: Makes a browser the one that drives.
-        driver: Says who drives: the number of a browser, or None.
+        drivers: Who drives.
         renew: Begins a new session with other settings, and returns why it does not, empty if it
             does; None where the session is not ours.
         of_session: Parameters of the session as a whole, which no node has.
     """
 
     def __init__(
-        self, server: viser.ViserServer, link: Link, may_drive: Callable[[int], bool],
-        take: Callable[[int], None], driver: Callable[[], int | None],
+        self, server: Server, link: Link, drivers: Drivers,
         renew: Renew | None = None,
         of_session: Parameters | None = None,
     ) -> None:  # fmt: skip
         self._server, self._gui, self._link = server, server.gui, link
-        self._may_drive, self._take, self._driver = may_drive, take, driver
-        self._drawn, self._is_saving = 0.0, False
+        self._make_public, self._may_drive = server.make_public, drivers.may_drive
+        self._take, self._drivers, self._drawn = drivers.take, drivers, 0.0
         self._recorded: Callable[[float], View] | None = None
         self._time = 0.0
         self.histories = {arm.name: History(arm) for arm in link.arms}
         self.scores = {arm.name: LiveScores() for arm in link.arms}
         self._plots: list[Plots] = []
         self._gui.main_panel.dock_right()  # beside the scene, not over it
-        if link.is_live:
-            self._add_stop()
+        self._buttons: dict[str, viser.GuiButtonHandle] = {}
         self._status = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
         if link.is_live:
@@ -85,35 +76,18 @@ class Panel:
 
     # -- parts -----------------------------------------------------------------------------------
 
-    def _add_stop(self) -> None:
-        """Emergency stop: in a window of its own, so that it is seen whatever else is shown."""
-        window = self._gui.add_panel(order=-1.0)
-        with window.add_tab("Emergency stop"):
-            stop = self._gui.add_button(
-                "EMERGENCY STOP", color="red", hint="stops all arms at once; the space key too"
-            )
-            self._button("release", "then Initialize", self._release)
-        window.float(x=15, y=-15, width=230)
-        # Anybody who watches may stop; letting the arm go again is the driver's.
-        stop.on_click(self._stop)
-        command = self._gui.add_command(
-            "Emergency stop", description="stops all arms at once", hotkey="space"
-        )
-        command.on_trigger(self._stop)
-
-    def _stop(self, _: object) -> None:
-        self._link.press(is_pressed=True)
-
     def _release(self, client: int) -> None:
         self._link.press(is_pressed=False)
 
     def _add_drive(self) -> None:
-        self._button("Take control", "one browser drives, the others watch", self._take)
+        take = self._button("Take control", "one browser drives, the others watch", self._take)
+        self._make_public(take)
         for label, hint, words in _ACTIONS:
             self._button(label, hint, partial(self._command, words))
+        self._button("Release", "lets the emergency stop go; then Initialize", self._release)
         with self._gui.add_folder("stylus"):
-            for name, label in (("mode", "coarse ↔ fine"), ("fixture", "box on ↔ off")):
-                self._button(label, f"the {name} button of the stylus", partial(self._press, name))
+            for name in ("mode", "fixture"):
+                self._button(name, f"the {name} button of the stylus", partial(self._press, name))
             self.stylus_folder = self._gui.add_folder("small steps", expand_by_default=False)
         with self._gui.add_folder("recording"):
             self._name = self._gui.add_text("name", "run_1", hint="letters, digits, . _ -")
@@ -124,20 +98,25 @@ class Panel:
     def _button(
         self, label: str, hint: str, action: Callable[[int], None]
     ) -> viser.GuiButtonHandle:
-        """Button that acts for the browser that drives, and tells others why it does not."""
-        button = self._gui.add_button(label, hint=hint, color=_BUTTONS.get(label, "gray"))
+        """Button that acts for the browser that drives, one press after the other."""
+        button = self._buttons[label] = self._gui.add_button(label, hint=hint, color="gray")
+        acts = threading.Lock()
 
         @button.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             client = -1 if event.client_id is None else event.client_id
-            if action == self._take or self._may_drive(client):
-                action(client)
-            else:
-                self._tell(client, _WATCHING)
+            if action != self._take and not self._may_drive(client):
+                return  # the filter has refused others already; control may have changed since
+            if acts.acquire(blocking=False):  # what is pressed while it works is not done again
+                try:
+                    action(client)
+                finally:
+                    acts.release()
 
         return button
 
     def _tell(self, client: int, text: str) -> None:
+        """Tell the people at one page why something was not done."""
         handle = self._server.get_clients().get(client)
         if handle is not None:
             handle.add_notification("Not done", text, auto_close_seconds=5.0, color="yellow")
@@ -190,9 +169,6 @@ class Panel:
             self._link.press_button(arm.name, name)
 
     def _save(self, client: int) -> None:
-        if self._is_saving:
-            return
-        self._is_saving = True
         try:
             self._last = self._link.save(self._name.value.strip())
             self._saved.content = f"saved: `{self._last}`"
@@ -200,8 +176,6 @@ class Panel:
             self._name.value = _next_name(self._name.value)  # type: ignore[misc]
         except TeleopError as error:
             self._saved.content = f"⚠ {html.escape(str(error))}"
-        finally:
-            self._is_saving = False
 
     def _begin_scores(self) -> None:
         for name in self.scores:
@@ -249,7 +223,9 @@ class Panel:
             return
         self._drawn = now
         doing = self._doing(view) if self._link.is_live else "replay"
-        self._set(self._status, _status_html(view, self._link.title, doing))
+        self._set(self._status, status_html(view, self._link.title, doing))
+        if self._link.is_live:
+            self._draw_buttons(view)
         tables = [
             (f"**{name}**\n\n" if len(self.scores) > 1 else "") + scores.text()
             for name, scores in self.scores.items()
@@ -257,10 +233,23 @@ class Panel:
         if self._live.content != (text := "\n\n".join(tables)):
             self._live.content = text
 
+    def _draw_buttons(self, view: View) -> None:
+        """Show on the buttons what is so, which of them can do something, and which comes next."""
+        arm, soon, now = next(iter(view.arms.values())), next_button(view), alive(view)
+        labels = {"mode": f"Mode: {mode_text(arm)}", "fixture": f"Fixture: {fixture_text(arm)}"}
+        for name, button in self._buttons.items():
+            label, is_dead = labels.get(name, button.label), not now.get(name, True)
+            color: Literal["blue", "gray"] = "blue" if name == soon else "gray"
+            if (button.label, button.color) != (label, color):
+                button.label, button.color = label, color
+            if name in now and button.disabled != is_dead:
+                button.disabled = is_dead
+        self.stylus_folder.visible = now["steps"]
+
     def _doing(self, view: View) -> str:
         """Run, recording, and who drives."""
         where = view.recording.name if view.recording else "not recording"
-        driver = self._driver()
+        driver = self._drivers.driver
         who = "nobody drives" if driver is None else f"browser {driver + 1} drives"
         return f"run {view.run + 1} · {where} · {who}"
 
@@ -274,29 +263,3 @@ def _next_name(name: str) -> str:
     """``run_2`` after ``run_1``."""
     head, digits = name.rstrip("0123456789"), name[len(name.rstrip("0123456789")) :]
     return f"{head}{int(digits) + 1}" if digits else f"{name}_2"
-
-
-def _status_html(view: View, title: str, doing: str) -> str:
-    """State of every arm, mode, what is being done, and warnings."""
-    lines = []
-    for name, arm in view.arms.items():
-        state = State(int(arm.operation["state"])) if arm.operation else None
-        color = _COLORS[state] if state is not None else "#868e96"
-        text = html.escape(arm.operation_text or "waits for the arm")
-        if not view.is_fresh:
-            text, color = "nothing comes from the session", "#e03131"
-        badge = f'<b style="color:{color}">●</b> <b>{html.escape(name)}</b> {text}'
-        lines.append(badge)
-        if arm.state:
-            is_fine = "fine" if arm.state["is_fine"] else "coarse"
-            hand = "clutched" if arm.state["is_clutched"] else "follows"
-            box = "box on" if arm.state["is_fixture_on"] else "no box"
-            lines.append(f"{is_fine} × {arm.state['gain']:g} · {hand} · {box}")
-    lines.append(f"{html.escape(title)} · {html.escape(doing)}")
-    said = [arm.operation_text for arm in view.arms.values() if arm.operation_text]
-    news = [text for text in view.news if not any(known in text for known in said)]
-    lines += [f'<span style="color:#e8a100">⚠ {html.escape(text)}</span>' for text in news[:4]]
-    body = "<br>".join(lines)
-    # Of one height, so that what is below stays where it is when there is more to say.
-    style = "padding:0 0.9em;font-size:0.8em;line-height:1.5;height:9em;overflow-y:auto"
-    return f'<div style="{style}">{body}</div>'

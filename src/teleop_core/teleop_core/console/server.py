@@ -3,6 +3,7 @@
 import secrets
 import threading
 
+from teleop_core.console.answers import Answers
 from teleop_core.console.drivers import PATIENCE, Drivers
 from teleop_core.console.guard import Guard, is_loopback, is_wildcard
 from teleop_core.console.hooks import Server
@@ -18,11 +19,13 @@ class ConsoleServer:
     """Server of the page, running from its making to :meth:`close`.
 
     Without a token it serves this machine alone; other addresses always have one. Pages of other
-    origins, names that were made to lead here, and requests without the token get 403.
+    origins, names that were made to lead here, and requests without the token get 403. Messages of
+    pages go through a :class:`~teleop_core.console.filter.Filter`.
 
     Attributes:
         viser: The server to which scene and panel are added.
         drivers: Which page drives.
+        answers: What pages are told beside viser's elements, and where their stop goes.
         token: Secret that the address must carry; empty for none.
 
     Args:
@@ -51,7 +54,9 @@ class ConsoleServer:
         self.host = host
         self.token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
         self.drivers = Drivers(patience)
-        self.viser = Server(opened, Guard(host, self.port, self.token), self.drivers, label)
+        self.answers = Answers(self.drivers)
+        guard = Guard(host, self.port, self.token)
+        self.viser = Server(opened, guard, self.drivers, self.answers, label)
         self._ends = threading.Event()
         self._watch = threading.Thread(target=self._look, name="console pages", daemon=True)
         self._watch.start()

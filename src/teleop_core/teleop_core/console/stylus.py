@@ -197,7 +197,8 @@ class Stylus:
     def show(self, *, is_shown: bool) -> None:
         """Show the gizmos or hide them."""
         for hand in self._hands.values():
-            hand.gizmo.visible = is_shown
+            if hand.gizmo.visible != is_shown:
+                hand.gizmo.visible = is_shown
 
 
 def stepped(pose: Array, axis: str, sign: int) -> Array:

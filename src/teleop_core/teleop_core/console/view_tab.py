@@ -5,6 +5,7 @@ from collections.abc import Callable
 import viser
 
 from teleop_core.console.cameras import Camera
+from teleop_core.console.hooks import Server
 from teleop_core.console.scene import Scene
 
 
@@ -16,7 +17,7 @@ class ViewTab:
         scene: What they control.
     """
 
-    def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
+    def __init__(self, server: Server, scene: Scene) -> None:
         self._server, self._scene = server, scene
         gui = server.gui
         with gui.add_folder("camera"):
@@ -31,6 +32,7 @@ class ViewTab:
 
     def _camera(self, label: str, hint: str, find: Callable[[], Camera]) -> None:
         button = self._server.gui.add_button(label, hint=hint, color="gray")
+        self._server.make_public(button)
 
         @button.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:

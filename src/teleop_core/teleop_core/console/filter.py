@@ -1,0 +1,252 @@
+"""Filter: which messages of a page the console hears; all others end at the socket.
+
+viser sets any attribute of any element that a page names, takes positions of any shape, and keeps
+uploads. So nothing reaches viser but the messages that are declared here, with the bounds that are
+declared here, from a page that may send them. What passes is encoded anew from what was checked.
+"""
+
+import struct
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Annotated, Any, Protocol
+
+import msgspec
+from msgspec import Meta, Struct
+
+LARGEST = 256 * 1024
+"""Largest message of a page [bytes]: a picture of an inset, drawn by a browser."""
+RATE, BURST = 200.0, 400.0
+"""Frames that a page may send in a second, and at once; a busy page sends 90."""
+BYTES_RATE, BYTES_BURST = 1e6, 2e6
+"""Bytes that a page may send in a second, and at once; insets that are shown need 520,000."""
+PICTURE = (180, 240)
+"""Height and width of a picture that a browser may be asked for [px]."""
+
+UNKNOWN = "no message that this page sends"
+WATCHES = "a page that watches cannot do this; take control first"
+NOTHING_THERE = "for an element that does not exist, is inactive or hidden"
+NO_VALUE = "a value that the element cannot have"
+NO_TURN = "a quaternion that is not of unit length"
+NOT_ASKED = "a picture that nobody asked for"
+FLOOD = f"more than {RATE:g} messages or {BYTES_RATE / 1e6:g} MB a second; it was cut off"
+
+_Name = Annotated[str, Meta(max_length=200)]
+_Unit = Annotated[float, Meta(ge=-1.01, le=1.01)]
+_Place = Annotated[float, Meta(ge=-1.0, le=1.0)]  # of a stylus in master_base [m]
+_Far = Annotated[float, Meta(ge=-1e4, le=1e4)]  # of a camera [m]
+_Length = Annotated[float, Meta(gt=0.0, le=1e6)]
+_Pixels = Annotated[int, Meta(ge=1, le=16384)]
+_Quaternion = tuple[_Unit, _Unit, _Unit, _Unit]
+_Number = Annotated[float, Meta(ge=-1e15, le=1e15)]
+_Count = Annotated[int, Meta(ge=-(10**15), le=10**15)]
+_OFF_UNIT = 1e-2  # of the square of a quaternion's length
+
+
+class _Message(Struct, tag_field="type", forbid_unknown_fields=True):
+    """What a page says; a float is finite because it has bounds."""
+
+
+class Looks(_Message, tag="ViewerCameraMessage"):
+    """Where the camera of the page is."""
+
+    wxyz: _Quaternion
+    position: tuple[_Far, _Far, _Far]
+    fov: Annotated[float, Meta(gt=0.0, lt=3.1416)]
+    near: _Length
+    far: _Length
+    image_height: _Pixels
+    image_width: _Pixels
+    look_at: tuple[_Far, _Far, _Far]
+    up_direction: tuple[_Far, _Far, _Far]
+
+
+class Takes(_Message, tag="TransformControlsDragStartMessage"):
+    """The page takes a gizmo."""
+
+    name: _Name
+    owner: _Name = ""
+
+
+class Drags(_Message, tag="TransformControlsUpdateMessage"):
+    """The page wants a gizmo at a pose in the frame of its parent."""
+
+    name: _Name
+    wxyz: _Quaternion
+    position: tuple[_Place, _Place, _Place]
+    owner: _Name = ""
+
+
+class LetsGo(_Message, tag="TransformControlsDragEndMessage"):
+    """The page lets a gizmo go."""
+
+    name: _Name
+    owner: _Name = ""
+
+
+class Value(Struct, forbid_unknown_fields=True):
+    """All that a page may set of an element."""
+
+    value: bool | _Count | _Number | Annotated[str, Meta(max_length=1000)]
+
+
+class Sets(_Message, tag="GuiUpdateMessage"):
+    """The page presses a button or changes a value."""
+
+    uuid: _Name
+    updates: Value
+
+
+class Triggers(_Message, tag="CommandTriggerMessage"):
+    """The page uses a key that stands for a command."""
+
+    uuid: _Name
+
+
+class Draws(_Message, tag="GetRenderResponseMessage"):
+    """The page answers with a picture."""
+
+    payload: bytes
+    render_uuid: _Name
+
+
+_DECODER = msgspec.msgpack.Decoder(Looks | Takes | Drags | LetsGo | Sets | Triggers | Draws)
+_ENCODER = msgspec.msgpack.Encoder()
+
+
+def decode(data: bytes | str) -> _Message | None:
+    """Message of a page, with sound bounds; None if it is none."""
+    try:
+        return _DECODER.decode(data)  # type: ignore[arg-type]
+    except (TypeError, ValueError):  # a text; msgspec's errors are ValueErrors
+        return None
+
+
+class Elements(Protocol):
+    """What is on the page now."""
+
+    def control(self, page: int, uuid: str) -> Any | None:
+        """Handle of an input that a page has before it; None if there is none."""
+
+    def has_command(self, uuid: str) -> bool:
+        """Whether there is such a command."""
+
+    def has_gizmo(self, name: str) -> bool:
+        """Whether there is such a gizmo."""
+
+    def is_public(self, uuid: str) -> bool:
+        """Whether pages that watch may use an element."""
+
+    def is_asked(self, page: int) -> bool:
+        """Whether a page has been asked for a picture."""
+
+
+class Filter:
+    """Judges the messages of all pages, and counts what it refuses.
+
+    Args:
+        elements: What is on the page.
+        may_drive: Whether a page may command the session.
+        say: Told of the first refusal of each kind, a line each.
+
+    Attributes:
+        refused: How often a message was refused, by the reason.
+    """
+
+    def __init__(
+        self, elements: Elements, may_drive: Callable[[int], bool], say: Callable[[str], None]
+    ) -> None:
+        self._elements, self._may_drive, self._say = elements, may_drive, say
+        self._lock = threading.Lock()
+        self.refused: Counter[str] = Counter()
+
+    def judge(self, page: int, data: bytes | str) -> tuple[bytes, str]:
+        """Encoded message that may go on to viser, and no reason; or nothing, and the reason."""
+        message = decode(data)
+        reason = UNKNOWN if message is None else self._reason(page, message)
+        if reason:
+            self.refuse(page, reason)
+            return b"", reason
+        return _ENCODER.encode(message), ""
+
+    def refuse(self, page: int, reason: str) -> None:
+        """Count a refusal; the first of its kind is said."""
+        with self._lock:
+            self.refused[reason] += 1
+            is_first = self.refused[reason] == 1
+        if is_first:
+            self._say(f"page {page + 1} was refused: {reason}")
+
+    def _reason(self, page: int, message: _Message) -> str:
+        """Why a message with sound bounds is refused; empty if it is not."""
+        elements = self._elements
+        if isinstance(message, Looks | Drags) and not _is_unit(message.wxyz):
+            return NO_TURN
+        if isinstance(message, Looks):
+            return ""
+        if isinstance(message, Draws):
+            is_answer = elements.is_asked(page) and is_picture(message.payload)
+            return "" if is_answer else NOT_ASKED
+        if isinstance(message, Sets):
+            return self._why_not_set(page, message)
+        if not self._may_drive(page):
+            return WATCHES
+        is_there = (
+            elements.has_command(message.uuid) if isinstance(message, Triggers)
+            else elements.has_gizmo(message.name)  # type: ignore[attr-defined]
+        )  # fmt: skip
+        return "" if is_there else NOTHING_THERE
+
+    def _why_not_set(self, page: int, message: Sets) -> str:
+        control = self._elements.control(page, message.uuid)
+        if control is None or not control.visible or control.disabled:
+            return NOTHING_THERE
+        if not takes(control, message.updates.value):
+            return NO_VALUE
+        is_allowed = self._elements.is_public(message.uuid) or self._may_drive(page)
+        return "" if is_allowed else WATCHES
+
+
+def takes(control: Any, value: object) -> bool:
+    """Whether an input of viser can have a value: of its type, its options, within its bounds."""
+    if hasattr(control, "options"):  # dropdowns and groups of buttons
+        return value in control.options
+    if isinstance(control.value, bool):  # buttons and boxes
+        return isinstance(value, bool)
+    if isinstance(control.value, str):
+        return isinstance(value, str)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    low, high = getattr(control, "min", None), getattr(control, "max", None)
+    is_within = (low is None or value >= low) and (high is None or value <= high)
+    return isinstance(control.value, int | float) and is_within
+
+
+def is_picture(data: bytes) -> bool:
+    """Whether data begin as a PNG of the size that is asked for: nothing large unfolds from it."""
+    return data[:8] == b"\x89PNG\r\n\x1a\n" and data[16:24] == struct.pack(">II", *PICTURE[::-1])
+
+
+def _is_unit(wxyz: tuple[float, ...]) -> bool:
+    return abs(sum(part * part for part in wxyz) - 1.0) < _OFF_UNIT
+
+
+class Budget:
+    """Frames and bytes that one page may still send.
+
+    Args:
+        clock: Monotonic time [s].
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock, self._since = clock, clock()
+        self._frames, self._bytes = BURST, BYTES_BURST
+
+    def spend(self, frames: int, size: int) -> bool:
+        """Take some frames and bytes off; whether there were as many."""
+        now = self._clock()
+        passed, self._since = now - self._since, now
+        self._frames = min(BURST, self._frames + RATE * passed) - frames
+        self._bytes = min(BYTES_BURST, self._bytes + BYTES_RATE * passed) - size
+        return self._frames >= 0.0 and self._bytes >= 0.0

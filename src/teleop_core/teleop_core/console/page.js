@@ -1,0 +1,83 @@
+// The emergency stop and the banner of every page, and its signs of life.
+//
+// They are elements of their own on top of viser's: in view whatever is scrolled or folded, and
+// they speak to the server by requests of their own.
+(() => {
+  'use strict';
+  const PERIOD = 1000, AGAIN = 200, TRIES = 50; // ms, ms, number
+  let connected = true, pressed = false, shown = {};
+
+  const ask = (path) => fetch(path, {
+    headers: { 'Teleop-Page': window.teleopPage || 'new' }, cache: 'no-store',
+    signal: AbortSignal.timeout(2000),
+  });
+  const wait = (time) => new Promise((done) => setTimeout(done, time));
+
+  const safety = document.createElement('div');
+  const stop = document.createElement('button');
+  const banner = document.createElement('div');
+  safety.id = 't-safety'; safety.hidden = true;
+  stop.id = 't-stop'; stop.textContent = 'EMERGENCY STOP';
+  stop.title = 'stops all arms at once; the space key too';
+  banner.id = 't-banner'; banner.setAttribute('role', 'alert');
+  safety.append(stop);
+
+  function show() {
+    const [head, text] = pressed === 'unheard'
+      ? ['STOP NOT CONFIRMED', 'The console does not answer. Use the emergency stop of the machine.']
+      : shown.is_stopped || pressed ? ['EMERGENCY STOP', shown.text || 'All arms are being stopped.']
+      : !connected ? ['NO CONNECTION', 'What you see is old. The arm holds while nobody drives.']
+      : ['', ''];
+    const root = document.documentElement.classList;
+    root.toggle('t-stopped', Boolean(shown.is_stopped || pressed));
+    root.toggle('t-says', head !== '');
+    root.toggle('t-watches', shown.drives === false);
+    if (banner.dataset.said !== head + text) {
+      banner.dataset.said = head + text;
+      const strong = document.createElement('b');
+      strong.textContent = head;
+      banner.replaceChildren(strong, text);
+    }
+    safety.hidden = !shown.can_stop;
+  }
+
+  async function press() {
+    if (!shown.can_stop || pressed === true) return;
+    pressed = true;
+    show();
+    for (let i = 0; i < TRIES; i++) {
+      try {
+        if ((await ask('stop')).ok) { await look(); pressed = false; return; }
+      } catch { /* asked again */ }
+      if (i === 4) { pressed = 'unheard'; show(); }
+      await wait(AGAIN);
+    }
+    pressed = false;
+  }
+
+  async function look() {
+    try {
+      shown = await (await ask('alive')).json();
+      connected = true;
+    } catch { connected = false; }
+    show();
+  }
+
+  const types = (element) => element.closest && element.closest(
+    'input:not([type=checkbox]):not([type=radio]):not([type=range]), textarea, [contenteditable=true]');
+  stop.addEventListener('pointerdown', press);
+  stop.addEventListener('click', press);
+  addEventListener('keydown', (event) => {
+    if (event.code !== 'Space' || types(event.target) || !shown.can_stop) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    if (!event.repeat) press();
+  }, true);
+  addEventListener('keyup', (event) => { // a focused button would take it for a click
+    if (event.code === 'Space' && !types(event.target) && shown.can_stop) event.preventDefault();
+  }, true);
+  addEventListener('DOMContentLoaded', async () => {
+    document.body.append(banner, safety);
+    for (;;) { await look(); await wait(PERIOD); }
+  });
+})();

@@ -1,0 +1,122 @@
+"""Page client: what a browser says to the console, byte for byte, without a browser.
+
+A hostile page is a program: it sends whatever it wants over a real WebSocket.
+"""
+
+import http.client
+import json
+import threading
+from contextlib import suppress
+
+import msgspec
+import viser
+import zstandard
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from browser import until
+
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [1.0, 0, 0.5], "fov": 0.8,
+    "near": 0.01, "far": 1000, "image_height": 600, "image_width": 800, "look_at": [0, 0, 0],
+    "up_direction": [0, 0, 1],
+}  # fmt: skip
+
+
+class PageClient:
+    """A page at a port; ``elements`` are viser's by what stands on them, ``gizmos`` their names."""
+
+    def __init__(self, port, *, comes_up=True):
+        self.port, self.name = port, ""
+        self.elements, self.gizmos, self.commands, self.values = {}, [], {}, {}
+        self.socket = connect(
+            f"ws://127.0.0.1:{port}/", origin=f"http://127.0.0.1:{port}", compression=None,
+            subprotocols=[f"viser-v{viser.__version__}"], max_size=None, close_timeout=1,
+        )  # fmt: skip
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        if comes_up:
+            self.say(CAMERA)
+            until(lambda: self.name and (self.gizmos or self.elements), "the page comes up")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.close()
+
+    def say(self, message):
+        """Send a message, or bytes as they are; what has been cut off says nothing."""
+        self.raw(msgspec.msgpack.encode(message))
+
+    def raw(self, data):
+        """Send bytes, or a text."""
+        try:
+            self.socket.send(data)
+        except (ConnectionClosed, OSError):
+            self.is_cut = True
+
+    is_cut = False
+
+    def set(self, uuid, /, **updates):
+        """Update an element as viser's page does."""
+        self.say({"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates})
+
+    def click(self, label):
+        """Press a button."""
+        self.set(self.elements[label], value=True)
+
+    def drag(self, position=(0.0, -0.06, -0.08), wxyz=(1.0, 0.0, 0.0, 0.0), **more):
+        """Say where the first gizmo shall be."""
+        self.say({"type": "TransformControlsUpdateMessage", "name": self.gizmos[0],
+                  "wxyz": wxyz, "position": position, "owner": ""} | more)  # fmt: skip
+
+    def ask(self, path, **headers):
+        """Status and body of an answer, as the page's own script asks."""
+        return ask(self.port, path, Teleop_Page=self.name or "new", **headers)
+
+    def sync(self):
+        """Wait until all that was said before has been judged, or this page is cut off."""
+        with suppress(ConnectionClosed, OSError):
+            heard = self.socket.ping()
+            until(lambda: heard.wait(0.01) or self.is_cut, "the answer to a ping")
+
+    def close(self):
+        """Go."""
+        self.socket.socket.close()
+
+    def _read(self):
+        try:
+            for data in self.socket:
+                size = int.from_bytes(data[8:16], "little")
+                inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
+                for message in msgspec.msgpack.decode(inner)["messages"]:
+                    self._take(message)
+        except (ConnectionClosed, OSError):
+            pass
+        finally:
+            self.is_cut = True
+
+    def _take(self, message):
+        kind = message["type"]
+        if kind == "TransformControlsMessage":
+            self.gizmos.append(message["name"])
+        elif kind == "RegisterCommandMessage":
+            self.commands[message["props"]["label"]] = message["uuid"]
+        elif kind == "RunJavascriptMessage" and "teleopPage" in message["source"]:
+            self.name = message["source"].split("'")[1]
+        elif kind == "GuiUpdateMessage" and "value" in message["updates"]:
+            self.values.setdefault(message["uuid"], []).append(message["updates"]["value"])
+        elif kind.startswith("Gui") and "props" in message and "label" in message["props"]:
+            self.elements[message["props"]["label"]] = message["uuid"]
+
+
+def ask(port, path, **headers):
+    """Status and body of an answer to a request with some headers."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    connection.request("GET", path, headers={n.replace("_", "-"): v for n, v in headers.items()})
+    answer = connection.getresponse()
+    body = answer.read()
+    connection.close()
+    is_json = answer.headers.get("Content-Type") == "application/json"
+    return answer.status, json.loads(body) if is_json else body
