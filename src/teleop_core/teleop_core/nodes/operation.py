@@ -57,8 +57,8 @@ class StopButton:
 class StopInput:
     """The emergency stop, looked at in every tick: 1 µs, and no executor on the way.
 
-    The reliable reader is looked at in every tick, the two others in every fourth. No press is lost:
-    readers keep all messages, a message that is missing counts as a press
+    The first reader is looked at in every tick, the two others in every fourth. No press is lost:
+    readers keep all messages, a missing message counts as a press
     (:class:`~teleop_core.operation.presses.Presses`), and a :class:`StopButton` that was pressed
     before it was found tells so.
 

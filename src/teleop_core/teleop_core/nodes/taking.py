@@ -1,8 +1,8 @@
 """Taking: messages of a subscription with the identity of their sender, which rclpy leaves out.
 
 rclpy hands over the number that a sender gave to a message, but not who the sender is; only both
-together show that a message was lost. So the call that rclpy makes, ``rcl_take_serialized_message``,
-is made from here. All that depends on the layout of rcl's structures is in this module.
+together show that a message was lost. So this module itself calls what rclpy calls,
+``rcl_take_serialized_message``. All that depends on the layout of rcl's structures is in here.
 """
 
 import ctypes
