@@ -50,7 +50,8 @@ def source_pid_control(
     for i in range(effort.shape[0]):
         error = setpoint[i] - measured[i]
         # Without integral action nothing holds what the arm weighed at the start either.
-        memory[i, 0] = memory[i, 0] + gains[i, 1] * dt * error if gains[i, 1] > 0.0 else 0.0
+        integral = memory[i, 0] + gains[i, 1] * dt * error if gains[i, 1] > 0.0 else 0.0
+        memory[i, 0] = min(max(integral, -limit[i]), limit[i])
         change = (error - memory[i, 1]) / dt
         memory[i, 1] = error
         effort[i] = gains[i, 0] * error + memory[i, 0] + gains[i, 2] * change + feedforward[i]

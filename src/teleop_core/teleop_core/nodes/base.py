@@ -501,6 +501,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
     def _retune(self, parameters: Any) -> None:
         if self.stage is None or not hasattr(self.stage, "retune"):
             return
+        if hasattr(self.stage, "examine"):  # takes long: beside the loop, which goes on meanwhile
+            self.stage.examine(parameters)
         if not self.lock.acquire(timeout=_LOCK_PATIENCE):
             raise SessionError(f"{self.member_name} is in a step that takes too long; try again")
         try:

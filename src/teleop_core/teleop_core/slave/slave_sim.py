@@ -32,7 +32,7 @@ from teleop_core.signals import DT, assign
 from teleop_core.slave.friction import bristle_damping
 from teleop_core.slave.handover import missing_effort
 from teleop_core.slave.motion import MotionCommands
-from teleop_core.slave.stability import check_stable
+from teleop_core.slave.stability import check_friction, check_stable, loop_key
 from teleop_core.slave.step import SPEED_LAG, Arm, slave_records, slave_step
 from teleop_core.slave.trajectory import shortest_move_time
 from teleop_core.stage import RunningStage, Stage
@@ -187,16 +187,19 @@ class SlaveSim(RunningStage):
         self.motion = MotionCommands(self)
         self._take_start(parameters)
         self._take_script(parameters.operation)
-        self._stable: bytes | None = None
-        self.retune(parameters)
+        self._take(parameters)
         self.reset()
-        self._insist_on_stability(parameters)
-        self._gains_in_force = self.arm.gains.copy()
+        self._check_loop()
+        self._examined, self._gains_in_force = parameters, self.arm.gains.copy()
         self._load_commands()
 
     def reset(self) -> None:
         """Back to home, at rest, with no command in force."""
-        s, home, arm = self.state, self.robot.home, self.arm
+        self._rest_at(self.robot.home)
+
+    def _rest_at(self, home: Array) -> None:
+        """Stand at joints (n,), at rest and in balance, with no command in force."""
+        s, arm = self.state, self.arm
         assign(s, 0)
         for name in ("command", "filtered", "setpoint", "target", "move_from"):
             s[name] = home
@@ -217,13 +220,36 @@ class SlaveSim(RunningStage):
         self.robot.kernels.fk(arm.q, arm.geometry, transform)
         pose_from_transform(transform, row["slave_setpoint_cp"])
 
+    def examine(self, parameters: SlaveSimParameters) -> None:
+        """Try parameters on an arm of their own, at home and where this one is.
+
+        This takes tenths of a second where the loop changes: in a running session it is done beside
+        the ticks, before :meth:`retune`.
+
+        Raises:
+            ParameterError: A list has another length than the robot has joints; friction is more
+                than drives or integrator can take; or an error would grow, or not come back.
+        """
+        trial = SlaveSim(parameters, self.dt)
+        if loop_key(trial.parameters, trial.arm) != loop_key(self.parameters, self.arm):
+            trial._rest_at(self.arm.q.clip(self.robot.lower, self.robot.upper))
+            trial._check_loop()
+        self._examined = parameters
+
     def retune(self, parameters: SlaveSimParameters) -> None:
         """Take new parameters from the next tick on; a law that can shift takes over what it gave.
 
         Raises:
-            ParameterError: A list has another length than the robot has joints, nothing changed; or
-                a small error would grow, and then the former ones are to be set again.
+            ParameterError: What :meth:`examine` refuses, unless these were examined; nothing
+                has changed then.
         """
+        if parameters is not self._examined:
+            self.examine(parameters)
+        self._take(parameters)
+        self._hand_over()
+
+    def _take(self, parameters: SlaveSimParameters) -> None:
+        """Write parameters where the step reads them."""
         robot, p, drives = self.robot, self.parameters, self.robot.drives
         assert drives is not None
         assert robot.dynamics is not None
@@ -250,9 +276,14 @@ class SlaveSim(RunningStage):
         p["interpolation"] = INTERPOLATIONS.index(parameters.interpolation)
         p["start_speed"] = parameters.start_speed
         self._take_operation(parameters.operation)
-        if self._stable is not None:
-            self._insist_on_stability(parameters)
-            self._hand_over()
+
+    def _check_loop(self) -> None:
+        """Try the loop as it is set, where the arm is; see :mod:`teleop_core.slave.stability`."""
+        assert self.robot.drives is not None
+        check_friction(self.parameters, self.robot.drives.inertia, self.dt)
+        check_stable(
+            self._law, self.robot, self.parameters, self.state, self.arm, self.signals, self.dt
+        )
 
     def _hand_over(self) -> None:
         """Let the integrators take over what new gains give less, once these are in force."""
@@ -263,16 +294,6 @@ class SlaveSim(RunningStage):
             missing = missing_effort(self.arm, speed, self._gains_in_force, self.dt)
             self._law.shift(self.arm.memory, missing)
         self._gains_in_force = self.arm.gains.copy()
-
-    def _insist_on_stability(self, parameters: SlaveSimParameters) -> None:
-        """Try the loop, unless it is the one that was tried last; see :func:`check_stable`."""
-        p, law = self.parameters, parameters.controller.kind.kind
-        loop = b"".join(
-            part.tobytes() for part in (self.arm.gains, p["viscous"], p["compensated"], p["steps"])
-        )
-        if loop != self._stable:
-            check_stable(law, p, self.state, self.arm, self.signals, self.dt)
-            self._stable = loop
 
     def _take_start(self, parameters: SlaveSimParameters) -> None:
         """Plan the move from home to where the slave starts.

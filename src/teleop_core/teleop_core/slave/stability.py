@@ -1,32 +1,101 @@
-"""Stability: whether a slave's loop, as it is set, lets small errors die away at its rate."""
+"""Stability: whether a slave's loop, as it is set, follows, comes to rest, and lets errors die.
+
+A loop is tried before it is used: copies of the arm run under it. What a trial shows does not
+depend on when it is made, so a loop that has passed is not tried twice in one process.
+"""
 
 from typing import Any
 
 import numpy as np
 
+from teleop_core.controllers import Controller
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import bound, records
 from teleop_core.operation.states import State
+from teleop_core.plants import PER_JOINT
+from teleop_core.robots.robot import Robot
 from teleop_core.slave.step import Arm, slave_step
 
 _TICKS, _LAST = 400, 100
-# So many times larger than at the start no error is after _TICKS. Laws that learn may let errors
-# grow for a while, within bounds; loops that run away pass it by orders of magnitude.
+# After _TICKS no error may be so many times what it was. Laws that learn may let errors grow for a
+# while, within bounds; loops that run away pass this by orders of magnitude.
 _GROWTH = 100.0
 # Error at the start, in encoder steps, and what is left of those steps meanwhile.
 _ERROR, _FINE = 1e-2, 1e-6
+# Ticks of a dash: bursts of full speed with rests between, a run at full speed, then rest.
+_BURSTS, _BURST, _RUN, _REST = 2, 50, 150, 500
+# A dash must not leave more than this share of its largest error after the rest.
+_LEFT = 0.5
+# Share of the room that a joint has, which a dash may take.
+_ROOM = 0.8
+# Where classical Runge-Kutta ends to be stable: -h times a real pole.
+_STABLE = 2.785
+_RIGID = 1e9  # acceleration and speed without a bound
+_LOOP = (*PER_JOINT, "bristle_damping", "lower", "upper", "effort_limit", "speed_limit",
+         "compensated", "steps")  # fmt: skip
+_ARM = ("gains", "dynamics", "model", "geometry", "coupling")
+_passed: set[tuple[object, ...]] = set()
 
 
-def check_stable(name: str, p: Any, s: Any, arm: Arm, row: Any, dt: float) -> None:
-    """Refuse a loop in which a small error of a joint grows.
-
-    Two copies of the arm are held at the present setpoint, one of them with a small error of all
-    joints; encoders are fine and dry friction is left out, so that the difference of the two is
-    that of a linear loop. After 0.4 s it must not be a hundred times what it was.
+def check_friction(p: Any, inertia: Array, dt: float) -> None:
+    """Refuse friction that the drives cannot move, or that the integrator cannot follow.
 
     Args:
-        name: Name of the control law, for the message.
+        p: Parameter record of the slave.
+        inertia: Inertias (n,) of the drives [kg·m² or kg].
+        dt: Tick [s].
+
+    Raises:
+        ParameterError: Dry friction and bias exceed a drive's effort, or a joint's friction is
+            too stiff for the Runge-Kutta steps of a tick.
+    """
+    held = p["coulomb"] + np.abs(p["bias"])
+    if (held >= p["effort_limit"]).any():
+        i = int(np.argmax(held >= p["effort_limit"]))
+        needed = f"below {p['effort_limit'][i] - abs(p['bias'][i]):.3g} for joint {i + 1}, "
+        needed += "the effort of its drive less its bias: else it never moves"
+        raise ParameterError("slave_sim.coulomb", p["coulomb"].tolist(), needed)
+    smooth = p["coulomb"] / np.maximum(p["friction_speed"], 1e-300) / inertia
+    sticking = np.sqrt(p["bristle"] / inertia)
+    pole = np.where(p["bristle"] > 0.0, sticking, smooth) * (p["coulomb"] > 0.0)
+    step = dt / int(p["steps"])
+    if (pole * step > _STABLE).any():
+        i = int(np.argmax(pole))
+        needed = (
+            f"soft enough for steps of {1e3 * step:g} ms: that of joint {i + 1} has a time constant "
+            f"of {1e3 / pole[i]:.2g} ms; lower it, or raise integration_steps"
+        )
+        raise ParameterError("slave_sim.coulomb", p["coulomb"].tolist(), needed)
+
+
+def loop_key(p: Any, arm: Arm) -> tuple[bytes, ...]:
+    """Numbers that make the loop of an arm what it is, wherever the arm is.
+
+    Args:
+        p: Parameter record of the slave.
+        arm: Its arrays.
+    """
+    fields = (*(p[name] for name in _LOOP), *(getattr(arm, name) for name in _ARM))
+    return tuple(field.tobytes() for field in fields)
+
+
+def check_stable(
+    law: Controller, robot: Robot, p: Any, s: Any, arm: Arm, row: Any, dt: float
+) -> None:
+    """Refuse a loop in which small errors grow, or that does not come back from large ones.
+
+    Small errors: two copies of the arm are held at the present setpoint, one of them with a small
+    error of all joints; encoders are fine and dry friction is left out, so that the difference of
+    the two is that of a linear loop. After 0.4 s it must not be a hundred times what it was.
+
+    Large errors: the setpoint of one joint after the other dashes at the full speed of its drive,
+    in bursts and in one run, and stands still at once, which saturates the drive. After 0.5 s at
+    rest the error must be below half of the largest one on the way.
+
+    Args:
+        law: The control law.
+        robot: What it moves.
         p: Parameter record of the slave.
         s: State record.
         arm: Its arrays.
@@ -34,8 +103,17 @@ def check_stable(name: str, p: Any, s: Any, arm: Arm, row: Any, dt: float) -> No
         dt: Tick [s].
 
     Raises:
-        ParameterError: It grows, or runs away.
+        ParameterError: An error grows, or does not come back.
     """
+    tried = (law.control, robot.kernels, dt, arm.q.tobytes(), *loop_key(p, arm))
+    if tried in _passed:
+        return
+    _check_small(law.name, p, s, arm, row, dt)
+    _check_large(law.name, p, s, arm, row, dt)
+    _passed.add(tried)
+
+
+def _check_small(name: str, p: Any, s: Any, arm: Arm, row: Any, dt: float) -> None:
     error = _ERROR * np.array(p["encoder_step"])
     calm, shaken = (_held(p, s, arm, row, dt, by) for by in (0.0 * error, error))
     with np.errstate(all="ignore"):
@@ -52,12 +130,10 @@ def check_stable(name: str, p: Any, s: Any, arm: Arm, row: Any, dt: float) -> No
 
 def _held(p: Any, s: Any, arm: Arm, row: Any, dt: float, by: Array) -> Array:
     """Positions (N, n) in the last ticks of an arm that is held ``by`` (n,) off its setpoint."""
-    p, s, row = (_copy(record) for record in (p, s, row))
-    arm = Arm(*(np.array(part) if isinstance(part, np.ndarray) else part for part in arm))
-    s["state"], p["brakes"], p["event_count"], p["heartbeat_ns"] = State.PAUSED, 0, 0, 0
-    p["reported"] = 1
-    for name in ("encoder_step", "effort_step"):
-        p[name] *= _FINE
+    p, s, arm, row = _copies(p, s, arm, row)
+    s["state"] = State.PAUSED
+    for field in ("encoder_step", "effort_step"):
+        p[field] *= _FINE
     p["coulomb"], p["wander"] = 0.0, 0.0
     arm.q[:] += by
     found, step = np.empty((_LAST, len(arm.q))), bound(slave_step, p, s, arm, row, dt)
@@ -66,6 +142,66 @@ def _held(p: Any, s: Any, arm: Arm, row: Any, dt: float, by: Array) -> Array:
         step()
         found[k % _LAST] = arm.q
     return found
+
+
+def _check_large(name: str, p: Any, s: Any, arm: Arm, row: Any, dt: float) -> None:
+    for joint in range(len(arm.q)):
+        error = _dashed(p, s, arm, row, dt, joint)
+        largest, left = np.max(error[:-_REST]), np.max(error[-_LAST:])
+        if not left <= _LEFT * largest:  # NaN is left as well
+            needed = (
+                f"such that the arm comes back: {_REST * dt:g} s after a stop from full speed joint "
+                f"{joint + 1} is off by {left:.2g}, {left / max(largest, 1e-300):.2g} of its "
+                "largest error on the way; raise its gains, or bound its integral"
+            )
+            raise ParameterError("slave_sim.controller.kind", name, needed)
+
+
+def dash(lower: float, upper: float, start: float, speed: float, dt: float) -> Array:
+    """Setpoints (N,) of a joint that dashes from ``start`` towards the farther of its limits.
+
+    Args:
+        lower: Lower limit [rad or m].
+        upper: Upper limit [rad or m].
+        start: Where it begins.
+        speed: Full speed of its drive [rad/s or m/s]; less of it where there is no room.
+        dt: Tick [s].
+    """
+    burst = np.repeat([1.0, 0.0], _BURST)
+    pace = np.concatenate((np.tile(burst, _BURSTS), np.ones(_RUN), np.zeros(_REST)))
+    room, way = max(upper - start, start - lower), speed * dt * float(pace.sum())
+    share = min(1.0, _ROOM * room / way) if np.isfinite(room) else 1.0
+    side = 1.0 if upper - start >= start - lower else -1.0
+    return start + side * share * speed * dt * np.cumsum(pace)
+
+
+def _dashed(p: Any, s: Any, arm: Arm, row: Any, dt: float, joint: int) -> Array:
+    """Errors (N,) of a joint whose setpoint dashes."""
+    p, s, arm, row = _copies(p, s, arm, row)
+    s["state"], s["is_homed"], s["seen_ns"] = State.ENABLED, 1, 0
+    p["is_filtered"] = p["interpolation"] = 0
+    p["acceleration"], p["tool_speed"], p["tool_acceleration"] = _RIGID, _RIGID, _RIGID
+    path = dash(
+        p["lower"][joint], p["upper"][joint], s["setpoint"][joint], p["speed_limit"][joint], dt
+    )
+    row["slave_servo_jp"] = s["setpoint"]
+    error, step = np.empty(len(path)), bound(slave_step, p, s, arm, row, dt)
+    for k, place in enumerate(path):
+        row["now_ns"] += round(dt * 1e9)
+        row["slave_servo_jp"][joint], row["slave_servo_jp_ns"] = place, row["now_ns"]
+        step()
+        error[k] = abs(arm.setpoint[joint] - arm.q[joint])
+    return error
+
+
+def _copies(p: Any, s: Any, arm: Arm, row: Any) -> tuple[Any, Any, Arm, Any]:
+    """Copies of an arm that stands still, whose faults are told only."""
+    p, s, row = (_copy(record) for record in (p, s, row))
+    arm = Arm(*(np.array(part) if isinstance(part, np.ndarray) else part for part in arm))
+    p["brakes"], p["event_count"], p["heartbeat_ns"], p["reported"] = 0, 0, 0, 1
+    for field in ("is_busy", "is_homing", "must_plan", "motion", "must_brake"):
+        s[field] = 0
+    return p, s, arm, row
 
 
 def _copy(record: Any) -> Any:
