@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.kernels import kernel, records
-from teleop_core.operation import Answer, Event, OperationParameters, State, command_event
+from teleop_core.operation import (
+    Answer,
+    Event,
+    Fault,
+    OperationParameters,
+    State,
+    command_event,
+)
 from teleop_core.operation.states import COMMANDS, STATE_FIELDS, TABLE, answer_text, change
 from teleop_core.parameters import build
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
@@ -113,10 +120,11 @@ def test_scripts_of_another_form_are_refused(text):
 class Arm:
     """A slave under a stream of commands that swing about home."""
 
-    def __init__(self, *, seconds=0.0, **operation):
-        self.slave = SlaveSim(SlaveSimParameters(
-            robot="rcrt1", starts_at_home=True, operation=OperationParameters(**operation)
-        ))  # fmt: skip
+    def __init__(self, *, seconds=0.0, law="pid", is_filtered=True, **operation):
+        chosen = {"controller.kind": law, "reference_filter.is_on": is_filtered}
+        given = {f"operation.{name}": value for name, value in operation.items()}
+        start = {"robot": "rcrt1", "starts_at_home": True}
+        self.slave = SlaveSim(build(SlaveSimParameters, start | chosen | given))
         self.row, self.ns = self.slave.signals, 10**9
         self.limit = self.slave.robot.drives.speed_limit
         self.home = self.slave.robot.home
@@ -287,3 +295,49 @@ def test_a_stream_with_a_gap_before_its_last_command_pauses_the_arm_too():
 def test_no_session_can_have_an_emergency_stop_told_only(word):
     with pytest.raises(ParameterError, match="reported"):
         build(OperationParameters, {"reported": (word,)})
+
+
+@pytest.mark.parametrize("seconds", [0.03, 0.13, 0.27, 0.41, 0.66, 0.93, 1.21])
+@pytest.mark.parametrize("law", ["pid", "source_pid"])
+def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_turn(law, seconds):
+    arm = Arm(law=law, is_filtered=False, seconds=seconds)
+    arm.slave.request("pause")
+    while arm.slave.request("resume")[0] is Answer.BRAKING:
+        arm.run(0.001)
+    assert arm.slave.state["state"] == E
+    paused = Arm(law=law, is_filtered=False, seconds=seconds)
+    paused.slave.request("pause")
+    paused.run(1e-9 * (arm.ns - paused.ns))
+    for _ in range(200):  # nothing of the swing is left to come
+        assert (np.abs(paused.slave.arm.dq) <= paused.slave.parameters["rest_speed"]).all()
+        paused.run(0.001)
+
+
+def test_an_arm_that_was_paused_while_it_homed_homes_when_it_is_resumed():
+    slave = SlaveSim(SlaveSimParameters(robot="puma560"))
+    row, ns = slave.signals, 10**9
+
+    def run(ticks):
+        nonlocal ns
+        for _ in range(ticks):
+            ns += 10**6
+            row["now_ns"] = ns
+            slave.step()
+
+    run(200)
+    assert slave.state["is_homing"]
+    slave.fail(Fault.STALL, 3.0, 2.0)
+    run(1000)
+    assert (slave.operation["state"], slave.operation["is_homed"]) == (P, 0.0)
+    assert slave.request("resume")[0] is Answer.DONE
+    run(10_000)
+    assert slave.operation["is_homed"] == 1.0
+    assert np.allclose(row["slave_setpoint_js"], slave.parameters["start"], rtol=0, atol=1e-12)
+
+
+def test_unhome_and_disable_end_what_a_pause_left_of_homing():
+    for ends in (Event.UNHOME, Event.DISABLE, Event.ENABLE):
+        s = make(E, is_homed=0, is_homing=1, is_busy=1)
+        for event in (Event.PAUSE, ends, Event.ENABLE, Event.PAUSE, Event.RESUME):
+            _change(s, int(event))
+        assert (s["state"], s["is_homing"]) == (E, 0), ends

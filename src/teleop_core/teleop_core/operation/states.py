@@ -77,7 +77,7 @@ TABLE = np.array(
 
 _DONE, _ALREADY, _REFUSED = int(Answer.DONE), int(Answer.ALREADY), int(Answer.REFUSED)
 _STOPPED, _BRAKING = int(Answer.STOPPED), int(Answer.BRAKING)
-_ENABLED, _FAULT = int(_E), int(_F)
+_ENABLED, _PAUSED, _FAULT = int(_E), int(_P), int(_F)
 _ENABLE, _DISABLE, _HOME, _UNHOME = (
     int(Event.ENABLE), int(Event.DISABLE), int(Event.HOME), int(Event.UNHOME)
 )  # fmt: skip
@@ -90,15 +90,15 @@ STATE_FIELDS = [
     (name, "i8")
     for name in (
         "state", "is_homed", "is_busy", "is_homing", "must_plan", "is_stopped", "is_pressed",
-        "is_moving",
-        "fault", "fault_joint",
+        "is_moving", "must_home", "fault", "fault_joint",
     )
 ] + [("fault_value", "f8"), ("fault_bound", "f8")]  # fmt: skip
 """Fields of a state record that :func:`change` reads and writes.
 
 ``must_plan``: a move is to be planned, to the start where it homes.
 ``is_stopped``: an emergency stop is latched. ``is_pressed``: its cause is still there.
-``is_moving``: the arm is not at rest.
+``is_moving``: the arm is not at rest. ``must_home``: a pause interrupted homing, which resume
+begins anew.
 """
 
 
@@ -117,6 +117,8 @@ def change(s: Any, event: int) -> int:
     if event == _MOVE and not s.is_homed:
         return _REFUSED
     answer = _ALREADY if follower == state else _DONE
+    if event != _RESUME and follower != state:
+        s.must_home = s.is_homing if follower == _PAUSED else 0
     answer = _take(s, event, answer)
     if follower != _ENABLED:
         s.is_busy = s.is_homing = s.must_plan = 0
@@ -129,12 +131,12 @@ def change(s: Any, event: int) -> int:
 @inner
 def _take(s: Any, event: int, answer: int) -> int:
     """What an event does beside the state."""
-    if event == _HOME:
-        s.is_busy, s.is_homing, s.must_plan, s.is_homed = 1, 1, 1, 0
+    if event == _HOME or (event == _RESUME and s.must_home):
+        s.is_busy, s.is_homing, s.must_plan, s.is_homed, s.must_home = 1, 1, 1, 0, 0
         return _DONE
     if event == _UNHOME:
         was = s.is_homed or s.is_homing
-        s.is_homed = s.is_homing = s.is_busy = s.must_plan = 0
+        s.is_homed = s.is_homing = s.is_busy = s.must_plan = s.must_home = 0
         return _DONE if was else _ALREADY
     if event == _STOP:
         was = s.is_stopped

@@ -13,7 +13,7 @@ from teleop_core.signals import TICK_NS
 
 OPERATION_STATE = [
     *STATE_FIELDS, ("must_brake", "i8"), ("told", "i8"), ("played", "i8"), ("first_ns", "i8"),
-    ("heard_ns", "i8"), ("pressed_ns", "i8"), ("left_ns", "i8"), ("is_resting", "i8"),
+    ("heard_ns", "i8"), ("pressed_ns", "i8"), ("left_ns", "i8"), ("is_resting", "i8"), ("still_ns", "i8"),
     ("left_at", "f8", (3,)), ("rest_time", "f8"), ("travel", "f8"),
 ]  # fmt: skip
 """Scalars of a state record; beside them it has ``full_ticks`` (n,)."""
@@ -36,6 +36,9 @@ _STOP, _FAILED, _LAPSED = int(Event.STOP), int(Event.FAILED), int(Event.LAPSED)
 _HEARTBEAT, _PRESSED = int(Fault.HEARTBEAT), int(Fault.STOP)
 _TRACKING, _TIP, _EFFORT = int(Fault.TRACKING), int(Fault.TIP), int(Fault.EFFORT)
 _OVERSPEED, _LIMIT = int(Fault.OVERSPEED), int(Fault.JOINT_LIMIT)
+REST_NS = 50_000_000
+"""An arm rests once no joint has moved for so long [ns]: twice as long as a turn of a swinging
+joint, at the bandwidths of 60 to 80 rad/s that drives have, takes."""
 # A joint this close to its limit [rad or m] is at it.
 _AT = 1e-9
 # A drive that gives this share of its limit gives all.
@@ -150,7 +153,21 @@ def measure_rest(s: Any, place: Array, now_ns: int) -> None:
         square += (place[i] - s.left_at[i]) ** 2
     s.travel = max(s.travel, square**0.5)
     if not s.is_moving:
-        s.is_resting, s.rest_time = 1, 1e-9 * (now_ns - s.left_ns)
+        s.is_resting, s.rest_time = 1, 1e-9 * max(s.still_ns - s.left_ns, TICK_NS)
+
+
+@inner
+def find_rest(s: Any, moves: bool, now_ns: int) -> None:
+    """Take note whether the arm moves; it rests after :data:`REST_NS` without motion.
+
+    A joint that swings about its place stands still for a moment at each of its turns.
+    """
+    if moves:
+        s.still_ns, s.is_moving = 0, 1
+        return
+    if s.still_ns == 0:
+        s.still_ns = now_ns
+    s.is_moving = s.is_moving and now_ns - s.still_ns < REST_NS
 
 
 @inner

@@ -10,6 +10,7 @@ from teleop_core.operation.watch import (
     OPERATION_PARAMETERS,
     OPERATION_STATE,
     begin_tick,
+    find_rest,
     is_braked,
     measure_rest,
     tell,
@@ -188,12 +189,12 @@ def _is_still(s: Any) -> bool:
 
 
 @inner
-def _is_moving(p: Any, s: Any) -> int:
-    """1 while setpoint or arm move."""
+def _moves(p: Any, s: Any) -> bool:
+    """Whether setpoint or arm move in this tick."""
+    moving = 0
     for i in range(s.setpoint.shape[0]):
-        if s.step[i] != 0.0 or not abs(s.speed[i]) <= p.rest_speed[i]:
-            return 1
-    return 0
+        moving += s.step[i] != 0.0 or not abs(s.speed[i]) <= p.rest_speed[i]
+    return moving > 0
 
 
 @kernel
@@ -250,7 +251,7 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
         watch_joints(p, s, arm.effort, dt)
         watch_tip(p, s, row.slave_setpoint_cp, row.slave_measured_cp)
     watch_limits(p, s, row.now_ns)
-    s.is_moving = _is_moving(p, s)
+    find_rest(s, _moves(p, s), row.now_ns)
     measure_rest(s, row.slave_measured_cp, row.now_ns)
     tell(s, row.slave_operation)
     wander(p, s)
