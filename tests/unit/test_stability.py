@@ -44,7 +44,7 @@ def test_friction_that_is_stiff_for_the_steps_is_one_that_the_drive_cannot_follo
     stiff = (0.0, 0.0, 0.0, 5.0, 0.0, 0.0)
     with pytest.raises(ParameterError, match="stable at 1000 Hz"):
         slave(viscous=stiff, integration_steps=1)
-    with pytest.raises(ParameterError, match="comes back.*joint 4"):
+    with pytest.raises(ParameterError, match=r"comes back.*joint 4"):
         slave(viscous=stiff, integration_steps=50)
 
 
@@ -89,7 +89,7 @@ def test_a_loop_that_runs_away_after_a_stop_from_full_speed_is_refused():
     law = unbounded_integral()
     register_controller(law)
     try:
-        with pytest.raises(ParameterError, match="comes back.*joint 3"):
+        with pytest.raises(ParameterError, match=r"comes back.*joint 3"):
             slave(controller__kind=law.name)
     finally:
         CONTROLLERS.remove(law.name)

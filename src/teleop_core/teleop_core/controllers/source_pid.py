@@ -1,8 +1,12 @@
 """Source PID: the published controller, as printed, with gains by a stated rule.
 
-Proportional, integral and differential action on the error alone: no limit to the integral, no
-filter of the derivative, which feels every encoder count. Only the axes whose gravity nobody feeds
-forward have integral action; that is what the published rest positions show.
+Proportional, integral and differential action on the error alone: no filter of the derivative,
+which feels every encoder count. Only the axes whose gravity nobody feeds forward have integral
+action; that is what the published rest positions show.
+
+In one thing it differs from what is printed: the integral ends at what the drive can give. Printed
+without a bound, it winds up at each stop from more than about 50 mm/s of joint 3, and the loop,
+whose three poles are at one place, then runs away at a standing setpoint.
 
 Source:
     Vongbunyong 2008, eqs. 6.1-6.4, with u_I(k-1) in place of the printed u(k-1).
@@ -46,7 +50,10 @@ def source_pid_control(
     dt: float,
     effort: Array,
 ) -> None:
-    """Write ``Kp e + Ki ∫e + Kd Δe / dt + feedforward``; memory: integral effort, last error."""
+    """Write ``Kp e + Ki ∫e + Kd Δe / dt + feedforward``; memory: integral effort, last error.
+
+    The integral effort stays within ±limit; see the module.
+    """
     for i in range(effort.shape[0]):
         error = setpoint[i] - measured[i]
         # Without integral action nothing holds what the arm weighed at the start either.

@@ -13,8 +13,8 @@ from teleop_core.signals import TICK_NS
 
 OPERATION_STATE = [
     *STATE_FIELDS, ("must_brake", "i8"), ("told", "i8"), ("played", "i8"), ("first_ns", "i8"),
-    ("heard_ns", "i8"), ("pressed_ns", "i8"), ("left_ns", "i8"), ("is_resting", "i8"), ("still_ns", "i8"),
-    ("left_at", "f8", (3,)), ("rest_time", "f8"), ("travel", "f8"),
+    ("heard_ns", "i8"), ("pressed_ns", "i8"), ("left_ns", "i8"), ("is_resting", "i8"),
+    ("still_ns", "i8"), ("left_at", "f8", (3,)), ("rest_time", "f8"), ("travel", "f8"),
 ]  # fmt: skip
 """Scalars of a state record; beside them it has ``full_ticks`` (n,)."""
 OPERATION_PARAMETERS = [
