@@ -13,6 +13,7 @@ from lifecycle_msgs.srv import ChangeState
 from live_process import LiveProcess, are_gone, wait_until
 from teleop_core import topics
 from teleop_core.bags.reader import Bag
+from teleop_core.nodes.children import free_domain
 from teleop_core.stage import STAGES
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
@@ -115,7 +116,7 @@ def test_no_node_outlives_the_command_and_the_recording_is_closed(start, number,
     assert session.recorded().topics["slave/measured_js"].count > 100
     left = [path.name for path in session.temporary.rglob("*") if not path.is_dir()]
     marks = [
-        name for name in left if re.fullmatch(r"\d+\.\d+", name)
+        name for name in left if re.fullmatch(r"\d+\.domain", name)
     ]  # the next session removes it
     assert left == (marks if number == signal.SIGKILL else [])
 
@@ -146,6 +147,21 @@ def test_a_stage_that_never_comes_back_is_found_within_a_second(start, tmp_path,
     bag = session.recorded()
     assert 0.7 < float(found[1]) - bag.read("test/beat").log_ns[-1] * 1e-9 < 2.0
     assert bag.topics["slave/measured_js"].count > 0
+
+
+def test_a_second_session_in_the_same_domain_is_refused_though_another_user_started_it(
+    start, tmp_path
+):
+    domain = {"ROS_DOMAIN_ID": free_domain()}
+    first = start("--composed", env=domain)
+    first.wait_text("  1/60 s")
+    folder = tmp_path / "second"  # with temporary files of its own, as another user's
+    folder.mkdir()
+    second = LiveProcess(folder, "--composed", env=domain)
+    assert second.wait(120) == 2, second.text
+    assert "another session sends slave/setpoint_js on ROS domain" in second.text
+    first.signal(signal.SIGINT)
+    assert first.wait() == 0, first.text
 
 
 def test_a_process_that_stands_still_ends_the_session(start):

@@ -98,3 +98,6 @@ def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(monkeypatch, 
     assert all(node["package"] == "teleop_core" for node in started)
     assert all(node["ros_arguments"] == ["--log-level", "warn"] for node in started)
     assert {node["namespace"] for node in started} <= {"/lab", "/lab/right"}
+    assert all(node["exec_name"] == node["name"] for node in started)
+    stays = {node["name"] for node in started if not node["respawn"]}
+    assert stays == {"slave_sim", "recorder"}

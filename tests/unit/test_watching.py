@@ -1,14 +1,20 @@
 """Watching: loops that hang are told from those that work, and parents from those that are gone."""
 
 import os
+import signal
 import socket
+import subprocess
+import sys
 import threading
+import time
 
+import psutil
 import pytest
 from numba import njit
 
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.kernels.progress import compiled_count, is_compiling
+from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.parent import VARIABLE, Parent
 
@@ -103,3 +109,74 @@ def test_kernels_that_are_compiled_are_counted():
     assert outer(1.0) == 4.0
     assert compiled_count() >= before + 2
     assert not is_compiling()
+
+
+@pytest.fixture
+def processor():
+    """One processor that processes of the test share; starts them, and ends them afterwards."""
+    running, first = [], min(os.sched_getaffinity(0))
+
+    def start(program, policy=os.SCHED_OTHER):
+        def settle():
+            os.sched_setaffinity(0, {first})
+            os.sched_setscheduler(0, policy, os.sched_param(0))
+
+        command = [sys.executable, "-S", "-c", f"print(flush=True)\n{program}"]
+        made = subprocess.Popen(command, preexec_fn=settle, stdout=subprocess.PIPE)  # noqa: PLW1509
+        assert made.stdout.readline()
+        running.append(made)
+        return made
+
+    yield start
+    for process in running:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+def share(chances, seconds=2.0, period=0.05):
+    """Share of some time that a process could have worked."""
+    begin, had = time.monotonic(), -chances.look()
+    while time.monotonic() - begin < seconds:
+        time.sleep(period)  # the period of looks, not a wait
+        had += chances.look()
+    return had / (time.monotonic() - begin)
+
+
+ENDLESS, ASLEEP = "while True: pass", "import time; time.sleep(1000)"
+
+
+def test_a_process_that_gets_no_processor_has_no_chance(processor):
+    starved = processor(ENDLESS, os.SCHED_IDLE)
+    processor(ENDLESS)
+    assert share(Chances(starved.pid)) < 0.3
+
+
+@pytest.mark.parametrize("is_stopped", [False, True], ids=["asleep", "stopped"])
+def test_a_process_that_does_nothing_could_have_worked(processor, is_stopped):
+    idle = processor(ASLEEP)
+    processor(ENDLESS)
+    if is_stopped:
+        idle.send_signal(signal.SIGSTOP)
+        while psutil.Process(idle.pid).status() != psutil.STATUS_STOPPED:
+            time.sleep(0.01)
+    assert share(Chances(idle.pid)) > 0.7
+
+
+def test_what_a_thread_runs_counts_though_it_waits_for_others_in_between(processor):
+    busy = processor(ENDLESS)
+    processor(ENDLESS)
+    chances, process = Chances(busy.pid, worker=busy.pid), psutil.Process(busy.pid)
+    chances.look()
+    before, had = process.cpu_times().user, 0.0
+    while (ran := process.cpu_times().user - before) < 0.5:
+        time.sleep(0.05)  # the period of looks, not a wait
+        had += chances.look()
+    assert had > 0.7 * ran
+
+
+def test_who_looks_late_counts_a_fifth_of_a_second_alone(processor):
+    chances = Chances(processor(ASLEEP).pid)
+    chances.look()
+    time.sleep(1.0)  # what is measured, not a wait
+    assert chances.look() <= 0.2

@@ -19,7 +19,7 @@ from teleop_core.bags.reports import read_reports
 from teleop_core.errors import ParameterError, SessionError, TeleopError
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
-from teleop_core.nodes.loop import PATIENCE, Loop
+from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import PREFIX, QualityOverrides, profile
@@ -105,9 +105,6 @@ class NodeParameters:
         return found or [(port, 0.0)]
 
 
-"""Parameters that a stage changes by itself are shown so much later at most [s]."""
-
-
 def _sim_time(node: str) -> ParameterError:
     """Refusal of a clock that others set: a step is a millisecond, of drives too."""
     requirement = (
@@ -154,8 +151,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self.ended, self.exit_code = Future(), 0
         self.has_ended = False
         """Whether the node was shut down: nothing more is to come from it."""
-        self.patience = PATIENCE
-        """Time without progress after which the loop counts as hung [s]."""
+        self.patience = self.options.real_time.patience
+        """Time without progress after which the loop counts as hung [s]; 0: never."""
         self.has_own_loop = True
         """Whether the node works in a thread of its own, or in that of a whole session."""
         self.is_at_work = False

@@ -8,13 +8,13 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 from collections import deque
 from collections.abc import Iterable
 from contextlib import suppress
 from typing import IO, Any, cast
 
 from teleop_core.errors import SessionError
+from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.parent import VARIABLE
 
@@ -91,7 +91,7 @@ class Child:
         self.is_told = self._is_asked = False
         self._line, theirs = socket.socketpair()
         self._line.setblocking(False)
-        self._heard, self._text = time.monotonic(), b""
+        self._text = b""
         # Closed with us: nobody else knows its name.
         self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
         command = [sys.executable, "-m", "teleop_core.nodes", stage]
@@ -105,6 +105,8 @@ class Child:
                 env=env | {VARIABLE: str(theirs.fileno())}, start_new_session=True,
                 pass_fds=(theirs.fileno(), parameters.fileno()),
             )  # fmt: skip
+
+        self._chances, self._silent = Chances(self._process.pid), 0.0
 
     @property
     def pid(self) -> int:
@@ -126,16 +128,16 @@ class Child:
             raise SessionError(text + self.last_words())
 
     def _silence(self) -> float:
-        """Time since it was heard last [s]; 0 as long as that is no reason to worry."""
+        """Time for which it could have spoken [s]; 0 while that is no reason to worry."""
         with suppress(OSError):
             while came := self._line.recv(4096):
                 self._text += came
         *words, self._text = self._text.split(b"\n")
+        self._silent += self._chances.look()
         if words:
-            self._heard, self.doing = time.monotonic(), words[-1].decode()
-        silence = time.monotonic() - self._heard
+            self._silent, self.doing = 0.0, words[-1].decode()
         patience = _STILL if self.doing in {"at work", "ending", "leaving"} else _STILL_STARTING
-        return silence if silence > patience else 0.0
+        return self._silent if self._silent > patience else 0.0
 
     def last_words(self) -> str:
         """What it wrote of its trouble, else its last lines, each indented on a line of its own."""

@@ -26,6 +26,10 @@ COMMON = {
     "composed": ("false", "whether one process holds all nodes, which is fastest"),
     "record": ("true", "whether the recorder records from the start"),
     "out": ("", "directory of the recording; empty: bags/ and the time"),
+    "respawn": (
+        "true",
+        "whether a node that ends is started again; never the slave and the recorder",
+    ),
     "log_level": ("info", "one of " + ", ".join(LOG_LEVELS)),
 }
 """Arguments of all launch files: name to default and meaning."""
@@ -34,6 +38,12 @@ TWO_ARMS = {
     "left_robot": ("", "robot of the default arm, whose topics have no arm's name"),
     "right_robot": ("", "robot of the further arm, whose topics are below right/"),
 }
+
+
+_ONCE = (RECORDER_NAME, "slave_sim")
+"""Nodes that are not started again: a recording that exists stays as it is, and an arm that broke
+down moves again on purpose only."""
+_RESPAWN_DELAY = 2.0
 
 
 @dataclass(frozen=True)
@@ -47,6 +57,7 @@ class Process:
         namespace: Where it is, with the slash before it.
         parameters: Parameter file, kept until the launching process ends.
         log_level: Lowest level of its log.
+        respawns: Whether it is started again when it ends.
     """
 
     executable: str
@@ -55,6 +66,7 @@ class Process:
     namespace: str
     parameters: str
     log_level: str
+    respawns: bool = False
 
 
 def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
@@ -83,7 +95,8 @@ def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
     for full in [RECORDER_NAME, *names] if is_recorded else names:
         arm, _, stage = full.rpartition("/")
         below = "/".join(filter(None, (where, arm)))
-        found.append(Process("stage", (stage,), stage, f"/{below}", file, level))
+        respawns = _truth("respawn", given["respawn"]) and stage not in _ONCE
+        found.append(Process("stage", (stage,), stage, f"/{below}", file, level, respawns))
     return found
 
 
@@ -128,6 +141,8 @@ def describe(own: Mapping[str, tuple[str, str]]) -> "LaunchDescription":
 def _action(node: Any, process: Process) -> Any:
     return node(
         package="teleop_core", executable=process.executable, arguments=[*process.arguments],
-        name=process.name or None, namespace=process.namespace, parameters=[process.parameters],
-        ros_arguments=["--log-level", process.log_level], output="screen",
+        exec_name=process.name or process.executable, name=process.name or None,
+        namespace=process.namespace, parameters=[process.parameters],
+        respawn=process.respawns, respawn_delay=_RESPAWN_DELAY, output="screen",
+        ros_arguments=["--log-level", process.log_level],
     )  # fmt: skip

@@ -24,6 +24,7 @@ from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION
 from teleop_core.session.links import link_texts
 from teleop_core.texts import printable
+from teleop_core.topics import SLAVE_SETPOINT_JS
 
 START_TIMEOUT = 180.0
 """A node that is not at work, and gets no further, for this long never will be [s]."""
@@ -33,6 +34,8 @@ SILENCE = 30.0
 Whether its process stands still, and whether its loop does, is found within seconds by others:
 :mod:`teleop_core.nodes.children` and :mod:`teleop_core.nodes.watch`.
 """
+_NEW = 5.0
+"""A session that finds another in its domain within this time is the younger one, and ends [s]."""
 _NEWS_PERIOD = 5.0  # from line to line about a node that is long in starting [s]
 Crew = dict[str, tuple[str, ...]]
 """Processes that are started together, each with its nodes."""
@@ -61,7 +64,8 @@ def live(
 
     Raises:
         RecordingError: The directory exists.
-        SessionError: A node did not start, died or hangs; the recording is closed nevertheless.
+        SessionError: The ROS domain has a session already; or a node did not start, died or
+            hangs, and then the recording is closed nevertheless.
     """
     out = Path(out).absolute()
     if out.exists():
@@ -73,8 +77,8 @@ def live(
     with (
         tempfile.TemporaryFile("w+") as parameters,
         interrupt.caught(),
-        Observer(int(env["ROS_DOMAIN_ID"])) as observer,
         announced(int(env["ROS_DOMAIN_ID"])),
+        Observer(int(env["ROS_DOMAIN_ID"])) as observer,
     ):
         parameters.write(parameter_file(configuration, str(out)))
         parameters.flush()
@@ -159,6 +163,20 @@ class _Session:
                 raise SessionError(reason + child.last_words())
         self._ready = time.monotonic()
 
+    def _insist_on_one_owner(self) -> None:
+        """Refuse a domain in which arms of the same names run, on whatever machine.
+
+        Raises:
+            SessionError: They do.
+        """
+        for arm in self._graph.namespaces:
+            topic = SLAVE_SETPOINT_JS.of_arm(arm).name
+            if self._observer.senders(topic) > 1:
+                raise SessionError(
+                    f"another session sends {topic} on ROS domain {self._env['ROS_DOMAIN_ID']}: "
+                    "end it, set ROS_DOMAIN_ID to another domain, or unset it to get a free one"
+                )
+
     def _await_operator(self) -> None:
         """Wait until the hand moves; it does after a while even if nothing follows it."""
         masters = [member.name for member in self._graph.masters]
@@ -198,6 +216,8 @@ class _Session:
         """Make sure that nobody stops it, all processes run and all nodes report."""
         self._interrupt.check()
         self._obey()
+        if time.monotonic() - self._ready < _NEW:
+            self._insist_on_one_owner()
         for crew in self.crews:
             for name in [name for name in crew if name in self._children]:
                 child = self._children[name]

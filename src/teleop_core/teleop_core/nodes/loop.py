@@ -7,8 +7,6 @@ from collections.abc import Callable
 
 from teleop_core.errors import TeleopError
 
-PATIENCE = 0.8
-"""A loop that has made nothing for this long hangs [s]."""
 _END_PATIENCE = 8.0  # the last turn may compile a kernel, or wait for a slow disk
 
 
@@ -22,7 +20,8 @@ class Loop:
             loop has ended then.
         prepare: Called once in the thread before the first turn, may take long; None if the turns
             do it themselves.
-        patience: Time without any progress after which it counts as hung [s].
+        patience: Time without any progress after which it counts as hung, less the time for which
+            it waited for a processor [s]; 0: it never does.
 
     Attributes:
         name: Name of the thread.
@@ -39,7 +38,7 @@ class Loop:
         turn: Callable[[], None],
         fail: Callable[[str, bool], None],
         prepare: Callable[[], None] | None = None,
-        patience: float = PATIENCE,
+        patience: float = 0.0,
     ) -> None:
         self.name, self.turns, self.patience = name, 0, patience
         self.is_ready = self.is_hung = False
@@ -63,6 +62,11 @@ class Loop:
     def is_alive(self) -> bool:
         """Whether it takes turns still."""
         return self._thread.is_alive()
+
+    @property
+    def thread(self) -> int:
+        """Number by which the system knows its thread; 0 before it has begun."""
+        return self._thread.native_id or 0
 
     def place(self) -> str:
         """Where its thread is now: the innermost calls, the last one last."""

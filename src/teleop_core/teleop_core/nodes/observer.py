@@ -82,6 +82,10 @@ class Observer:
         """Press the emergency stop of all arms, or release it; from any thread."""
         self._button.say(is_pressed=is_pressed)
 
+    def senders(self, topic: str) -> int:
+        """Publishers of a topic that were found."""
+        return int(self._node.count_publishers(f"/{topic}"))
+
     def is_active(self, name: str) -> bool:
         """Whether a node has reported that it is at work."""
         status = self.statuses.get(name)

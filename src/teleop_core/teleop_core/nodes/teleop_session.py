@@ -48,7 +48,7 @@ class TeleopSession:
         self._at_work: tuple[bool, ...] = ()
         self._pending: list[tuple[Output, int, int]] = []
         self._ticks = 0
-        self._loop = Loop("session", self._turn, last.fail)
+        self._loop = Loop("session", self._turn, last.fail, patience=last.patience)
         self._loop.start()
 
     @property

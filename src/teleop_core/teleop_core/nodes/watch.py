@@ -10,10 +10,12 @@ import select
 import signal
 import threading
 import time
+from dataclasses import dataclass
 from typing import Protocol
 
 from teleop_core.kernels.progress import compiled_count, is_compiling
 from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.parent import Parent
 
@@ -60,6 +62,15 @@ def signal_pipe() -> int:
     return reading
 
 
+@dataclass
+class _Stillness:
+    """How long nothing came of a loop: since the number that it had, of its chances to work [s]."""
+
+    chances: Chances
+    number: int
+    time: float = 0.0
+
+
 class Watch:
     """Watching thread of a process; works from its making to the end of the process.
 
@@ -76,7 +87,7 @@ class Watch:
         self.word = "starting"
         self._crew, self._signals, self._parent = crew, signals, parent
         self._first = crew.nodes[0]
-        self._still: dict[Loop, tuple[int, int]] = {}
+        self._still: dict[Loop, _Stillness] = {}
         self._asked: float | None = None
         self._leaving = 0
         self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
@@ -126,19 +137,23 @@ class Watch:
         return f"compiling kernels ({count} so far)" if is_compiling() else self.word
 
     def _find_hung(self) -> None:
-        """Count looks, not time: where this thread did not run, others had no chance either."""
-        still: dict[Loop, tuple[int, int]] = {}
+        """Find loops of which nothing came for longer than they could have worked."""
+        still: dict[Loop, _Stillness] = {}
+        own = threading.get_native_id()  # runs now, whatever its account says
+        threads = {t.native_id or own for t in threading.enumerate()} - {own}
         for loop, number in self._crew.watched():
-            before, looks = self._still.get(loop, (-1, 0))
-            looks = looks + 1 if number == before else 0
-            still[loop] = number, looks
-            if looks * _PERIOD >= loop.patience and loop.is_alive:
+            one = self._still.get(loop) or _Stillness(Chances(os.getpid(), loop.thread), number)
+            chance = one.chances.look(threads)
+            one.time = one.time + chance if number == one.number else 0.0
+            one.number, still[loop] = number, one
+            if 0.0 < loop.patience <= one.time and loop.is_alive:
                 self._give_up(loop)
         self._still = still
 
     def _give_up(self, loop: Loop) -> None:
         loop.is_hung = True
-        text = f"{loop.name} hangs: nothing came of it for {loop.patience:g} s; it is here:"
+        text = f"{loop.name} hangs: nothing came of it for {loop.patience:g} s in which it could "
+        text += "work; it is here:"
         self._first.get_logger().fatal(f"{text}\n{loop.place()}")
         self._ask(1)
 

@@ -25,6 +25,11 @@ class RealTimeParameters:
     cpus: tuple[int, ...] = parameter(
         (), lower=0, fixed=True, doc="processors that the loop may use; empty: all"
     )
+    patience: float = parameter(
+        0.8, unit="s", lower=0.0, upper=60.0, fixed=True, source="assumed",
+        doc="a loop of which nothing came for longer hangs, and ends its process; time for which "
+        "it waited for a processor does not count; 0: never",
+    )  # fmt: skip
     lock_memory: bool = parameter(False, fixed=True, doc="keep all memory out of swap")
     freeze_gc: bool = parameter(
         True, fixed=True, doc="keep what exists at the start out of garbage collections"

@@ -91,7 +91,7 @@ def check_stable(
     the two is that of a linear loop. After 0.4 s it must not be a hundred times what it was.
 
     Large errors: the setpoint of one joint after the other dashes at the full speed of its drive,
-    in bursts and in one run, and stands still at once, which saturates the drive. Within 2 s at rest
+    in bursts and in one run, and stands still at once, which saturates the drive. Within 2 s
     the error must come below half of the largest one on the way.
 
     Args:

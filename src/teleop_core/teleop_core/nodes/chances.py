@@ -1,0 +1,71 @@
+"""Chances: how long a process could have worked, by the system's accounts of its threads.
+
+On a busy machine a healthy thread may get no processor for a second. Who judges by the clock takes
+it for one that hangs; so the time for which it waited for a processor does not count here.
+"""
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+_LONGEST = 0.2
+"""Largest part of the time between two looks that counts [s]: who looks so late had no processor
+himself, or was stopped together with the process."""
+
+
+@dataclass(frozen=True)
+class _Account:
+    """Time that a thread ran, and waited for a processor [s]; whether it is ready to run."""
+
+    ran: float
+    waited: float
+    is_ready: bool
+
+
+class Chances:
+    """Time that a process had for its work from look to look.
+
+    Args:
+        pid: The process.
+        worker: Thread that does the work; what it ran counts in any case, as of a loop without end.
+            0: none in particular.
+    """
+
+    def __init__(self, pid: int, worker: int = 0) -> None:
+        self._folder, self._worker = Path(f"/proc/{pid}/task"), worker
+        self._last = time.monotonic()
+        self._accounts: dict[int, _Account] = {}
+
+    def look(self, threads: Iterable[int] | None = None) -> float:
+        """Time since the last look for which no thread waited for a processor [s].
+
+        Args:
+            threads: Those that matter; None for all of the process.
+        """
+        now = time.monotonic()
+        elapsed, self._last = min(now - self._last, _LONGEST), now
+        before, self._accounts = self._accounts, self._read(threads)
+        waited = ran = 0.0
+        for thread, account in self._accounts.items():
+            if thread not in before:
+                continue
+            got = account.ran - before[thread].ran
+            waits = account.is_ready and got <= 0.0  # its account is written when it runs again
+            waited = max(waited, elapsed if waits else account.waited - before[thread].waited)
+            ran = got if thread == self._worker else ran
+        return max(elapsed - waited, ran, 0.0)
+
+    def _read(self, threads: Iterable[int] | None) -> dict[int, _Account]:
+        found = {}
+        try:
+            names = [int(p.name) for p in self._folder.iterdir()] if threads is None else threads
+            for thread in names:
+                folder = self._folder / str(thread)
+                ran, waited, _ = map(int, (folder / "schedstat").read_text().split())
+                # The name, in parentheses, may hold anything.
+                state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+                found[thread] = _Account(1e-9 * ran, 1e-9 * waited, state == "R")
+        except (OSError, ValueError):  # a thread has ended, or the system keeps no accounts
+            pass
+        return found
