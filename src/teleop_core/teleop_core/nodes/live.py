@@ -153,6 +153,8 @@ class _Session:
             self._observer.listen(0.1)
             self._check_alive()
             for name in [name for name in waiting if self._observer.is_active(name)]:
+                if self._children[home[name]].doing != "at work":  # another session's node
+                    continue
                 waiting.remove(name)
                 self._say(f"{name} is ready")
             for line in progress.news():
