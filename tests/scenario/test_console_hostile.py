@@ -65,6 +65,9 @@ class Desk:
     def parameters(self):
         return {}
 
+    def changes(self):
+        return {}
+
     def change(self, node, name, value):
         self.asked.append(name)
         return ""

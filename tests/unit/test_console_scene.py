@@ -8,10 +8,11 @@ import trimesh
 
 import teleop_core as tc
 from teleop_core.bodies import Solid
-from teleop_core.console.body_nodes import AT_LIMIT, ROLES
+from teleop_core.console.body_nodes import ROLES
 from teleop_core.console.link import Arm, ArmView, View
+from teleop_core.console.look import GOOD, WRONG
 from teleop_core.console.meshes import mesh_of
-from teleop_core.console.outlines import FREE, TOUCHED, unit_outline
+from teleop_core.console.outlines import unit_outline
 from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
@@ -100,7 +101,7 @@ def test_a_fixture_is_red_where_its_wall_is_felt_and_green_elsewhere(server, lin
         scene, view = drawn(server, link, time)
         assert view.arms[""].state["is_fixture_on"]
         colors.append(tuple(scene.arms[""].outline.line.colors.tolist()))
-    assert colors == [TOUCHED, FREE]
+    assert colors == [WRONG, GOOD]
 
 
 def path_of(server, name):
@@ -196,9 +197,9 @@ def test_a_joint_at_its_limit_is_drawn_in_another_colour(server):
 
     at_limit = robot.start.copy()
     at_limit[1] = robot.upper[1]
-    assert AT_LIMIT not in colours(robot.start)
-    assert colours(at_limit) == {AT_LIMIT}
-    assert AT_LIMIT not in colours(robot.start)
+    assert WRONG not in colours(robot.start)
+    assert colours(at_limit) == {WRONG}
+    assert WRONG not in colours(robot.start)
 
 
 def test_two_arms_stand_beside_each_other_and_each_tip_is_where_it_was_measured(server, link):

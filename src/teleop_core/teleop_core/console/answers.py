@@ -9,6 +9,7 @@ import gzip
 import http
 import json
 import secrets
+from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -23,6 +24,8 @@ from teleop_core.console.look import style
 
 OWN_PAGE = "Teleop-Page"
 """Header of our page's requests; to a page of another origin browsers do not allow it."""
+PRESS = "Teleop-Press"
+"""Header with the name of a press: one that is said again, unanswered, is the same."""
 _SCRIPT = Path(__file__).with_name("page.js")
 _FURNITURE = b'<link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script></head>'
 
@@ -58,6 +61,7 @@ class Answers:
         self.stop: Callable[[], None] | None = None
         self._drivers = drivers
         self._pages: dict[str, int] = {}  # by names that no other page can guess
+        self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
         self._paths = {
             "/alive": self._alive, "/stop": self._stop, "/teleop.js": _script, "/teleop.css": _style
         }  # fmt: skip
@@ -102,7 +106,10 @@ class Answers:
             return _answer(http.HTTPStatus.FORBIDDEN)
         if self.stop is None:
             return _answer(http.HTTPStatus.CONFLICT)
-        self.stop()
+        press = next(iter(request.header(PRESS)), None)
+        if press is None or press not in self._heard:
+            self.stop()
+            self._heard.append(press)
         return _answer(http.HTTPStatus.NO_CONTENT)
 
 

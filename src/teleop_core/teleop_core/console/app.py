@@ -25,6 +25,7 @@ from teleop_core.console.visitors import Visitors
 RATE = 30.0
 """How often the page is drawn [1/s]."""
 _NICE = 10
+_ASK_AGAIN = 2.0  # [s]
 
 
 class Console:
@@ -82,7 +83,13 @@ class Console:
         self.scene.draw(view)
         self.stylus.draw(view)
         self.panel.draw(view)
+        self.panel.settings.follow(self._link.changes())
         self._visitors.look()
+
+    def _ask(self, is_over: Callable[[], bool]) -> None:
+        """Ask the nodes for their parameters until all of them have come up and answered."""
+        while not is_over() and not self.panel.settings.refresh():
+            time.sleep(_ASK_AGAIN)
 
     def _try_to_draw(self) -> None:
         """Draw; what fails is said once, and costs this drawing and not the session."""
@@ -97,8 +104,7 @@ class Console:
         """Draw until something is over; time that was lost is not made up for."""
         if self._link.is_live:
             give_way()
-        # Asking the nodes takes a moment.
-        threading.Thread(target=self.panel.settings.refresh, daemon=True).start()
+        threading.Thread(target=self._ask, args=(is_over,), daemon=True).start()
         due = time.monotonic()
         while not is_over():
             self._try_to_draw()

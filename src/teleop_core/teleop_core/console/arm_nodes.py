@@ -7,8 +7,9 @@ import numpy as np
 import viser
 
 from teleop_core.bodies import bodies_of
-from teleop_core.console.body_nodes import BodyNodes, Color, extent
+from teleop_core.console.body_nodes import BodyNodes, extent
 from teleop_core.console.link import Arm, ArmView, box_of
+from teleop_core.console.look import MEASURED, WANTED, Color
 from teleop_core.console.master_nodes import MasterNodes
 from teleop_core.console.meshes import mesh_of
 from teleop_core.console.outlines import OutlineNode
@@ -30,13 +31,11 @@ from teleop_core.topics import (
     Topic,
 )
 
-MEASURED: Color = (194, 55, 10)
-REFERENCE: Color = (66, 133, 244)
-"""Colours of paths."""
 Path = Callable[[Topic, str, float], tuple[Array, Array]]
 """From a topic, an arm and a length [s]: times (N,) [s] and rows (N, width) up to now."""
 _AT = 1e-3
 """Share of a joint's range next to its end that counts as at its limit."""
+_WORK, _GRIP = 0.05, 0.1  # room on all sides of a tip and of a stylus with its handles [m]
 _TOUCH = 0.05  # force of a wall that somebody touches [N]
 
 
@@ -68,7 +67,7 @@ class ArmNodes:
         self._ghost: BodyNodes | None = None
         self._is_ghost_shown = False
         self.measured = Tail(server, f"{self.path}/measured", MEASURED)
-        self.reference = Tail(server, f"{self.path}/reference", REFERENCE, 1.5)
+        self.reference = Tail(server, f"{self.path}/reference", WANTED, 1.5)
         self._axes = PUBLISHED_AXES
         self._stand = stand_beside(self._own_low, self._own_high, self._axes)
         self.master = MasterNodes(server, f"{self.path}/master", self._stand)
@@ -97,6 +96,13 @@ class ArmNodes:
         vertices = np.concatenate([mesh_of(solid)[0] for solid in DEVICE] + [REST[None, :3]])
         points = vertices @ self._stand.axes.T + self._stand.origin
         points = np.concatenate((points, self._own_low[None], self._own_high[None]))
+        return points.min(axis=0), points.max(axis=0)
+
+    def work(self) -> tuple[Array, Array]:
+        """Lowest and highest corner (3,) [m] of where tip and stylus work, in the page's axes."""
+        hand = self._stand.axes @ REST[:3] + self._stand.origin + np.array([0.0, self._side, 0.0])
+        tip, room = self.begin(), max(_WORK, 0.08 * self.bodies.size)
+        points = np.stack((hand - _GRIP, hand + _GRIP, tip - room, tip + room))
         return points.min(axis=0), points.max(axis=0)
 
     def tip(self) -> Array:

@@ -3,6 +3,7 @@
 import numpy as np
 import viser
 
+from teleop_core.console.look import WRONG
 from teleop_core.geometry import Array
 
 METRES_PER_NEWTON = 0.05
@@ -10,7 +11,6 @@ METRES_PER_NEWTON = 0.05
 _LEAST = 0.03
 """Force that is not drawn [N]; forces of the device are read in steps of some mN."""
 _STEP = 0.02  # change that is not drawn [N]
-_COLOR = (224, 49, 49)
 
 
 class ForceArrow:
@@ -24,7 +24,7 @@ class ForceArrow:
     def __init__(self, server: viser.ViserServer, name: str) -> None:
         self._frame = server.scene.add_frame(name, show_axes=False, visible=False)
         self._arrow = server.scene.add_arrows(
-            f"{name}/arrow", np.zeros((1, 2, 3), np.float32), _COLOR, shaft_radius=0.0025,
+            f"{name}/arrow", np.zeros((1, 2, 3), np.float32), WRONG, shaft_radius=0.0025,
             head_radius=0.006, head_length=0.014,
         )  # fmt: skip
         self._label = server.scene.add_label(

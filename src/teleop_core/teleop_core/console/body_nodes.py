@@ -7,18 +7,16 @@ import numpy as np
 import viser
 
 from teleop_core.bodies import Bodies, Role, Solid
+from teleop_core.console.look import WANTED, WRONG, Color
 from teleop_core.console.meshes import merged, mesh_of
 from teleop_core.console.poses import moved, set_pose
 from teleop_core.geometry import Array, rotations_from_quaternions
 
-Color = tuple[int, int, int]
 ROLES: Mapping[Role, Color] = MappingProxyType({
     "base": (96, 108, 122), "link": (196, 204, 212), "joint": (52, 112, 176),
     "leg": (150, 162, 176), "platform": (120, 140, 160), "tool": (214, 130, 40),
 })  # fmt: skip
 """Colours of solids, readable on light and on dark ground."""
-GHOST: Color = (66, 133, 244)
-AT_LIMIT: Color = (224, 49, 49)
 
 
 class BodyNodes:
@@ -66,7 +64,7 @@ class BodyNodes:
         bodies = frozenset(self._bodies.joint_body[joint] for joint in joints)
         for body in bodies ^ self._marked:
             for role, mesh in self._meshes[body].items():
-                mesh.color = AT_LIMIT if body in bodies else ROLES[role]
+                mesh.color = WRONG if body in bodies else ROLES[role]
         self._marked = bodies
 
     def show_axes(self, *, is_shown: bool) -> None:
@@ -76,16 +74,21 @@ class BodyNodes:
 
 
 def add_solids(
-    server: viser.ViserServer, path: str, solids: tuple[Solid, ...], *, is_ghost: bool = False
+    server: viser.ViserServer,
+    path: str,
+    solids: tuple[Solid, ...],
+    *,
+    is_ghost: bool = False,
+    opacity: float | None = None,
 ) -> dict[Role, viser.MeshHandle]:
-    """Add solids below a node: one mesh for each role among them."""
+    """Add solids below a node: one mesh for each role among them; an opacity of None is opaque."""
     meshes = {}
     for role in dict.fromkeys(solid.role for solid in solids):
         parts = [mesh_of(solid) for solid in solids if solid.role == role]
         vertices, faces = merged(parts)
         meshes[role] = server.scene.add_mesh_simple(
             f"{path}/{role}", vertices.astype(np.float32), faces.astype(np.uint32),
-            color=GHOST if is_ghost else ROLES[role], opacity=0.3 if is_ghost else None,
+            color=WANTED if is_ghost else ROLES[role], opacity=0.3 if is_ghost else opacity,
             cast_shadow=False, receive_shadow=False,
         )  # fmt: skip
     return meshes

@@ -12,10 +12,11 @@ FIELD = np.radians(45.0)
 """Vertical field of view of all cameras [rad]."""
 _FROM = np.array([-0.80, -0.42, 0.48])
 """Direction from what is seen to the first camera: behind the arm, over its right shoulder."""
-_WIDE, _HIGH = 0.875, 0.8
+_WIDE, _HIGH = 0.875, 0.8  # parts of a picture that may be filled across and upwards
 ASPECT = 1.2
 """Width over height of a wide window with the panel beside it."""
-"""Parts of a square picture that may be filled across and upwards: windows are rarely narrower."""
+_PHONE = 0.75  # width over height below which the panel covers the lower part
+_CLEAR = (0.5, 0.3)  # middle and half height of what is clear then, of half the picture, upwards
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,7 @@ class Camera:
 
 
 def around(low: Array, high: Array, aspect: float = ASPECT) -> Camera:
-    """Camera that sees a box as a whole.
+    """Camera that sees a box as a whole, beside the panel or, on a phone, above it.
 
     Args:
         low: Lowest corner of the box (3,) [m].
@@ -65,10 +66,11 @@ def around(low: Array, high: Array, aspect: float = ASPECT) -> Camera:
     corners = np.array(list(product(*zip(low, high, strict=True)))) - middle
     right, down, into = (corners @ turn).T
     half = np.tan(0.5 * FIELD)
-    needed = (
-        np.maximum(np.abs(right) / (_WIDE * aspect * half), np.abs(down) / (_HIGH * half)) - into
-    )
-    return Camera(middle + float(needed.max()) * direction, middle, up)
+    shift, clear = _CLEAR if aspect < _PHONE else (0.0, 1.0)
+    across, upwards = _WIDE * aspect * half, _HIGH * clear * half
+    distance = float((np.maximum(np.abs(right) / across, np.abs(down) / upwards) - into).max())
+    middle = middle + shift * half * distance * turn[:, 1]
+    return Camera(middle + distance * direction, middle, up)
 
 
 def from_tool(pose: Array, size: float) -> Camera:

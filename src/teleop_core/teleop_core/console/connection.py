@@ -41,6 +41,9 @@ class Connection(ws.ServerConnection):
         opening: Connections of the same server that are no page yet, the oldest first.
         arguments: As the library gives them.
         options: As the library gives them.
+
+    Attributes:
+        silent_until: Time of the loop until which its page is told nothing more [s].
     """
 
     def __init__(
@@ -49,6 +52,7 @@ class Connection(ws.ServerConnection):
         super().__init__(*arguments, **options)
         self._gate, self._opening, self._budget = gate, opening, Budget()
         self._is_cut = False
+        self.silent_until = 0.0
 
     def connection_made(self, transport: Any) -> None:
         """Begin; the oldest that is still opening gives way if there are too many."""

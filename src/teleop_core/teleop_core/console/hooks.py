@@ -37,6 +37,7 @@ from teleop_core.errors import SessionError
 
 PAGES = 16
 """Pages that may be open at once; the youngest that does not drive gives way."""
+_NOTICE = 5.0  # for which a page is told something, and nothing else [s]
 _STARTING = threading.Lock()
 
 Answer = Callable[[ws.ServerConnection, Request], Response | None]
@@ -144,6 +145,9 @@ class Server(viser.ViserServer):
         passed, reason = self.filter.judge(page, data)
         if reason in {WATCHES, NO_VALUE}:
             self._put_back(page, data)
+        if reason == WATCHES and connection.loop.time() > connection.silent_until:
+            connection.silent_until = connection.loop.time() + _NOTICE
+            self._notify(page, "You watch. Take control first.")
         return passed
 
     def cut(self, connection: Connection) -> None:
@@ -160,6 +164,11 @@ class Server(viser.ViserServer):
     def _page(self, connection: Connection) -> int:
         live = self._websock_server._live_connections
         return next((page for page, known in live.items() if known is connection), -1)
+
+    def _notify(self, page: int, text: str) -> None:
+        client = self._connected_clients.get(page)
+        if client is not None:
+            client.add_notification("Not done", text, auto_close_seconds=_NOTICE, color="yellow")
 
     def _put_back(self, page: int, data: Data) -> None:
         """Show the value of an element again that a page could not change."""

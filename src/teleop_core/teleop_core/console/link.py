@@ -134,6 +134,9 @@ class Link(Protocol):
     def parameters(self) -> Parameters:
         """All parameters of all nodes by node and name, as they were when last asked for."""
 
+    def changes(self) -> Mapping[tuple[str, str], Setting]:
+        """Parameters that anybody has changed since the last call, by node and name."""
+
     def change(self, node: str, name: str, value: Setting) -> str:
         """Set a parameter; returns why it was refused, empty if it was taken."""
 

@@ -28,9 +28,9 @@ TARGET: Color = (230, 150, 30)
 
 # -- ground
 
-LIGHT: Color = (246, 247, 248)
-DARK: Color = (21, 24, 27)
-"""Ground behind the scene."""
+LIGHT: Color = (255, 255, 255)
+DARK: Color = (20, 20, 20)
+"""Ground behind the scene: viser's."""
 GRID: Color = (196, 202, 208)
 GRID_DARK: Color = (52, 58, 64)
 """Lines of the floor: there, and no more."""
@@ -52,10 +52,12 @@ _STYLE = """\
 :root { VARIABLES; --t-stop: #d6001c; --t-small: 12px; --t-text: 13px; --t-head: 16px; }
 :root[data-mantine-color-scheme="dark"] { DARK_VARIABLES; }
 body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
-.t-status { padding: 8px 14px; color: var(--t-color-text); font-size: var(--t-small);
-  height: 9.5em; overflow-y: auto; overflow-wrap: anywhere; line-height: 1.45;
+.t-status { padding: 4px 14px; color: var(--t-color-text); font-size: var(--t-small);
+  box-sizing: border-box; height: 140px; overflow-y: auto; overflow-wrap: anywhere;
+  line-height: 18px;
   border-bottom: 1px solid var(--t-color-line); margin-bottom: 6px; }
-.t-status b { font-size: var(--t-head); font-weight: 600; }
+.t-role { margin: 8px 14px 0; font-weight: 600; }
+.t-status b { font-size: var(--t-head); font-weight: 600; line-height: 24px; }
 .t-status p { margin: 0; } .t-muted { color: var(--t-color-muted); }
 .t-good { color: var(--t-color-good); } .t-held { color: var(--t-color-held); }
 .t-wrong { color: var(--t-color-wrong); } .t-idle { color: var(--t-color-idle); }
@@ -63,12 +65,13 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
   display: flex; flex-direction: column; gap: 8px; font: inherit; }
 #t-safety[hidden] { display: none; }
 #t-stop { height: 56px; border: 0; border-radius: 6px; background: var(--t-stop); color: #fff;
-  font: 700 18px/1 inherit; font-family: inherit; letter-spacing: 0.02em; cursor: pointer;
+  font-family: inherit; font-size: 18px; font-weight: 700; letter-spacing: 0.02em; cursor: pointer;
   box-shadow: 0 1px 4px rgba(0,0,0,.3); touch-action: manipulation; user-select: none; }
 #t-stop:hover { filter: brightness(1.08); } #t-stop:active { filter: brightness(0.85); }
 #t-stop:focus-visible { outline: 3px solid var(--t-color-text); outline-offset: 2px; }
-#t-banner { display: none; position: fixed; top: 0; left: 0; right: 0; z-index: 10001;
-  padding: 10px 16px; background: var(--t-stop); color: #fff; font-size: var(--t-head); }
+#t-banner { display: none; position: fixed; top: 0; left: 0; z-index: 10001;
+  box-sizing: border-box; padding: 10px 16px; font-size: var(--t-head); line-height: 1.4;
+  background: var(--t-stop); color: #fff; }
 #t-banner b { font-weight: 700; margin-right: 0.6em; }
 .t-says #t-banner { display: block; }
 .t-stopped #t-stop { background: #fff; color: var(--t-stop); border: 3px solid var(--t-stop); }

@@ -5,13 +5,14 @@ import viser
 
 from teleop_core.console.arrows import ForceArrow
 from teleop_core.console.body_nodes import add_solids
+from teleop_core.console.look import HAND
 from teleop_core.console.outlines import OutlineNode
 from teleop_core.console.poses import move
 from teleop_core.console.stand import DEVICE, REST, STYLUS, Stand
 from teleop_core.console.tails import Tail
 from teleop_core.geometry import Array
 
-_HAND = (112, 72, 190)
+_DIM = 0.35  # of the device, behind which the handles of the stylus are seen
 
 
 class MasterNodes:
@@ -29,14 +30,14 @@ class MasterNodes:
             path, show_axes=False, axes_length=0.05, axes_radius=0.002, wxyz=stand.quaternion,
             position=stand.origin,
         )  # fmt: skip
-        add_solids(server, path, DEVICE)
+        add_solids(server, path, DEVICE, opacity=_DIM)
         self.stylus = server.scene.add_frame(
             f"{path}/stylus", show_axes=False, axes_length=0.04, axes_radius=0.0015,
             wxyz=REST[3:], position=REST[:3],
         )  # fmt: skip
         add_solids(server, f"{path}/stylus", STYLUS)
         self.outline = OutlineNode(server, f"{path}/fixture", np.array([1.0, 0.0, 0.0, 0.0]))
-        self.tail = Tail(server, f"{path}/path", _HAND, 1.5)
+        self.tail = Tail(server, f"{path}/path", HAND, 1.5)
         self._force = ForceArrow(server, f"{path}/force")
 
     def stand(self, stand: Stand) -> None:

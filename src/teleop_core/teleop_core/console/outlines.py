@@ -5,13 +5,12 @@ from functools import cache
 import numpy as np
 import viser
 
+from teleop_core.console.look import GOOD, WRONG
 from teleop_core.errors import TeleopError
 from teleop_core.fixtures import FIXTURES
 from teleop_core.fixtures.box import BOX
 from teleop_core.geometry import Array
 
-FREE, TOUCHED = (43, 138, 62), (224, 49, 49)
-"""Colours of a fixture: nobody touches it, somebody does."""
 _STILL = 5e-5  # [m]
 
 
@@ -69,7 +68,7 @@ class OutlineNode:
             size: From end to end (3,) [m] along the master's axes.
             is_touched: Whether somebody stands at its wall.
         """
-        color = TOUCHED if is_touched else FREE
+        color = WRONG if is_touched else GOOD
         if self.line is None or kind != self._kind:
             self.line = self._server.scene.add_line_segments(
                 self._name, unit_outline(kind).astype(np.float32), color, thickness=2.0,

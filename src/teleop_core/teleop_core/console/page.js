@@ -7,8 +7,8 @@
   const PERIOD = 1000, AGAIN = 200, TRIES = 50; // ms, ms, number
   let connected = true, pressed = false, shown = {};
 
-  const ask = (path) => fetch(path, {
-    headers: { 'Teleop-Page': window.teleopPage || 'new' }, cache: 'no-store',
+  const ask = (path, more = {}) => fetch(path, {
+    headers: { 'Teleop-Page': window.teleopPage || 'new', ...more }, cache: 'no-store',
     signal: AbortSignal.timeout(2000),
   });
   const wait = (time) => new Promise((done) => setTimeout(done, time));
@@ -39,15 +39,18 @@
       banner.replaceChildren(strong, text);
     }
     safety.hidden = !shown.can_stop;
+    const seen = document.querySelector('canvas')?.getBoundingClientRect();
+    if (seen) banner.style.width = `${seen.width}px`; // the panel beside it stays in view
   }
 
   async function press() {
     if (!shown.can_stop || pressed === true) return;
     pressed = true;
     show();
+    const name = crypto.getRandomValues(new Uint32Array(2)).join('-'); // said again, it is one press
     for (let i = 0; i < TRIES; i++) {
       try {
-        if ((await ask('stop')).ok) { await look(); pressed = false; return; }
+        if ((await ask('stop', { 'Teleop-Press': name })).ok) { await look(); pressed = false; return; }
       } catch { /* asked again */ }
       if (i === 4) { pressed = 'unheard'; show(); }
       await wait(AGAIN);

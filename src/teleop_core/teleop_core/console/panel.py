@@ -106,7 +106,7 @@ class Panel:
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             client = -1 if event.client_id is None else event.client_id
             if action != self._take and not self._may_drive(client):
-                return  # the filter has refused others already; control may have changed since
+                return  # the filter has refused and told others; control has changed since
             if acts.acquire(blocking=False):  # what is pressed while it works is not done again
                 try:
                     action(client)

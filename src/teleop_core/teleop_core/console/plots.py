@@ -8,10 +8,10 @@ import viser
 from viser import uplot
 
 from teleop_core.console.history import SPAN, History
+from teleop_core.console.look import CURVES
 from teleop_core.geometry import Array
 
 _PERIOD = 0.25  # between two drawings [s]
-_COLORS = ("#4c78a8", "#f58518", "#54a24b", "#b279a2", "#9d755d", "#e45756")
 _POINTS = 400  # in a curve: more than the panel has pixels
 
 
@@ -61,7 +61,7 @@ class Plots:
         for dashed in (False, True) if is_pair else (False,):
             series += [
                 uplot.Series(
-                    label=f"{label} wanted" if dashed else label, stroke=_COLORS[i], width=1.5,
+                    label=f"{label} wanted" if dashed else label, stroke=CURVES[i], width=1.5,
                     dash=(6.0, 4.0) if dashed else (),
                 )
                 for i, label in enumerate(labels[:count])

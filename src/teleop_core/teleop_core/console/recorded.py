@@ -177,6 +177,10 @@ class RecordedLink:
     def press(self, *, is_pressed: bool) -> None:
         """Nothing: there is nothing to stop."""
 
+    def changes(self) -> dict[tuple[str, str], Setting]:
+        """None: what is recorded stays."""
+        return {}
+
     def change(self, node: str, name: str, value: Setting) -> str:
         """Refused."""
         del node, name, value

@@ -8,14 +8,12 @@ import viser
 from teleop_core.console.arm_nodes import ArmNodes, Path
 from teleop_core.console.cameras import ASPECT, FIELD, Camera, around, from_tool, microscope
 from teleop_core.console.link import Arm, Parameters, View
+from teleop_core.console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
 from teleop_core.console.stand import PUBLISHED_AXES
 from teleop_core.console.targets import targets_of
 from teleop_core.errors import TeleopError
 from teleop_core.geometry import Array
 from teleop_core.mapping.parameters import axis_map
-
-LIGHT, DARK = (255, 255, 255), (20, 20, 20)
-"""Ground of the page, light and dark."""
 
 
 class Scene:
@@ -79,7 +77,7 @@ class Scene:
         """Show the points of a task in the hand's space, as balls of 2 mm."""
         if len(points):
             self._server.scene.add_point_cloud(
-                f"{nodes.master.path}/targets", points, colors=(230, 150, 30), point_size=0.002,
+                f"{nodes.master.path}/targets", points, colors=TARGET, point_size=0.002,
                 point_shape="circle",
             )  # fmt: skip
 
@@ -108,10 +106,19 @@ class Scene:
 
     def set_dark(self, *, is_dark: bool) -> None:
         """Take the colours for a dark page, or a light one."""
+        ground = DARK if is_dark else LIGHT
+        self._floor.cell_color = self._floor.section_color = GRID_DARK if is_dark else GRID
         for nodes in self.arms.values():
-            nodes.set_background(DARK if is_dark else LIGHT)
+            nodes.set_background(ground)
 
     # -- cameras ---------------------------------------------------------------------------------
+
+    def work(self, aspect: float = ASPECT) -> Camera:
+        """Camera that sees the work: all tips and styli with the room that they need."""
+        boxes = [nodes.work() for nodes in self.arms.values()]
+        low = np.min([low for low, _ in boxes], axis=0)
+        high = np.max([high for _, high in boxes], axis=0)
+        return around(low, high, aspect)
 
     def whole(self, aspect: float = ASPECT) -> Camera:
         """Camera that sees all arms and their masters; ``aspect``: width over height."""
@@ -147,15 +154,15 @@ class Scene:
         wide = 2.5 * float((high - low)[:2].max())
         cell = 10.0 ** np.floor(np.log10(wide / 5.0))
         middle = 0.5 * (low + high)
-        self._server.scene.add_grid(
+        self._floor = self._server.scene.add_grid(
             "/ground", wide, wide, cell_size=cell, section_size=5.0 * cell,
-            cell_color=(150, 150, 150), section_color=(125, 125, 125), cell_thickness=0.6,
+            cell_color=GRID, section_color=GRID, cell_thickness=0.5,
             section_thickness=1.0, fade_distance=2.5 * wide, shadow_opacity=0.0,
             position=(middle[0], middle[1], low[2] - 1e-3),
         )  # fmt: skip
 
     def _begin(self) -> None:
-        first, camera = self.whole(), self._server.initial_camera
+        first, camera = self.work(), self._server.initial_camera
         camera.fov, camera.up = FIELD, first.up
         camera.position, camera.look_at = first.position, first.look_at
 

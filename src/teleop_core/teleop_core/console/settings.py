@@ -1,7 +1,7 @@
 """Settings: every parameter of the session as a control, with its unit, bounds and meaning."""
 
 import ast
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -52,6 +52,7 @@ class SettingsPanel:
         self._told = self._gui.add_markdown("parameters are being asked for …")
         self._choice = self._gui.add_dropdown("show", ("most used",), hint="stage and group")
         self._folder = self._gui.add_folder("values")
+        self._by_key: dict[tuple[str, str], Any] = {}
         self._controls: list[viser.GuiInputHandle | viser.GuiMarkdownHandle] = []  # type: ignore[type-arg]
         with self._gui.add_folder("fixed while it runs", visible=False) as self._pending:
             self._list = self._gui.add_markdown("")
@@ -63,17 +64,36 @@ class SettingsPanel:
         """Call a function with all parameters whenever some of them are other ones."""
         self._listeners.append(listener)
 
-    def refresh(self) -> None:
-        """Ask the nodes anew, and show what they say; takes a moment."""
+    def refresh(self) -> bool:
+        """Ask the nodes anew, and show what they say; takes a moment.
+
+        Returns:
+            Whether they say as much as when they were asked before: all of them have come up.
+        """
+        before = self.known.keys()
         try:
             self._know({**self._of_session, **self._link.parameters()})
         except TeleopError as error:
             self._told.content = f"**{error}**"
-            return
+            return False
+        if self.known.keys() == before:
+            return len(before) > len(self._of_session)
         groups = sorted({_group(*key) for key in self.known})
         self._choice.options = ("most used", *groups)
         self._told.content = f"{len(self.known)} parameters; hover over a name for its meaning"
         self._show()
+        return False
+
+    def follow(self, changes: Mapping[tuple[str, str], Setting]) -> None:
+        """Show values that anybody has changed: a button of the stylus, a program, another page."""
+        known = {key: value for key, value in changes.items() if key in self.known}
+        if not known:
+            return
+        new = {key: replace(self.known[key], value=value) for key, value in known.items()}
+        self._know({**self.known, **new})
+        for key, value in known.items():
+            if (control := self._by_key.get(key)) is not None and control.value != _shown(value):
+                control.value = _shown(value)
 
     def _know(self, known: Parameters) -> None:
         self.known = known
@@ -89,6 +109,7 @@ class SettingsPanel:
         for control in self._controls:
             control.remove()
         self._controls.clear()
+        self._by_key.clear()
         self._folder.label = chosen
         with self._folder:
             for key in keys:
@@ -101,8 +122,9 @@ class SettingsPanel:
         wanted = self._wanted.get((info.node, info.name), info.value)
         control = _control(self._gui, f"{arm} {label}".strip(), replace(info, value=wanted))
         why = self._gui.add_markdown("", visible=False)
-        self._controls += [control, why]
         key = info.node, info.name
+        self._controls += [control, why]
+        self._by_key[key] = control
 
         @control.on_update
         def _(event: viser.GuiEvent) -> None:  # type: ignore[type-arg]

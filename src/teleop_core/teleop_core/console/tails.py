@@ -3,9 +3,9 @@
 import numpy as np
 import viser
 
+from teleop_core.console.look import Color
 from teleop_core.geometry import Array
 
-Color = tuple[int, int, int]
 LENGTH = 10.0
 """Time that a tail shows [s]."""
 PERIOD = 0.25

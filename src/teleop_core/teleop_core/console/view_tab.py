@@ -21,6 +21,7 @@ class ViewTab:
         self._server, self._scene = server, scene
         gui = server.gui
         with gui.add_folder("camera"):
+            self._camera("Work", "tips and styli, as near as they fit", scene.work)
             self._camera("Whole", "all arms and their masters", scene.whole)
             self._camera("From the tool", "as the tool of the first arm sees it now", scene.tool)
             self._camera("Microscope", "fixed, over where the tip starts", scene.microscope)

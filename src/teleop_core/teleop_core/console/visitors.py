@@ -21,17 +21,17 @@ class Visitors:
 
     def __init__(self, server: viser.ViserServer, drivers: Drivers, scene: Scene) -> None:
         self._server, self._drivers, self._scene = server, drivers, scene
-        self._lines: dict[int, viser.GuiMarkdownHandle] = {}
+        self._lines: dict[int, viser.GuiHtmlHandle] = {}
         self._fitted: dict[int, tuple[float, float]] = {}  # since when, for which picture
 
     def look(self) -> None:
         """Welcome who has come, and tell everybody whether he drives or watches."""
         clients = self._server.get_clients()
         for number, client in clients.items():
-            text = f"**{self._drivers.role(number)}**"
+            text = f'<p class="t-role">{self._drivers.role(number)}</p>'
             self._fit(number, client)
             if number not in self._lines:
-                self._lines[number] = client.gui.add_markdown(text, order=-10.0)
+                self._lines[number] = client.gui.add_html(text, order=-10.0)
             elif self._lines[number].content != text:
                 self._lines[number].content = text
         for number in self._lines.keys() - clients.keys():
@@ -42,7 +42,7 @@ class Visitors:
         now, aspect = time.monotonic(), client.camera.aspect
         since, known = self._fitted.get(number, (now, 0.0))
         if abs(aspect - known) > 0.02 * aspect and now - since < _SETTLING:
-            self._scene.whole(aspect).give(client)
+            self._scene.work(aspect).give(client)
             self._fitted[number] = (since, aspect)
 
     def close(self) -> None:

@@ -28,7 +28,7 @@ from teleop_core.graph import RECORDER_NAME
 from teleop_core.nodes.display import SEEN, displayed
 from teleop_core.nodes.observer import WARNING, Status
 from teleop_core.nodes.operation import StopButton
-from teleop_core.nodes.parameter_client import ParameterClient, call
+from teleop_core.nodes.parameter_client import ParameterClient, ParameterEvents, call
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.operation import operation_text
 from teleop_core.robots import load_robot_set
@@ -116,7 +116,7 @@ class LiveLink:
         self._lock = threading.Lock()
         self._button = StopButton(self._node)
         self._clients: dict[str, Any] = {}
-        self._client = ParameterClient(self._node)
+        self._client, self._events = ParameterClient(self._node), ParameterEvents(self._node)
         self._known: dict[tuple[str, str], ParameterInfo] = {}
         self._statuses: dict[str, Status] = {}
         self._reports = Subscription(self._node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
@@ -290,6 +290,10 @@ class LiveLink:
                 found |= {(node, name): info for name, info in self._client.read(node).items()}
         self._known = found
         return MappingProxyType(found)
+
+    def changes(self) -> dict[tuple[str, str], Setting]:
+        """Parameters that anybody has changed since the last call, by node and name."""
+        return self._events.take()
 
     def change(self, node: str, name: str, value: Setting) -> str:
         """Set a parameter; returns why it was refused, empty if it was taken."""

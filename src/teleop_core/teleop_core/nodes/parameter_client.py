@@ -1,13 +1,15 @@
 """Parameter client: what the parameters of other nodes are, what they may be, and setting them."""
 
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor, ParameterType
+from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent, ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import qos_profile_parameter_events
 
 from teleop_core.console.link import ParameterInfo, Setting
 from teleop_core.errors import SessionError
@@ -17,6 +19,35 @@ PATIENCE = 3.0
 _LARGEST = 1e18
 _ONE_OF = "one of "
 _HIDDEN = ("use_sim_time", "qos_overrides", "start_type_description_service", "configuration")
+
+
+class ParameterEvents:
+    """Changes of parameters that nodes tell; an executor of the caller's must be spinning.
+
+    Args:
+        node: Node that hears them.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._lock = threading.Lock()
+        self._changed: dict[tuple[str, str], Setting] = {}
+        profile = qos_profile_parameter_events
+        self._own = node.create_subscription(
+            ParameterEvent, "/parameter_events", self._hear, profile
+        )
+
+    def take(self) -> dict[tuple[str, str], Setting]:
+        """Newest values of what has changed since the last call, by node and name."""
+        with self._lock:
+            taken, self._changed = self._changed, {}
+        return taken
+
+    def _hear(self, event: ParameterEvent) -> None:
+        found = (*event.new_parameters, *event.changed_parameters)
+        with self._lock:
+            for one in found:
+                value = _plain(parameter_value_to_python(one.value))
+                self._changed[event.node.strip("/"), one.name] = value
 
 
 class ParameterClient:
