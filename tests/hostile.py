@@ -260,3 +260,6 @@ HOSTILE = (
     keeps_another_page_alive, reads_files, drives_to_where_no_stylus_is,
 )  # fmt: skip
 """All that must not even be noticed by the arm."""
+
+STOPPING = (opens_sockets_and_says_nothing, opens_pages_that_never_come_up)
+"""Those of them in which somebody presses the stop."""

@@ -24,10 +24,11 @@ CAMERA = {
 
 
 class PageClient:
-    """A page at a port; ``elements`` are viser's by what stands on them, ``gizmos`` their names."""
+    """A page at a port; ``elements`` are viser's by what stands on them, ``gizmos`` their names,
+    ``status`` is what it says of the session."""
 
     def __init__(self, port, *, comes_up=True):
-        self.port, self.name = port, ""
+        self.port, self.name, self.status = port, "", ""
         self.elements, self.gizmos, self.commands, self.values = {}, [], {}, {}
         self.socket = connect(
             f"ws://127.0.0.1:{port}/", origin=f"http://127.0.0.1:{port}", compression=None,
@@ -99,6 +100,9 @@ class PageClient:
 
     def _take(self, message):
         kind = message["type"]
+        content = message.get("updates", message.get("props", {})).get("content", "")
+        if "t-status" in content:
+            self.status = content
         if kind == "TransformControlsMessage":
             self.gizmos.append(message["name"])
         elif kind == "RegisterCommandMessage":

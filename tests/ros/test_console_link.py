@@ -73,6 +73,15 @@ def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(li
     wait_until(lambda: link.command("enable")[0], "enabled")
 
 
+def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_parameter(live):
+    _, link, _ = live
+    wait_until(lambda: state(link) == "ENABLED", "enabled")
+    for mode in ("fine", "coarse"):
+        link.changes()
+        link.press_button("", "mode")
+        wait_until(lambda mode=mode: link.changes().get(("motion_scaling", "mode")) == mode, mode)
+
+
 def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(live):
     _, link, _ = live
     known = link.parameters()

@@ -1,98 +1,28 @@
 """Hostile pages: nothing that they send moves an arm that they do not drive, or stops the stop."""
 
 import logging
-import threading
-import time
 
-import numpy as np
 import pytest
 
 pytest.importorskip("viser")
 
 import hostile
 from browser import until
+from desk import Desk, shown
 from page_client import PageClient, ask
-from teleop_core.console.app import Console
 from teleop_core.console.filter import BURST, FLOOD
-from teleop_core.console.link import Arm, ArmView, View
 from teleop_core.console.server import ConsoleServer
-from teleop_core.operation import State
-from teleop_core.robots import load_robot_set
-from teleop_core.topics import MASTER_MEASURED_CP, OPERATION
 
-POSE = np.array([0.0, -0.0655, -0.0881, 1.0, 0.0, 0.0, 0.0])
-
-
-class Desk:
-    """A session of one arm that writes down what the page asks of it."""
-
-    title, is_live = "desk", True
-
-    def __init__(self):
-        self.arms = (Arm("", load_robot_set("rcrt1", ())),)
-        self.asked, self.stops = [], 0
-        self.obeys = threading.Event()
-        self.obeys.set()
-        arm = ArmView({MASTER_MEASURED_CP.name: POSE}, {}, {}, dict.fromkeys(OPERATION, 0.0), "-")
-        arm.operation |= {"state": float(State.ENABLED), "is_homed": 1.0, "fault_joint": -1.0}
-        self._view = View(arms={"": arm}, is_fresh=True)
-
-    def view(self):
-        self._view.time = time.monotonic()
-        return self._view
-
-    def press(self, *, is_pressed):
-        if is_pressed:
-            self.stops += 1
-        else:
-            self.asked.append("release")
-
-    def command(self, word, arm=""):
-        self.obeys.wait(60)
-        self.asked.append(word)
-        return True, word
-
-    def hold(self, arm, pose):
-        assert np.shape(pose) == (7,)
-        self.asked.append("hold")
-
-    def let_go(self, arm):
-        pass
-
-    def press_button(self, arm, name):
-        self.asked.append(name)
-
-    def parameters(self):
-        return {}
-
-    def changes(self):
-        return {}
-
-    def change(self, node, name, value):
-        self.asked.append(name)
-        return ""
-
-    def save(self, name):
-        self.asked.append("save")
+# viser warns of what is queued for a page that leaves at this moment.
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a")
 
 
 @pytest.fixture(scope="module")
 def served():
     """A page of a desk, drawn as the command draws it, and whoever drives it."""
-    desk = Desk()
-    ends = threading.Event()
-    with ConsoleServer(0) as server:
-        console = Console(server, desk)
-        drawing = threading.Thread(target=console.run, args=(ends.is_set,))
-        drawing.start()
-        try:
-            with PageClient(server.port) as driver:
-                until(lambda: server.drivers.driver is not None, "it drives")
-                yield server, desk, driver
-                assert drawing.is_alive()
-        finally:
-            ends.set()
-            drawing.join()
+    with shown(Desk()) as (server, desk), PageClient(server.port) as driver:
+        until(lambda: server.drivers.driver is not None, "it drives")
+        yield server, desk, driver
 
 
 @pytest.mark.parametrize("attack", hostile.HOSTILE, ids=lambda attack: attack.__name__)

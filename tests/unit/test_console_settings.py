@@ -2,12 +2,15 @@
 
 import pytest
 
+from desk import Desk
 from teleop_core.console.link import ParameterInfo
-from teleop_core.console.settings import _parsed, _shown, _text
+from teleop_core.console.server import ConsoleServer
+from teleop_core.console.settings import SettingsPanel, _parsed, _shown, _text
 from teleop_core.parameters import specs, values_of
 from teleop_core.plain_yaml import parse
 from teleop_core.session.layers import declared_groups
 
+MODE, GAIN = ("motion_scaling", "mode"), ("motion_scaling", "fine_gain")
 EVERY = [
     (name, spec.name, values_of(group())[spec.name])
     for name, group in declared_groups().items()
@@ -39,3 +42,22 @@ def test_lists_are_read_as_people_write_them(shown, present, wanted):
 def test_a_setting_text_is_read_by_the_session_as_the_value(value):
     found = parse(_text(value)) if not isinstance(value, bool) else {"True": True}[_text(value)]
     assert (tuple(found) if isinstance(found, list) else found) == value
+
+
+def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back():
+    desk = Desk()
+    desk.known = {
+        MODE: ParameterInfo(*MODE, "coarse", choices=("coarse", "fine")),
+        GAIN: ParameterInfo(*GAIN, 0.1),
+    }
+    with ConsoleServer(0) as server:
+        settings = SettingsPanel(server.viser, desk, lambda _: True)
+        settings.refresh()
+        inputs = server.viser.gui._gui_input_handle_from_uuid.values()
+        shown = {handle.label: handle for handle in inputs}
+        heard = []
+        settings.on_change(heard.append)
+        settings.follow({MODE: "fine", ("elsewhere", "mode"): "coarse"})
+        assert shown["mode"].value == settings.known[MODE].value == "fine"
+        assert shown["fine_gain"].value == 0.1
+        assert heard == [settings.known]

@@ -25,8 +25,8 @@
   function show() {
     const [head, text] = pressed === 'unheard'
       ? ['STOP NOT CONFIRMED', 'The console does not answer. Use the emergency stop of the machine.']
-      : shown.is_stopped || pressed ? ['EMERGENCY STOP', shown.text || 'All arms are being stopped.']
       : !connected ? ['NO CONNECTION', 'What you see is old. The arm holds while nobody drives.']
+      : shown.is_stopped || pressed ? ['EMERGENCY STOP', shown.text || 'All arms are being stopped.']
       : ['', ''];
     const root = document.documentElement.classList;
     root.toggle('t-stopped', Boolean(shown.is_stopped || pressed));

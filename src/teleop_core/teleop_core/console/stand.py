@@ -67,6 +67,6 @@ def stand_beside(low: Array, high: Array, axes: Array) -> Stand:
     """
     vertices = np.concatenate([mesh_of(solid)[0] for solid in DEVICE]) @ axes.T
     own_low, own_high = vertices.min(axis=0), vertices.max(axis=0)
-    gap = 0.1 + 0.05 * float((high - low).max())
+    gap = 0.04 + 0.02 * float((high - low).max())
     middle = 0.5 * (low + high)[0] - 0.5 * (own_low + own_high)[0]
     return Stand(axes, np.array([middle, low[1] - gap - own_high[1], low[2] - own_low[2]]))

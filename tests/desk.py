@@ -1,0 +1,93 @@
+"""Desk: a page of a session that does nothing, to see what a page asks of it."""
+
+import threading
+import time
+from contextlib import contextmanager
+
+import numpy as np
+
+from teleop_core.console.app import Console
+from teleop_core.console.link import Arm, ArmView, View
+from teleop_core.console.server import ConsoleServer
+from teleop_core.operation import Fault, State, operation_text
+from teleop_core.robots import load_robot_set
+from teleop_core.topics import MASTER_MEASURED_CP, OPERATION
+
+POSE = np.array([0.0, -0.0655, -0.0881, 1.0, 0.0, 0.0, 0.0])
+
+
+class Desk:
+    """Link to an arm that stands still and writes down what the page asks of it.
+
+    Its state changes with the stop alone, and only if it ``is_stoppable``.
+    """
+
+    title, is_live = "desk", True
+
+    def __init__(self, *, is_stoppable=False):
+        self.is_stoppable = is_stoppable
+        self.arms = (Arm("", load_robot_set("rcrt1", ())),)
+        self.asked, self.stops, self.known = [], 0, {}
+        self.obeys = threading.Event()
+        self.obeys.set()
+        arm = ArmView({MASTER_MEASURED_CP.name: POSE}, {}, {}, dict.fromkeys(OPERATION, 0.0), "-")
+        arm.operation |= {"state": float(State.ENABLED), "is_homed": 1.0, "fault_joint": -1.0}
+        self._view = View(arms={"": arm}, is_fresh=True)
+
+    def view(self):
+        self._view.time, arm = time.monotonic(), self._view.arms[""]
+        arm.operation_text = operation_text(arm.operation)
+        return self._view
+
+    def press(self, *, is_pressed):
+        if is_pressed:
+            self.stops += 1
+        else:
+            self.asked.append("release")
+        if self.is_stoppable:
+            fault = {"state": State.FAULT, "fault": Fault.STOP, "is_stopped": is_pressed}
+            self.view().arms[""].operation |= {name: float(n) for name, n in fault.items()}
+
+    def command(self, word, arm=""):
+        self.obeys.wait(60)
+        self.asked.append(word)
+        return True, word
+
+    def hold(self, arm, pose):
+        assert np.shape(pose) == (7,)
+        self.asked.append("hold")
+
+    def let_go(self, arm):
+        pass
+
+    def press_button(self, arm, name):
+        self.asked.append(name)
+
+    def parameters(self):
+        return self.known
+
+    def changes(self):
+        return {}
+
+    def change(self, node, name, value):
+        self.asked.append(name)
+        return ""
+
+    def save(self, name):
+        self.asked.append("save")
+
+
+@contextmanager
+def shown(desk):
+    """Server of the page of a desk, drawn as the command draws it, and the desk."""
+    ends = threading.Event()
+    with ConsoleServer(0) as server:
+        console = Console(server, desk)
+        drawing = threading.Thread(target=console.run, args=(ends.is_set,))
+        drawing.start()
+        try:
+            yield server, desk
+            assert drawing.is_alive()
+        finally:
+            ends.set()
+            drawing.join()

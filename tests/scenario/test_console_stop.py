@@ -1,0 +1,91 @@
+"""The page's emergency stop: in view at any scroll, and seen by all pages when pressed."""
+
+import pytest
+
+pytest.importorskip("viser")
+
+from browser import Tab, until
+from desk import Desk, shown
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+STOP = """(() => {
+    const box = document.querySelector('#t-stop').getBoundingClientRect();
+    const at = (x, y) => document.elementFromPoint(x, y)?.id === 't-stop';
+    return box.height >= 44 && box.left >= 0 && box.right <= innerWidth && box.top >= 0
+        && box.bottom <= innerHeight && at(box.x + 5, box.y + 5)
+        && at(box.right - 5, box.bottom - 5);
+})()"""
+SCROLL = (
+    """document.querySelectorAll('*').forEach((e) => { e.scrollTop = SHARE * e.scrollHeight; })"""
+)
+STOPPED = "document.documentElement.classList.contains('t-stopped')"
+DEAD = """[...document.querySelectorAll('button')].filter((b) =>
+    ['Start', 'Pause', 'Home'].includes(b.innerText)).every((b) => b.disabled)"""
+
+
+@pytest.fixture(scope="module")
+def tab(tmp_path_factory):
+    with Tab(tmp_path_factory.mktemp("stop"), 390, 780) as opened:
+        yield opened
+
+
+@pytest.fixture(autouse=True)
+def _clean(tab):
+    """Each test begins with an empty tab and with no memory of errors."""
+    yield
+    tab.call("Page.navigate", url="about:blank")
+    tab.value("0")
+    tab.errors.clear()
+
+
+@pytest.mark.parametrize("size", [(390, 780), (780, 390), (1400, 900)])
+def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pressed(tab, size):
+    tab.resize(*size)
+    with shown(Desk(is_stoppable=True)) as (server, desk):
+        tab.visit(server.url)
+        tab.shows("ENABLED")
+        for share in (0.0, 0.5, 1.0):
+            tab.value(SCROLL.replace("SHARE", str(share)) + "; 0")
+            tab.until(STOP)
+        assert not tab.value(STOPPED)
+        tab.click("EMERGENCY STOP")
+        tab.until(STOPPED)
+        until(lambda: desk.stops == 1, "the stop is heard")
+        tab.shows("press Initialize")  # what to do next
+        tab.until(DEAD)
+        assert all(not handle.visible for handle in gizmos(server))
+        assert tab.value(STOP)  # it may be pressed again
+        tab.click("Release")
+        until(lambda: "release" in desk.asked, "it is released")
+        tab.shows("Released; the arms stay in FAULT")
+        assert not tab.faults()
+
+
+def gizmos(server):
+    """All styli's handles that the server shows."""
+    return list(server.viser.scene._handle_from_transform_controls_name.values())
+
+
+def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab):
+    with shown(Desk(is_stoppable=True)) as (server, desk):
+        tab.visit(server.url)
+        tab.shows("ENABLED")
+        tab.fill("name", "a")
+        tab.key(" ")
+        tab.value("document.activeElement.blur()")
+        assert desk.stops == 0
+        tab.click("Settings")  # the focus is on a button now, which space would press
+        tab.key(" ")
+        tab.until(STOPPED)
+        until(lambda: desk.stops == 1, "the stop is heard")
+
+
+def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_gone(tab):
+    with shown(Desk(is_stoppable=True)) as (server, desk):
+        tab.visit(server.url)
+        tab.shows("ENABLED")
+        desk.press(is_pressed=True)
+        tab.until(STOPPED)
+        desk.press(is_pressed=False)
+    tab.shows("NO CONNECTION")
