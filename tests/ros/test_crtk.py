@@ -1,9 +1,14 @@
 """CRTK: a stock client moves our arms, and the conformance test finds what is wrong with others."""
 
 import math
+import signal
+import socket
+import subprocess
+import sys
 import threading
 import time
-from contextlib import suppress
+from collections import deque
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -17,7 +22,7 @@ from std_msgs.msg import Empty
 
 from teleop_core.conformance import Verdict
 from teleop_core.nodes.children import free_domain
-from teleop_core.nodes.conformance import examine
+from teleop_core.nodes.conformance import examine, left_behind
 from teleop_core.nodes.conformance_arm import Arm
 
 crtk = pytest.importorskip("crtk_msgs.msg")
@@ -160,17 +165,20 @@ class ForeignArm(Node):
     def __init__(self, context, faults):
         super().__init__("foreign", context=context, use_global_arguments=False,
                          enable_rosout=False)  # fmt: skip
-        self.faults, self.state, self.q = faults, "ENABLED", [0.1, 0.2, 0.3]
+        self.faults, self.state, self.q = set(faults), "ENABLED", [0.1, 0.2, 0.3]
         self.goal, self.speed, self.busy_until = list(self.q), 0.5, 0.0
         best = ReliabilityPolicy.BEST_EFFORT
         quality = QoSProfile(depth=10, **({"reliability": best} if "qos" in faults else {}))
         if "no state" not in faults:
             self.states = self.create_publisher(crtk.OperatingState, "PSM/operating_state", 10)
         self.measured = self.create_publisher(JointState, "PSM/measured_js", quality)
+        self.setpoint = self.create_publisher(JointState, "PSM/setpoint_js", 10)
+        self.past, self.home = deque(maxlen=50), list(self.q)
         kind = JointState if "type" in faults else PoseStamped
         self.pose = self.create_publisher(kind, "PSM/measured_cp", 10)
         self.create_subscription(crtk.StringStamped, "PSM/state_command", self.command, 10)
         self.create_subscription(JointState, "PSM/move_jp", self.move, 10)
+        self.create_subscription(JointState, "PSM/servo_jp", self.servo, 10)
         self.create_timer(0.01, self.tick)
 
     def command(self, message):
@@ -183,6 +191,25 @@ class ForeignArm(Node):
         if self.state == "ENABLED" or "moves paused" in self.faults:
             self.goal = list(message.position)
             self.busy_until = time.monotonic() + 0.15
+
+    def servo(self, message):
+        if self.state == "ENABLED":
+            self.goal = list(message.position)
+
+    def lying(self):
+        """Joints and speeds as this arm tells them, in ticks of 10 ms."""
+        self.past.append(list(self.q))
+        before = self.past[-2] if len(self.past) > 1 else self.q
+        told, speed = list(self.q), [(a - b) / 0.01 for a, b in zip(self.q, before, strict=True)]
+        if "frozen" in self.faults:
+            told = list(self.home)
+        if "scaled" in self.faults:
+            told = [h + 0.5 * (q - h) for h, q in zip(self.home, told, strict=True)]
+        if "late" in self.faults:
+            told = self.past[0]
+        if "speeds" in self.faults:
+            speed = [2.0 * v for v in speed]
+        return told, speed
 
     def tick(self):
         now = self.get_clock().now().to_msg()
@@ -198,7 +225,13 @@ class ForeignArm(Node):
             state = crtk.OperatingState(state=self.state, is_homed=True, is_busy=is_busy)
             state.header.stamp = now
             self.states.publish(state)
-        joints = JointState(name=["a", "b", "c"], position=list(self.q))
+        told, speed = self.lying()
+        joints = JointState(name=["a", "b", "c"], position=told)
+        if self.faults & {"speeds", "honest"}:
+            joints.velocity = speed
+        setpoint = JointState(name=["a", "b", "c"], position=list(self.q))
+        setpoint.header.stamp = now
+        self.setpoint.publish(setpoint)
         if "stamp" not in self.faults:
             joints.header.stamp = now
         if "nan" in self.faults:
@@ -214,6 +247,13 @@ class ForeignArm(Node):
 
 def findings_of(*faults, may_move=False):
     """What is found of a foreign arm with these faults, by topic."""
+    with foreign_arm(*faults) as arm:
+        return {found.row.name: found for found in examine(arm, may_move=may_move)}
+
+
+@contextmanager
+def foreign_arm(*faults):
+    """Client of a foreign arm with these faults, which runs meanwhile."""
     domain, context = int(free_domain()), Context()
     context.init(args=[], domain_id=domain)
     node, executor = ForeignArm(context, faults), SingleThreadedExecutor(context=context)
@@ -228,7 +268,7 @@ def findings_of(*faults, may_move=False):
     try:
         with Arm("PSM", domain) as arm:
             assert arm.is_there(20.0)
-            return {found.row.name: found for found in examine(arm, may_move=may_move)}
+            yield arm
     finally:
         executor.shutdown()
         thread.join(10)
@@ -238,9 +278,10 @@ def findings_of(*faults, may_move=False):
 
 @pytest.mark.slow
 def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes():
-    found = findings_of(may_move=True)
+    found = findings_of("honest", may_move=True)
     verdicts = {name: one.verdict for name, one in found.items()}
-    sound = ("operating_state", "state_command", "measured_js", "measured_cp", "move_jp")
+    sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js",
+             "move_jp", "servo_jp")  # fmt: skip
     assert {name: verdicts[name] for name in sound} == dict.fromkeys(sound, Verdict.OK), found
     others = {verdict for name, verdict in verdicts.items() if name not in sound}
     assert others == {Verdict.ABSENT}
@@ -277,6 +318,51 @@ def test_faults_of_a_foreign_arm_are_found_by_trying(fault, topic, note):
     found = findings_of(fault, may_move=True)[topic]
     assert found.verdict is Verdict.FAILED
     assert note in found.note
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "topics", "note"),
+    [
+        ("frozen", ("measured_js", "servo_jp", "move_jp"), "measured_js by 0"),
+        ("scaled", ("measured_js", "servo_jp", "move_jp"), "measured_js by 0.00"),
+        ("late", ("measured_js", "servo_jp", "move_jp"), "setpoint"),
+        ("speeds", ("measured_js",), "add up to another way"),
+    ],
+)
+def test_an_arm_that_lies_about_where_it_is_is_found_by_moving_it(fault, topics, note):
+    found = findings_of(fault, may_move=True)
+    for topic in topics:
+        assert found[topic].verdict is Verdict.FAILED, (topic, found[topic])
+        assert note in found[topic].note, found[topic]
+
+
+def test_a_test_that_is_interrupted_claims_no_recording():
+    domain = free_domain()
+    command = [sys.executable, "-m", "teleop_core.cli", "conformance", "slave", "--read-only",
+               "--wait", "60", "--domain", domain]  # fmt: skip
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        while not takes_part(int(domain)):
+            assert process.poll() is None, process.stderr.read()
+        process.send_signal(signal.SIGINT)
+        assert process.stderr.read() == "teleop conformance: interrupted\n"
+    assert process.returncode == 130
+
+
+def takes_part(domain):
+    """Whether a participant of a ROS domain listens: DDSI-RTPS 2.5, 9.6.1.1."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("", 7410 + 250 * domain))
+        except OSError:
+            return True
+    return False
+
+
+def test_what_an_interrupted_test_leaves_is_told():
+    with foreign_arm() as arm:
+        assert left_behind(arm, may_move=False) == "nothing was commanded"
+        assert "the arm is ENABLED and may be off by 0.01 rad" in left_behind(arm, may_move=True)
 
 
 def test_nothing_is_commanded_when_only_looking():

@@ -68,7 +68,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"teleop {parsed.command}: {error}", file=sys.stderr)
         return FAILED
     except KeyboardInterrupt:
-        print(f"teleop {parsed.command}: interrupted; what was recorded is kept", file=sys.stderr)
+        kept = "; what was recorded is kept" if getattr(parsed, "records", False) else ""
+        print(f"teleop {parsed.command}: interrupted{kept}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:  # the reader of our output, such as head, has seen enough
         sys.stderr.close()

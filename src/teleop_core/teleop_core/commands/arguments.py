@@ -33,7 +33,8 @@ def command(
 
 
 def out_argument(parser: argparse.ArgumentParser) -> None:
-    """Let a command write a recording."""
+    """Let a command write a recording; interrupted, it keeps what it has recorded."""
+    parser.set_defaults(records=True)
     parser.add_argument(
         "--out", type=Path, required=True, help="directory of the recording; must not exist"
     )

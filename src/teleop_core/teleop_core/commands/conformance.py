@@ -14,8 +14,10 @@ are, their types, rates, stamps and numbers, and whether it does what a stock cl
   teleop conformance /PSM1                 asks before it moves anything
   teleop conformance slave --yes --json    for programs
 It pauses and resumes the arm, moves one joint by 0.01 rad (or 10 mm) and the tip by 3 mm, at most
-0.02 rad/s and 6 mm/s where it chooses the speed, and goes back each time. Efforts, forces and free
-are never tried. Stop whoever else commands the arm, and keep a hand at the emergency stop.
+0.02 rad/s and 6 mm/s where it chooses the speed, and goes back each time. Whatever it measures
+must follow what it was told, in time and in place; its speeds must add up to its way. Efforts,
+forces and free are never tried. Stop whoever else commands the arm, and keep a hand at the
+emergency stop.
 verdicts: ok; absent, which is allowed; not tried, with the reason; noted, works but look at it;
 FAILED. The exit code is 1 if a row FAILED.
 """
@@ -36,6 +38,11 @@ def add(commands: Any) -> None:
         "--domain", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)"
     )
     parser.add_argument(
+        "--robot", metavar="NAME",
+        help="what it is, one of `teleop robots` or a Denavit-Hartenberg table: its forward "
+        "kinematics are held against measured_cp",
+    )  # fmt: skip
+    parser.add_argument(
         "--wait", type=float, default=5.0, metavar="S",
         help="seconds in which the arm must be there (default: 5)",
     )  # fmt: skip
@@ -45,12 +52,14 @@ def _run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from teleop_core.conformance import Verdict, findings_json, findings_table
+    from teleop_core.robots import load_robot
 
     ros_module("conformance")
     from teleop_core.nodes.children import environment
-    from teleop_core.nodes.conformance import examine
+    from teleop_core.nodes.conformance import examine, left_behind
     from teleop_core.nodes.conformance_arm import Arm
 
+    robot = None if arguments.robot is None else load_robot(arguments.robot)
     environment()
     with Arm(arguments.namespace, arguments.domain) as arm:
         if not arm.is_there(arguments.wait):
@@ -59,8 +68,13 @@ def _run(arguments: argparse.Namespace) -> int:
             raise SessionError(f"no CRTK topic at {where}; {hint}")
         may_move = not arguments.read_only and (arguments.yes or _agreed(arm.namespace))
         progress = Console(stderr=True)
-        with progress.status("looking") as status:
-            findings = examine(arm, may_move=may_move, report=status.update)
+        try:
+            with progress.status("looking") as status:
+                findings = examine(arm, may_move=may_move, report=status.update, robot=robot)
+        except KeyboardInterrupt:
+            left = left_behind(arm, may_move=may_move)
+            print(f"teleop conformance: interrupted; {left}", file=sys.stderr)
+            return 130
     if arguments.json:
         print(findings_json(arm.namespace, findings))
     else:

@@ -9,7 +9,9 @@ from collections.abc import Callable, Iterable
 from teleop_core.conformance.rows import ROWS, Finding, Group, Row, Verdict
 from teleop_core.nodes.conformance_arm import Arm
 from teleop_core.nodes.conformance_queries import look
-from teleop_core.nodes.conformance_trials import TRIALS, Trials
+from teleop_core.nodes.conformance_trials import TRIALS, TURN, Outcome, Trials
+from teleop_core.nodes.conformance_watch import Watch
+from teleop_core.robots.robot import Robot
 
 Report = Callable[[str], None]
 NEVER_TRIED = {
@@ -21,7 +23,9 @@ NEVER_TRIED = {
 }
 
 
-def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None) -> list[Finding]:
+def examine(
+    arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot: Robot | None = None
+) -> list[Finding]:
     """Findings of all rows.
 
     Args:
@@ -29,6 +33,7 @@ def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None) -> lis
         may_move: Whether states are commanded and small motions made: a few millimetres and
             hundredths of a radian, each back again.
         report: Told what is done now.
+        robot: What it should be; its forward kinematics are held against the measured tip.
     """
     findings: dict[str, Finding] = {}
     for row in ROWS:
@@ -36,10 +41,20 @@ def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None) -> lis
         findings[row.name] = look(arm, row)
     _insist_on_one(findings)
     if may_move:
-        _try(arm, findings, report)
+        _try(arm, findings, report, robot)
     else:
         _skip(findings, "read only")
     return [findings[row.name] for row in ROWS]
+
+
+def left_behind(arm: Arm, *, may_move: bool) -> str:
+    """How a test that was interrupted leaves an arm, in words."""
+    if not may_move:
+        return "nothing was commanded"
+    state = arm.newest("operating_state", 0.5)
+    told = "in an unknown state" if state is None else state.state
+    cure = "; resume it" if told == "PAUSED" else ""
+    return f"the arm is {told} and may be off by {TURN} rad or {1e3 * TURN:.0f} mm{cure}"
 
 
 def _insist_on_one(findings: dict[str, Finding]) -> None:
@@ -65,7 +80,7 @@ def _skip(findings: dict[str, Finding], why: str) -> None:
             findings[name] = Finding(row, Verdict.SKIPPED, findings[name].found, why)
 
 
-def _try(arm: Arm, findings: dict[str, Finding], report: Report) -> None:
+def _try(arm: Arm, findings: dict[str, Finding], report: Report, robot: Robot | None) -> None:
     trials = Trials(arm)
     refusal = trials.unfit()
     if refusal:
@@ -83,6 +98,25 @@ def _try(arm: Arm, findings: dict[str, Finding], report: Report) -> None:
             )
         else:
             report(f"trying {name}")
-            verdict, note = TRIALS[name](trials)
+            verdict, note = _watched(trials, name, findings, robot)
             trials.go_back()
         findings[name] = Finding(row, verdict, findings[name].found, note)
+
+
+def _watched(
+    trials: Trials, name: str, findings: dict[str, Finding], robot: Robot | None
+) -> Outcome:
+    """Try a command; what the arm measures meanwhile must be what it was told.
+
+    A command that moved the setpoint alone moved nothing. Which of the two lies is not known from
+    outside, so both rows fail.
+    """
+    watch = Watch(trials.arm, None if robot is None else robot.fk)
+    verdict, note = TRIALS[name](trials)
+    lies = watch.lies()
+    for topic, lie in lies.items():
+        told = findings[topic]
+        if told.verdict is not Verdict.FAILED:
+            findings[topic] = Finding(told.row, Verdict.FAILED, told.found, f"{name}: {lie}")
+    missed = [lie for lie in lies.values() if "setpoint" in lie]
+    return (Verdict.FAILED, missed[0]) if verdict is Verdict.OK and missed else (verdict, note)

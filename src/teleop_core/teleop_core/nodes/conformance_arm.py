@@ -39,6 +39,7 @@ class Tap:
         )  # fmt: skip
         self.count = 0
         self.newest: Any = None
+        self._kept: list[tuple[int, bytes]] = []
 
     def take(self, every: Callable[[Any], None] | None = None) -> int:
         """Take what has come; returns how many messages there were.
@@ -56,6 +57,15 @@ class Tap:
             self.newest = deserialize_message(data, self._type)
         self.count += count
         return count
+
+    def drain(self) -> None:
+        """Keep what has come, unread."""
+        while (taken := self._own.handle.take_message(self._type, True)) is not None:
+            self._kept.append((taken[1]["source_timestamp"], taken[0]))
+
+    def kept(self) -> list[tuple[int, Any]]:
+        """Messages of :meth:`drain`, each with the time at which it was sent [ns]."""
+        return [(sent_ns, deserialize_message(data, self._type)) for sent_ns, data in self._kept]
 
     def close(self) -> None:
         """Stop listening."""
@@ -83,6 +93,7 @@ class Arm:
             enable_rosout=False,
         )  # fmt: skip
         self._taps: dict[str, Tap] = {}
+        self._keeping: dict[str, Tap] = {}
         self._publishers: dict[str, Any] = {}
 
     def __enter__(self) -> "Arm":
@@ -142,6 +153,21 @@ class Arm:
         if name in self._taps:
             self._taps.pop(name).close()
 
+    def keep(self, names: list[str]) -> None:
+        """Keep all messages of some topics from now on, beside what :meth:`tap` takes."""
+        for name in names:
+            self._keeping[name] = Tap(self.node, self.path(name), _ROWS[name].ros_type)
+
+    def kept(self) -> dict[str, list[tuple[int, Any]]]:
+        """What was kept, with the times at which it was sent [ns]; nothing is kept any longer."""
+        found = {}
+        for name, tap in self._keeping.items():
+            tap.drain()
+            found[name] = tap.kept()
+            tap.close()
+        self._keeping.clear()
+        return found
+
     def newest(self, name: str, timeout: float = 2.0) -> Any:
         """Newest message of a topic; None if there is none within a time [s]."""
         tap = self.tap(name)
@@ -176,6 +202,8 @@ class Arm:
         """Whether something becomes true within a time [s]."""
         end = time.monotonic() + timeout
         while not condition():
+            for tap in self._keeping.values():
+                tap.drain()
             if time.monotonic() > end:
                 return False
             time.sleep(_TURN)

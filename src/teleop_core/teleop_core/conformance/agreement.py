@@ -1,0 +1,141 @@
+"""Agreement: whether an arm measures what it was told to do, in time and in place.
+
+Trails of the same motion are compared by what changes: a constant difference, such as that of a
+load that the law does not take up, counts for nothing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vectors = NDArray[np.float64]
+
+LATEST = 0.25
+"""A measurement may be so much later than its setpoint [s]: five times what our own arms are, which
+leaves a tenth for networks and slow laws; assumed."""
+SHARE = 0.15
+"""Share of the way by which two trails may differ; assumed: between friction and a wrong scale."""
+_GRID = 0.01  # time from one place of a comparison to the next [s]
+_FARTHEST = 1.0  # lag that is looked for [s]
+_GAP = 0.05  # messages farther apart were lost on the way, or nobody was there to take them [s]
+_SPAN = 0.25  # over which places are averaged: longer than a loop settles [s]
+_SAMPLES = 20  # with which a motion must be told, so that its speeds can be added up
+_FEW = 10  # messages with which nothing can be compared
+
+
+@dataclass(frozen=True, eq=False)
+class Trail:
+    """Messages of one topic during a motion.
+
+    Attributes:
+        sent: When each was sent, shape (N,) [s].
+        stamp: Time of its sample, shape (N,) [s].
+        place: Joints or place, shape (N, k).
+        rate: Its speeds, shape (N, k); empty if it tells none.
+    """
+
+    sent: Vectors
+    stamp: Vectors
+    place: Vectors
+    rate: Vectors
+
+    def __len__(self) -> int:
+        return len(self.sent)
+
+    @property
+    def way(self) -> float:
+        """Largest change of any number since the begin; 0 without messages."""
+        return float(np.max(np.abs(self.place - self.place[:1]), initial=0.0))
+
+
+def follows(name: str, measured: Trail, wanted: Trail, least: float) -> str:
+    """What is wrong with a measurement beside its setpoint, in words; empty if it agrees.
+
+    Args:
+        name: Name of the measurement.
+        measured: What the arm measures.
+        wanted: What it is told.
+        least: A way below which nothing is compared.
+    """
+    if len(measured) < _FEW or len(wanted) < _FEW or wanted.way < least:
+        return ""
+    grid = np.arange(wanted.sent[0], max(wanted.sent[-1], measured.sent[-1]), _GRID)
+    found = _smooth(grid, measured)
+    lags = np.arange(0.0, _FARTHEST, _GRID)
+    off = [_differences(found, _smooth(grid - lag, wanted)) for lag in lags]
+    if not any(len(one) >= _FEW for one in off):
+        return ""
+    best = int(np.argmin([float(np.mean(one**2)) if len(one) >= _FEW else np.inf for one in off]))
+    share = max(float(np.max(np.abs(off[best]))) / wanted.way, 1.0 - measured.way / wanted.way)
+    if share > SHARE:
+        ways = f"its setpoint moved by {wanted.way:.3g}, {name} by {measured.way:.3g}"
+        return f"{ways}: {share:.0%} off"
+    if lags[best] > LATEST:
+        return f"{name} is {lags[best]:.2g} s behind its setpoint, at most {LATEST:g}"
+    return ""
+
+
+def adds_up(trail: Trail, least: float) -> str:
+    """What is wrong with speeds beside the differences of places, in words; empty if they agree."""
+    if len(trail) < _FEW or not trail.rate.size or trail.way < least:
+        return ""
+    steps = np.diff(trail.stamp)[:, None]
+    is_whole = (steps > 0.0) & (steps < _GAP)
+    went = np.cumsum(is_whole * 0.5 * (trail.rate[1:] + trail.rate[:-1]) * steps, axis=0)
+    moved = np.cumsum(is_whole * np.diff(trail.place, axis=0), axis=0)
+    longest = max(_SAMPLES * float(np.median(steps)), 0.5 * _SPAN)
+    if np.max(np.abs(trail.rate)) * longest > trail.way:
+        return ""  # over before filtered speeds could be told
+    share = float(np.max(np.abs(_differences(went, moved)))) / trail.way
+    if share > SHARE:
+        return f"its speeds add up to another way than its places: {share:.0%} off"
+    return ""
+
+
+def obeys(joints: Trail, tip: Trail, fk: Callable[[Vectors], Vectors], least: float) -> str:
+    """What is wrong with places of the tip beside forward kinematics of the joints, in words.
+
+    Args:
+        joints: Measured joints.
+        tip: Measured places of the tip, (N, 3) [m].
+        fk: Joints (n,) to the tip's pose (4, 4).
+        least: Way of the tip below which nothing is compared [m].
+    """
+    if len(joints) < _FEW or len(tip) < _FEW:
+        return ""
+    places = np.array([fk(row)[:3, 3] for row in joints.place])
+    model = Trail(joints.sent, joints.stamp, places, np.empty((0, 0)))
+    if max(model.way, tip.way) < least:
+        return ""
+    grid = np.arange(joints.sent[0], joints.sent[-1], _GRID)
+    differences = _differences(_smooth(grid, model), _smooth(grid, tip))
+    off = float(np.max(np.abs(differences), initial=0.0))
+    if off > SHARE * max(model.way, tip.way):
+        return f"forward kinematics of measured_js moved the tip {1e3 * off:.2g} mm elsewhere"
+    return ""
+
+
+def _differences(first: Vectors, second: Vectors) -> Vectors:
+    """Differences (M, k) where both are known, less what they differ by most of the time."""
+    found = first - second
+    found = found[np.isfinite(found).all(axis=1)]
+    return found - np.median(found, axis=0) if len(found) else found
+
+
+def _smooth(times: Vectors, trail: Trail) -> Vectors:
+    """Change (M, k) since the first message, mean of a time around each of some times (M,).
+
+    So an overshoot of a few hundredths of a second is none of a place. NaN where messages are
+    missing; before the first one nothing has changed.
+    """
+    at = np.searchsorted(trail.sent, times, side="right") - 1
+    changed = trail.place[np.maximum(at, 0)] - trail.place[0]
+    is_old = (at >= 0) & (times - trail.sent[np.maximum(at, 0)] > _GAP)
+    changed[is_old] = np.nan
+    half = round(0.5 * _SPAN / _GRID)
+    padded = np.pad(changed, ((half, half), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0)
+    mean: Vectors = windows.mean(axis=-1)
+    return mean
