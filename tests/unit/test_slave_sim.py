@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from teleop_core.controllers import CONTROLLERS
 from teleop_core.errors import ParameterError
 from teleop_core.kernels import pointer
-from teleop_core.operation import OperationParameters
+from teleop_core.operation import Answer, Fault, OperationParameters, State
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ACCELERATION, independent_acceleration
@@ -270,6 +270,22 @@ def test_integral_stays_bounded_while_an_overload_holds_the_arm_back():
     assert abs(joints[-1, 0] - goal[0]) <= COUNT[0]
     # An eighth of the way at most: a tenth of a second of full torque before it brakes.
     assert joints[:, 0].max() <= goal[0] + 0.25 * 0.2
+
+
+def test_an_effort_that_was_a_fault_is_none_any_more_after_a_reset():
+    others = OperationParameters(reported=("tracking", "tip", "overspeed"))
+    bench = Bench(coulomb=(20.0, *DRIVES.coulomb[1:]), operation=others)
+    goal = ARM.home + np.array([0.2, 0, 0, 0, 0, 0])
+    bench.trace(goal, 5000)
+    assert bench.slave.operation["fault"] == Fault.EFFORT
+    assert bench.slave.state["full_ticks"].max() == 0
+    bench.slave.retune(SlaveSimParameters(operation=others))
+    for command in ("reset", "enable"):
+        answer, text = bench.slave.request(command)
+        assert answer is Answer.DONE, text
+    for _ in range(500):
+        bench.tick(goal)
+    assert bench.slave.operation["state"] == State.ENABLED
 
 
 # Encoders.

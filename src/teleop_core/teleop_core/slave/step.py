@@ -170,6 +170,7 @@ def _brake(p: Any, s: Any, arm: Any, dt: float) -> None:
     """Let brakes as strong as the drives stop the arm, whatever its dynamics have become."""
     for i in range(arm.q.shape[0]):
         fastest, less = p.speed_limit[i] * 1.5, p.braking[i] * dt
+        s.full_ticks[i] = 0  # what an effort of before was, says nothing of that after a reset
         speed = min(max(arm.dq[i], -fastest), fastest)
         speed = max(0.0, speed - less) if speed > 0.0 else min(0.0, speed + less)
         arm.dq[i] = speed if math.isfinite(speed) else 0.0
