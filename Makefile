@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup crtk_msgs demo test test-slow coverage lint format bench bench-setup endurance fuzz clean
+.PHONY: setup crtk_msgs demo test test-slow coverage lint format bench bench-setup endurance fuzz drill-mutants clean
 
 setup: $(VENV)/.installed
 
@@ -77,6 +77,11 @@ bench: bench-setup
 COUNT ?= 100
 endurance: setup
 	$(BIN)/python benchmarks/endurance.py --count $(COUNT)
+
+# Copies of the package with one safety broken each: the drill must find every one, in both forms,
+# and nothing in a sound copy; half an hour. MUTANTS names some of them.
+drill-mutants: setup
+	$(BIN)/python tests/mutants.py $(MUTANTS)
 
 clean:
 	rm -rf $(OUT) ros_ws/build ros_ws/install ros_ws/log

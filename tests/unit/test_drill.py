@@ -5,13 +5,20 @@ import math
 import numpy as np
 import pytest
 
+from mutants import MUTANTS, changed
+from teleop_core import api
+from teleop_core.bags.reader import Bag
+from teleop_core.bags.writer import BagWriter
 from teleop_core.drill import EXERCISES, SHORT, Cure, Motion, Outcome, chosen, hand, measure
 from teleop_core.drill.hand import Sample
-from teleop_core.drill.recordings import check_recording
+from teleop_core.drill.judging import Measured, Seen, judge
+from teleop_core.drill.numbers import Numbers, Scheduling
+from teleop_core.drill.recordings import check_recording, missing
 from teleop_core.drill.table import drill_table, markdown, rows, summary
 from teleop_core.errors import UnknownNameError
 from teleop_core.operation import Fault, State
 from teleop_core.robots import load_robot
+from teleop_core.topics import SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
 
 MS = 1_000_000
 DT = 1e-3
@@ -21,7 +28,8 @@ def trace(values, numbers=None):
     """One message a millisecond, from 1 s on."""
     values = np.asarray(values, dtype=float)
     numbers = np.arange(len(values)) if numbers is None else np.asarray(numbers)
-    return measure.Trace(1_000 * MS + numbers * MS, numbers.astype(np.int64), values)
+    times = 1_000 * MS + numbers.astype(np.int64) * MS
+    return measure.Trace(times, numbers.astype(np.int64), values, times)
 
 
 @pytest.mark.parametrize(("steps", "ratio"), [([1e-3, 2e-3], 2.0), ([5e-4, -5e-4], 0.5)])
@@ -134,7 +142,8 @@ def outcome(**changed):
     """One that is as expected, of an arm that was stopped."""
     good = {
         "exercise": next(one for one in EXERCISES if one.name == "stop_topic"),
-        "state": State.FAULT, "fault": Fault.STOP, "travel": 1e-3, "bound": 2e-3, "ratio": 1.0,
+        "state": State.FAULT, "fault": Fault.STOP,
+        "measures": {"travel_m": Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 1e-3, 2e-3)},
         "recording": "intact", "recovered": 0.2, "cure": Cure.RESET, "detected": 1e-3,
     }  # fmt: skip
     return Outcome(**(good | changed))
@@ -150,8 +159,6 @@ def test_an_outcome_as_expected_has_no_failures():
         ({"state": State.ENABLED}, "ENABLED, not FAULT"),
         ({"state": None}, "gone"),
         ({"fault": Fault.SILENCE}, "silence"),
-        ({"travel": 2.5e-3}, "0.5 mm too far"),
-        ({"ratio": 1.001}, "1.001"),
         ({"recording": "lost", "is_recorded": False}, "lost"),
         ({"recovered": math.nan}, "did not recover"),
         ({"cure": Cure.NOTHING}, "by itself"),
@@ -162,6 +169,167 @@ def test_whatever_is_not_as_expected_fails_and_says_what(changed, word):
     assert word in failure
     assert rows([outcome(**changed)])[0][-1] == "✗"
     assert any(word in line for line in summary([outcome(**changed)]))
+
+
+def test_a_number_outside_its_bounds_fails_and_says_both():
+    far = Measured("travel_m", "{0:.1f} mm, at most {1:.1f}", 2.5e-3, 2e-3)
+    assert outcome(measures={"travel_m": far}).failures() == ["2.5 mm, at most 2.0"]
+    slow = Measured("path_m", "{0:.0f} mm, at least {1:.0f}", 1e-3, least=9e-3)
+    assert outcome(measures={"path_m": slow}).failures() == ["1 mm, at least 9"]
+    assert Measured("told_s", "{0} {1}", math.inf, 1.0).failure
+    assert not Measured("told_s", "{0} {1}", math.nan, 1.0).failure
+
+
+def test_what_is_not_recorded_fails_unless_the_fault_may_cost_it():
+    one = outcome()
+    one.note_loss(0.3)
+    assert "0.30 s" in one.failures()[0]
+    frozen = outcome(exercise=by_name("freeze_recorder"))
+    frozen.note_loss(0.3)
+    assert not any("0.30 s" in text for text in frozen.failures())
+
+
+# -- judging: an arm that goes round as the hand does, and what may be wrong with it ---------------
+
+
+def by_name(name):
+    return next(one for one in EXERCISES if one.name == name)
+
+
+NUMBERS = Numbers.of(api.configuration("free_motion"))
+ROBOT = NUMBERS.robot
+BEGIN = 1_500 * MS
+
+
+def seen(joints, lies=1.0, told=None, warned=None, late=0.0):
+    """What a tap hears of an arm whose setpoint and measured joints are these, each millisecond."""
+    joints = np.asarray(joints)
+    measured = ROBOT.start + lies * (joints - ROBOT.start)
+    tips = [np.append(ROBOT.fk(row)[:3, 3], [1.0, 0.0, 0.0, 0.0]) for row in joints]
+    end = 1_000 * MS + len(joints) * MS
+    heard = [trace(values) for values in (joints, measured, tips)]
+    return Seen(BEGIN, end, *heard, told, warned, Scheduling(late, late))
+
+
+def round_and_round(speed=1.0, count=2000):
+    """Joints whose tip goes as fast as the hand: one joint there and back on a circle's arc."""
+    pull = np.linalg.norm(ROBOT.jacobian(ROBOT.start)[:3, 0])
+    rate = speed * NUMBERS.tip_speed / pull
+    reach = 0.03 / pull
+    way = np.abs((rate * DT * np.arange(count) + reach) % (2 * reach) - reach)
+    return ROBOT.start + way[:, None] * np.eye(ROBOT.n)[0]
+
+
+def stopping(after, braking=1.0, count=1500):
+    """Joints that go on for a time after the fault, then brake with a share of what they can."""
+    rate = np.eye(ROBOT.n)[0] * NUMBERS.tip_speed
+    rate /= np.linalg.norm(ROBOT.jacobian(ROBOT.start)[:3, 0])
+    step = np.where(np.arange(count) < 500 + round(after / DT), 1.0, 0.0)[:, None] * rate * DT
+    for k in range(1, count):
+        less = braking * NUMBERS.braking * DT * DT
+        step[k] = np.maximum(step[k], step[k - 1] - less)
+    return ROBOT.start + np.cumsum(step, axis=0)
+
+
+def wrong(name, found):
+    return [m.name for m in judge(by_name(name), found, NUMBERS) if m.failure]
+
+
+def test_an_arm_that_goes_where_the_hand_goes_is_as_expected():
+    assert wrong("loss", seen(round_and_round())) == []
+
+
+@pytest.mark.parametrize(
+    ("joints", "names"),
+    [
+        (round_and_round(speed=2.8), ["tip_speed_m_s"]),
+        (round_and_round(speed=0.3), ["path_m"]),
+        (round_and_round(speed=0.0), ["path_m"]),
+    ],
+)
+def test_an_arm_that_goes_on_goes_neither_faster_nor_slower_than_the_hand(joints, names):
+    assert wrong("loss", seen(joints)) == names
+
+
+def test_measured_joints_that_are_not_where_the_tip_is_are_found():
+    assert wrong("loss", seen(round_and_round(), lies=0.5)) == ["apart_m"]
+
+
+def test_an_arm_that_is_paused_in_time_and_brakes_as_its_drives_can_is_as_expected():
+    found = seen(stopping(NUMBERS.command_timeout), told=BEGIN + round(1e9 * 2.0))
+    assert wrong("master_silent", found) == []
+
+
+@pytest.mark.parametrize(
+    ("after", "braking", "told", "names"),
+    [
+        (0.6, 1.0, 2.0, ["travel_m", "still_s"]),
+        (0.1, 0.1, 2.0, ["still_s", "braking_share"]),
+        (0.1, 1.0, 2.5, ["told_s"]),
+        (0.1, 1.0, None, ["told_s"]),
+    ],
+)
+def test_an_arm_that_stops_late_or_softly_or_says_so_late_is_found(after, braking, told, names):
+    told_ns = None if told is None else BEGIN + round(1e9 * told)
+    found = wrong("master_silent", seen(stopping(after, braking), told=told_ns))
+    assert set(names) <= set(found)
+    assert found
+
+
+def test_a_stop_that_comes_20_ms_late_is_found_and_one_in_the_next_tick_is_not():
+    told = BEGIN + MS
+    assert wrong("stop_topic", seen(stopping(DT, 1e9), told=told)) == []
+    assert "still_s" in wrong("stop_topic", seen(stopping(0.02, 1e9), told=told))
+
+
+def test_the_lateness_of_the_machine_is_granted_and_no_more():
+    joints = stopping(NUMBERS.command_timeout + 0.03)
+    told = BEGIN + round(1e9 * 2.0)
+    assert wrong("master_silent", seen(joints, told=told, late=0.02)) == []
+    assert "still_s" in wrong("master_silent", seen(joints, told=told, late=0.005))
+
+
+def test_setpoints_beyond_a_limit_or_faster_than_a_drive_are_found_whatever_happens():
+    joints = round_and_round()
+    joints[1000:, 4] = ROBOT.upper[4] + 1e-6
+    assert {"step_ratio", "beyond_limit"} <= set(wrong("loss", seen(joints)))
+
+
+def test_a_fault_that_nobody_warns_of_is_found():
+    assert "warned_s" in wrong("teleport", seen(round_and_round()))
+    assert "warned_s" not in wrong("teleport", seen(round_and_round(), warned=BEGIN + 900 * MS))
+
+
+@pytest.mark.parametrize("share", [1.0, 0.1])
+def test_the_deceleration_is_read_off_the_last_steps(share):
+    found = measure.ramp(trace(stopping(0.1, share)), NUMBERS.braking, DT)
+    assert found == pytest.approx(share, rel=1e-6)
+
+
+def test_a_joint_that_creeps_after_its_reference_and_stops_at_once_is_no_ramp():
+    creeping = np.cumsum(1e-4 * 0.99 ** np.arange(500))
+    places = np.concatenate((creeping, np.full(100, creeping[-1])))[:, None]
+    assert math.isnan(measure.ramp(trace(places), np.array([50.0]), DT))
+
+
+@pytest.mark.parametrize("recorded", [[], [5, 6, 9], [5, 5, 6, 9, 9, 9]])
+def test_messages_that_are_not_recorded_are_counted_one_by_one(tmp_path, recorded):
+    """Against a recording made by the writer itself; a stamp that comes again counts again."""
+    heard = np.array([5, 5, 6, 7, 9, 9])
+    names = ROBOT.joint_names
+    with BagWriter(tmp_path / "bag", (SLAVE_SETPOINT_JS, SLAVE_TRUE_CP), names) as writer:
+        stamps = np.array(recorded, np.int64)
+        values = np.zeros((len(stamps), ROBOT.n))
+        if len(stamps):
+            writer.write_block({SLAVE_SETPOINT_JS: (stamps, values, stamps)})
+        pose = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
+        writer.write_block({SLAVE_TRUE_CP: (np.array([5]), pose, np.array([5]))})
+    found = missing(Bag(tmp_path / "bag"), SLAVE_SETPOINT_JS.name, (heard * 10, heard))
+    left = list(recorded)
+    expected = []
+    for stamp in heard:
+        left.remove(stamp) if stamp in left else expected.append(stamp * 10)
+    assert sorted(found) == sorted(expected)
 
 
 def test_every_exercise_says_what_is_expected_and_has_a_name_of_its_own_in_each_way():
@@ -175,6 +343,14 @@ def test_every_exercise_says_what_is_expected_and_has_a_name_of_its_own_in_each_
         assert one.motion is Motion.RESTS or one.watch >= 0.0
 
 
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda one: one.name)
+def test_every_mutant_fits_the_source_and_names_rows_that_there_are(mutant):
+    assert changed(mutant)
+    for is_composed in (False, True):
+        rows = mutant.rows_of(is_composed=is_composed)
+        assert {one.name for one in chosen(rows, is_composed=is_composed)} >= set(rows)
+
+
 def test_the_short_form_is_there_in_five_processes():
     assert {one.name for one in chosen(SHORT, is_composed=False)} == set(SHORT)
 
@@ -186,7 +362,7 @@ def test_a_fault_that_there_is_not_is_refused_with_those_that_there_are():
 
 
 def test_the_tables_have_a_row_for_each_fault():
-    found = [outcome(), outcome(travel=math.nan), outcome(recovered=math.nan)]
+    found = [outcome(), outcome(measures={}), outcome(recovered=math.nan)]
     assert drill_table(found).row_count == 3
     assert len(markdown(found).splitlines()) == 5
 

@@ -1,11 +1,13 @@
 """Exercise: one fault of a drill, what is expected of the arm, and how it recovers."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from teleop_core.drill.hand import Distortion
+from teleop_core.drill.hand import SPEED, Distortion
+from teleop_core.drill.numbers import Numbers
 from teleop_core.geometry import Array
 from teleop_core.operation import Fault, State
 from teleop_core.topics import Topic
@@ -22,6 +24,8 @@ class Motion(Enum):
     """What the arm does under a fault."""
 
     RESTS = "it comes to rest by itself"
+    HOLDS = "it goes to the last sound command, and stays there as if clutched"
+    LED = "it goes where the drill's own commands lead it"
     GOES_ON = "it goes on, within what the hand asks for"
 
 
@@ -54,8 +58,10 @@ class Rig(Protocol):
     def kill(self, node: str) -> None:
         """Kill a node's process, as the kernel does when memory is short."""
 
-    def freeze(self, node: str, seconds: float) -> None:
-        """Stop a node's process for a time [s], then let it go on."""
+    def freeze(
+        self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None
+    ) -> None:
+        """Stop a node's process for a time [s], do something, then let it go on."""
 
     def limit_files(self, node: str, room: int | None) -> None:
         """Let files of a node's process grow by so many bytes only; None: as they like."""
@@ -87,8 +93,11 @@ class Rig(Protocol):
     def setpoint(self) -> Array:
         """Newest joint setpoint (n,) of the slave [rad or m]."""
 
-    def effort_limit(self) -> Array:
-        """What the slave's drives can give, shape (n,) [N·m or N]."""
+    def way_to_limit(self) -> Array:
+        """Way (n,) of one joint, that which moves the tip least, to its nearer limit [rad or m]."""
+
+    def drive(self, speeds: Array, seconds: float) -> None:
+        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
 
     def now_ns(self) -> int:
         """Time [ns]."""
@@ -99,11 +108,43 @@ class Rig(Protocol):
     def command(self, name: str) -> bool:
         """Ask the slave for something by service; whether it was done."""
 
+    def commands(self, *names: str) -> list[bool]:
+        """As :meth:`command`, some at once, without waiting for the answers in between."""
+
     def set(self, node: str, name: str, value: object) -> bool:
         """Set a parameter of a running node; whether it was taken."""
 
     def control(self, word: int, offset_ns: int = 0) -> None:
         """Say what the drill's own stage does, and by how much all clocks are off [ns]."""
+
+
+Time = Callable[[Numbers], float]
+"""A time [s] that follows from the numbers of the session."""
+
+
+def command_timeout(numbers: Numbers) -> float:
+    """Of commands that fail: the last one is in force for so long."""
+    return numbers.command_timeout
+
+
+def at_once(numbers: Numbers) -> float:
+    """Of what the slave itself is told: it looks in every tick."""
+    return numbers.tick
+
+
+def outage(numbers: Numbers) -> float:
+    """Of a stream that fell silent: until the arm is PAUSED."""
+    return numbers.longest_outage
+
+
+def never(_: Numbers) -> float:
+    """No time at all."""
+    return 0.0
+
+
+def after(seconds: float) -> Time:
+    """A time that the exercise itself makes up [s]."""
+    return lambda _: seconds
 
 
 def nothing(_: Rig) -> None:
@@ -125,6 +166,13 @@ class Exercise:
         cures: What it may take to move again.
         master: Who moves the hand.
         allowed: Time for which it may go on as it moves [s], before it has to brake.
+        stands: Time for which an arm that goes on may stand still all the same [s].
+        gap: Time for which commands may be missing that the arm makes up for [s].
+        told: Time after which ``slave/operation`` tells the state or the fault [s]; None: never.
+        warns: Whether a node must warn of it in ``diagnostics``.
+        hand_speed: Largest speed of the hand, or of what leads the tip in its place [m/s].
+        tool_speed: Largest speed of the tip's setpoint that the exercise sets [m/s].
+        lost: How much of the recording it may cost [s].
         watch: Time for which it is watched after the injection [s].
         ways: Which ways of running it makes sense in: True for composed.
         cuts_recording: Whether its recorder cannot close it.
@@ -140,7 +188,14 @@ class Exercise:
     faults: tuple[Fault, ...] = ()
     cures: tuple[Cure, ...] = (Cure.NOTHING,)
     master: Master = Master.DRILL
-    allowed: float = 0.1
+    allowed: Time = command_timeout
+    stands: Time = never
+    gap: Time = never
+    told: Time | None = None
+    warns: bool = False
+    hand_speed: float = SPEED
+    tool_speed: float = math.inf
+    lost: float = 0.0
     watch: float = 0.5
     ways: tuple[bool, ...] = (False, True)
     cuts_recording: bool = False

@@ -3,6 +3,7 @@
 The speed is constant, so that what may move legally in a time is known exactly.
 """
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -93,6 +94,28 @@ def reordered(count: int) -> Distortion:
         return out
 
     return send
+
+
+def replayed(samples: int) -> Distortion:
+    """Send each sample, and after it the one that came a number of samples before, as it was."""
+    past: list[Sample] = []
+
+    def send(sample: Sample) -> list[Sample]:
+        past.append(sample)
+        return [sample, past.pop(0)] if len(past) > samples else [sample]
+
+    return send
+
+
+def shaken(amplitude: float, frequency: float) -> Distortion:
+    """Swing across the circle by an amplitude [m] at a frequency [Hz], from rest on."""
+    times = (PERIOD * count for count in itertools.count())
+
+    def change(pose: Array) -> Array:
+        pose[1] += amplitude * math.sin(2.0 * math.pi * frequency * next(times))
+        return pose
+
+    return moved(change)
 
 
 def moved(change: Callable[[Array], Array]) -> Distortion:

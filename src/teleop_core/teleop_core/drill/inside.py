@@ -7,12 +7,16 @@ drill has started. What it does is said by the numbers of a file that both sides
 import mmap
 import os
 import struct
+import threading
 import time
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from teleop_core.errors import PartError
+from teleop_core.geometry import Array
 from teleop_core.parameters import NoParameters
+from teleop_core.slave.slave_sim import SlaveSim
 from teleop_core.stage import STAGES, RunningStage, Stage, register_stage
 from teleop_core.topics import SLAVE_SERVO_CP, Kind, Topic, passed_on
 
@@ -20,8 +24,9 @@ VARIABLE = "TELEOP_DRILL"
 """Environment variable with the name of the file that says what is to break."""
 STAGE_NAME = "drill_stage"
 _FORM = struct.Struct("<qq")
-WORKS, HANGS, RAISES = 0, 1, 2
-"""What the stage does."""
+WORKS, HANGS, RAISES, STICKS = 0, 1, 2, 3
+"""What the stage does; or what the joints do, which no parameter of a session can make stick."""
+_TURN = 5e-3  # from one look of the joints at what they do to the next [s]
 
 
 class Control:
@@ -87,6 +92,40 @@ def _step_clock(control: Control) -> None:
     time.time_ns = lambda: right() + control.offset_ns
 
 
+class _Joints:
+    """Joints of all simulated slaves of the process: they stick as long as they are told to.
+
+    Their dry friction is then twice what the drives can give, as under a load far too heavy.
+    """
+
+    def __init__(self, control: Control) -> None:
+        self._control = control
+        self._slaves: WeakKeyDictionary[SlaveSim, Array | None] = WeakKeyDictionary()
+        self._make = SlaveSim.__init__
+
+    def follow(self) -> None:
+        """Know every slave that is made from now on."""
+        joints = self
+
+        def make(slave: SlaveSim, *arguments: Any, **options: Any) -> None:
+            joints._make(slave, *arguments, **options)
+            joints._slaves[slave] = None
+
+        SlaveSim.__init__ = make  # type: ignore[method-assign, assignment]
+        threading.Thread(target=self._run, name="joints", daemon=True).start()
+
+    def _run(self) -> None:
+        while True:
+            time.sleep(_TURN)
+            for slave, before in tuple(self._slaves.items()):
+                friction, sticks = slave.parameters["coulomb"], self._control.word == STICKS
+                if sticks:
+                    self._slaves[slave] = friction.copy() if before is None else before
+                    friction[:] = 2.0 * slave.parameters["effort_limit"]
+                elif before is not None:
+                    friction[:], self._slaves[slave] = before, None
+
+
 def _install() -> None:
     stage = Stage(
         STAGE_NAME, NoParameters, reads=(SLAVE_SERVO_CP,), writes=(DRILLED_CP,),
@@ -101,6 +140,7 @@ def _install() -> None:
         raise PartError("file of a drill", file, "one that the drill has made")
     _Passing.control = Control(Path(file))
     _step_clock(_Passing.control)
+    _Joints(_Passing.control).follow()
 
 
 if __name__.startswith("teleop_own_parts"):

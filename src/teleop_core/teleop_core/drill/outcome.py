@@ -3,11 +3,9 @@
 import math
 from dataclasses import dataclass, field
 
-from teleop_core.drill.exercise import Cure, Exercise, Motion
+from teleop_core.drill.exercise import Cure, Exercise
+from teleop_core.drill.judging import Measured
 from teleop_core.operation import Fault, State
-
-LARGEST_RATIO = 1.0 + 1e-9
-"""Largest step of a setpoint over what its drive can do, up to rounding."""
 
 _SHORT = 20  # notes that fit beside the state
 
@@ -20,11 +18,10 @@ class Outcome:
         exercise: What was done.
         detected: Time until somebody said so [s]; NaN if nobody did.
         told_by: Who said so first, and what.
+        told: Time until ``slave/operation`` told what was expected [s]; None if it did not.
         state: Operating state that followed; None if the slave was gone.
         fault: What it told.
-        travel: Farthest that the tip got after the fault [m]; NaN if unknown.
-        bound: What it was allowed [m].
-        ratio: Largest step of a joint setpoint over what its drive can do.
+        measures: All numbers that were measured, by name, each with its bounds.
         recording: What became of the recording; empty until it has been looked at.
         is_recorded: Whether that is as it should be.
         recovered: Time from the end of the fault until the arm followed again [s]; NaN if never.
@@ -36,11 +33,10 @@ class Outcome:
     exercise: Exercise
     detected: float = math.nan
     told_by: str = ""
+    told: float | None = None
     state: State | None = None
     fault: Fault = Fault.NONE
-    travel: float = math.nan
-    bound: float = math.nan
-    ratio: float = 0.0
+    measures: dict[str, Measured] = field(default_factory=dict)
     recording: str = ""
     is_recorded: bool = True
     recovered: float = math.nan
@@ -48,6 +44,16 @@ class Outcome:
     note: str = ""
     load: float = 0.0
     extra: dict[str, float] = field(default_factory=dict)
+
+    def measured(self, name: str) -> Measured:
+        """A number by its name; NaN if it was not measured."""
+        return self.measures.get(name, Measured(name, "", math.nan))
+
+    def note_loss(self, seconds: float) -> None:
+        """Take note of how much of what the drill's own tap heard is not in the recording [s]."""
+        text = "{0:.2f} s of a topic that the drill heard are not recorded, at most {1:.2f} s"
+        most = self.exercise.lost
+        self.measures["lost_s"] = Measured("lost_s", text, seconds, most, scale=1.0)
 
     def failures(self) -> list[str]:
         """What is not as expected, in words."""
@@ -58,10 +64,7 @@ class Outcome:
         if asked.faults and self.fault not in asked.faults:
             wanted = " or ".join(fault.word for fault in asked.faults)
             found.append(f"told {self.fault.word}, not {wanted}")
-        if self.travel > self.bound:
-            found.append(f"the tip moved {1e3 * (self.travel - self.bound):.1f} mm too far")
-        if self.ratio > LARGEST_RATIO:
-            found.append(f"a joint step of {self.ratio:.3f} times the drive's limit")
+        found += [one.failure for one in self.measures.values() if one.failure]
         if not self.is_recorded:
             found.append(f"recording: {self.recording}")
         if math.isnan(self.recovered):
@@ -85,10 +88,10 @@ class Outcome:
             "fault": asked.name, "text": asked.text, "is_passed": not self.failures(),
             "failures": self.failures(), "detected_s": _number(self.detected),
             "told_by": self.told_by, "state": _state(self.state), "told": self.fault.word,
-            "travel_m": _number(self.travel), "travel_bound_m": _number(self.bound),
-            "step_ratio": _number(self.ratio), "recording": self.recording,
+            "measured": {one.name: one.to_json() for one in self.measures.values()},
+            "recording": self.recording,
             "recovered_s": _number(self.recovered), "cure": self.cure.value,
-            "goes_on": asked.motion is Motion.GOES_ON, "note": self.note, "load": self.load,
+            "motion": asked.motion.name.lower(), "note": self.note, "load": self.load,
             **{name: _number(value) for name, value in self.extra.items()},
         }  # fmt: skip
 

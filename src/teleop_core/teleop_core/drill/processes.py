@@ -3,13 +3,24 @@
 from collections.abc import Callable
 from functools import partial
 
-from teleop_core.drill.exercise import Cure, Exercise, Master, Motion, Rig
+from teleop_core.drill.exercise import (
+    Cure,
+    Exercise,
+    Master,
+    Motion,
+    Rig,
+    after,
+    at_once,
+    outage,
+)
 from teleop_core.drill.inside import HANGS, RAISES, WORKS
 from teleop_core.operation import Fault, State
 
 FREEZE = 3.0
 """For how long a process is stopped [s]."""
 _STAGES = ("haptic_master", "motion_scaling", "inverse_kinematics")
+_LOOK = 0.01
+"""Time from one look of the slave at its clocks to the next [s]."""
 _HOUR_NS = 3_600_000_000_000
 
 
@@ -61,7 +72,7 @@ def _killed(node: str) -> Exercise:
     return Exercise(
         name=f"kill_{node}", text=f"{node} killed", inject=partial(_kill, node),
         states=(State.PAUSED,), faults=(Fault.SILENCE,), cures=(Cure.RESTART,),
-        master=Master.DEVICE, watch=2.6, ways=(False,),
+        master=Master.DEVICE, told=outage, watch=2.6, ways=(False,),
     )  # fmt: skip
 
 
@@ -69,7 +80,7 @@ def _frozen(node: str) -> Exercise:
     return Exercise(
         name=f"freeze_{node}", text=f"{node} stopped for {FREEZE:g} s",
         inject=partial(_freeze, node), states=(State.PAUSED,), faults=(Fault.SILENCE,),
-        cures=(Cure.RESUME,), master=Master.DEVICE, ways=(False,),
+        cures=(Cure.RESUME,), master=Master.DEVICE, told=outage, ways=(False,),
     )  # fmt: skip
 
 
@@ -77,7 +88,7 @@ def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exerci
     """A stage that breaks in a process of its own, and in that of all."""
     alone = Exercise(
         name=name, text=text, inject=inject, undo=_mend, states=(State.PAUSED,),
-        faults=(Fault.SILENCE,), cures=(Cure.RESTART,), watch=2.6, ways=(False,),
+        faults=(Fault.SILENCE,), cures=(Cure.RESTART,), told=outage, watch=2.6, ways=(False,),
     )  # fmt: skip
     together = Exercise(
         name=name, text=f"{text}: ends the session", inject=inject, undo=_mend, states=(None,),
@@ -104,17 +115,19 @@ PROCESSES = (
     *(_frozen(node) for node in _STAGES),
     Exercise(
         name="freeze_slave_sim", text=f"slave_sim stopped for {FREEZE:g} s",
-        inject=partial(_freeze, "slave_sim"), states=(State.PAUSED,), faults=(Fault.STALL,),
+        inject=partial(_freeze, "slave_sim"), states=(State.PAUSED,),
+        faults=(Fault.STALL,), told=at_once,
         cures=(Cure.RESUME,), master=Master.DEVICE, ways=(False,),
     ),
     Exercise(
         name="freeze_recorder", text=f"recorder stopped for {FREEZE:g} s",
         inject=partial(_freeze, "recorder"), motion=Motion.GOES_ON, master=Master.DEVICE,
-        ways=(False,),
+        lost=FREEZE, ways=(False,),
     ),
     Exercise(
         name="freeze_session", text=f"whole session stopped for {FREEZE:g} s",
-        inject=partial(_freeze, "slave_sim"), states=(State.PAUSED,), faults=(Fault.STALL,),
+        inject=partial(_freeze, "slave_sim"), states=(State.PAUSED,),
+        faults=(Fault.STALL,), told=at_once,
         cures=(Cure.RESUME,), master=Master.DEVICE, ways=(True,),
     ),
     Exercise(
@@ -131,10 +144,12 @@ PROCESSES = (
     Exercise(
         name="clock_ahead", text="clock stepped 1 h ahead", inject=partial(_step_clock, _HOUR_NS),
         undo=_mend, states=(State.PAUSED,), faults=(Fault.CLOCK,), cures=(Cure.RESUME,),
+        allowed=after(_LOOK), told=after(_LOOK),
     ),
     Exercise(
         name="clock_back", text="clock stepped 1 h back", inject=partial(_step_clock, -_HOUR_NS),
         undo=_mend, states=(State.PAUSED,), faults=(Fault.CLOCK,), cures=(Cure.RESUME,),
+        allowed=after(_LOOK), told=after(_LOOK),
     ),
     Exercise(
         name="disk_full", text="disk full under the recording", inject=_fill_disk,
@@ -142,7 +157,7 @@ PROCESSES = (
     ),
     Exercise(
         name="disk_full", text="disk full under the recording: ends the session",
-        inject=_fill_disk, states=(None,), cures=(Cure.RESTART,), allowed=3.0, watch=2.0,
+        inject=_fill_disk, states=(None,), cures=(Cure.RESTART,), allowed=after(3.0), watch=2.0,
         ways=(True,), cuts_recording=True,
     ),
 )  # fmt: skip

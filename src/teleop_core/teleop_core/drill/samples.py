@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from teleop_core.drill import hand
-from teleop_core.drill.exercise import Cure, Exercise, Motion, Rig
+from teleop_core.drill.exercise import Cure, Exercise, Motion, Rig, Time, after, never, outage
 from teleop_core.drill.hand import Distortion
 from teleop_core.operation import Fault, State
 from teleop_core.topics import (
@@ -20,6 +20,11 @@ from teleop_core.topics import (
 
 _FOR = 1.0  # how long a stream is disturbed [s]
 _AHEAD_NS = 2_000_000_000
+_WATCH = 0.5  # for which an arm that goes on is watched afterwards [s]
+_SLOW = 0.05  # tool speed under which the hand shakes [m/s]
+_SHAKE, _SHAKES = 0.02, 3.0  # amplitude [m] and frequency [Hz] of a hand that shakes
+_PRESS, _STAY = 1.0, 1.5  # times in which a joint goes to its limit, and is pressed into it [s]
+_SHAKEN = hand.SPEED + 2.0 * math.pi * _SHAKE * _SHAKES
 
 
 def _distort(distortion: Distortion, rig: Rig, seconds: float = _FOR) -> None:
@@ -32,12 +37,41 @@ def _straighten(rig: Rig) -> None:
     rig.distort(hand.faithful)
 
 
-def _disturbed(name: str, text: str, distortion: Distortion, *, is_held: bool = False) -> Exercise:
+def _disturbed(
+    name: str, text: str, distortion: Distortion, *, motion: Motion = Motion.GOES_ON,
+    stands: Time = never, warns: bool = False,
+) -> Exercise:  # fmt: skip
     """A hand whose samples do not arrive as they are: it is followed, or held as if clutched."""
+    is_going = motion is Motion.GOES_ON
     return Exercise(
         name=name, text=text, inject=partial(_distort, distortion), undo=_straighten,
-        motion=Motion.RESTS if is_held else Motion.GOES_ON, allowed=0.35,
+        motion=motion, stands=stands, warns=warns, watch=_WATCH if is_going else 0.0,
     )  # fmt: skip
+
+
+def _shake(rig: Rig) -> None:
+    """A hand far faster than the tool may be."""
+    rig.set("slave_sim", "operation.tool_speed", _SLOW)
+    rig.mark()
+    rig.distort(hand.shaken(_SHAKE, _SHAKES))
+    rig.wait(_FOR)
+
+
+def _calm(rig: Rig) -> None:
+    rig.distort(hand.faithful)
+    rig.wait(0.5)
+    rig.set("slave_sim", "operation.tool_speed", 0.0)
+
+
+def _press_limit(rig: Rig) -> None:
+    """Drive a joint into the end of its range, keep on, and go back."""
+    rig.distort(hand.silent)
+    rig.wait(0.3)  # after which others may drive the arm
+    speeds = rig.way_to_limit() / _PRESS
+    rig.mark()
+    rig.drive(speeds, _PRESS + _STAY)
+    rig.drive(-speeds, _PRESS)
+    rig.wait(0.3)
 
 
 def _mute(rig: Rig) -> None:
@@ -117,7 +151,7 @@ SAMPLES = (
     Exercise(
         name="master_silent", text="hand silent for 3 s",
         inject=partial(_distort, hand.silent, seconds=3.0), undo=_straighten,
-        states=(State.PAUSED,), faults=(Fault.SILENCE,), cures=(Cure.RESUME,),
+        states=(State.PAUSED,), faults=(Fault.SILENCE,), cures=(Cure.RESUME,), told=outage,
     ),
     Exercise(
         name="hiccup", text="hand silent for 0.5 s",
@@ -125,21 +159,34 @@ SAMPLES = (
     ),
     _disturbed("loss", "30 % of the hand's samples lost", hand.lossy(0.3)),
     _disturbed("loss_heavy", "90 % of the hand's samples lost", hand.lossy(0.9)),
-    _disturbed("delay", "hand's samples 0.2 s late", hand.delayed(100)),
+    _disturbed("delay", "hand's samples 0.2 s late", hand.delayed(100), stands=after(0.2)),
     _disturbed("reordered", "hand's samples in reverse order, five at a time", hand.reordered(5)),
-    _disturbed("nan", "hand sends NaN", hand.filled(math.nan), is_held=True),
-    _disturbed("infinite", "hand sends 1e308 m", hand.filled(1e308), is_held=True),
-    _disturbed("teleport", "hand jumps by 10 cm", hand.shifted((0.1, 0.0, 0.0))),
-    _disturbed("random", "hand at random places in 20 cm", hand.scattered(0.2), is_held=True),
-    _disturbed("stamps_frozen", "hand's stamps stand still", hand.frozen_stamps(), is_held=True),
-    _disturbed("stamps_zero", "hand's stamps are 0", hand.stamped(lambda _: 0), is_held=True),
-    _disturbed(
-        "stamps_ahead", "hand's stamps 2 s ahead", hand.stamped(lambda ns: ns + _AHEAD_NS),
-        is_held=True,
-    ),
+    _disturbed("replayed", "hand's samples of 0.2 s ago between the new ones", hand.replayed(100)),
+    _disturbed("nan", "hand sends NaN", hand.filled(math.nan), motion=Motion.RESTS),
+    _disturbed("infinite", "hand sends 1e308 m", hand.filled(1e308), motion=Motion.HOLDS,
+               warns=True),
+    _disturbed("teleport", "hand jumps by 10 cm", hand.shifted((0.1, 0.0, 0.0)), warns=True),
+    _disturbed("random", "hand at random places in 20 cm", hand.scattered(0.2),
+               motion=Motion.HOLDS, warns=True),
+    _disturbed("stamps_frozen", "hand's stamps stand still", hand.frozen_stamps(),
+               motion=Motion.RESTS, warns=True),
+    _disturbed("stamps_zero", "hand's stamps are 0", hand.stamped(lambda _: 0),
+               motion=Motion.RESTS, warns=True),
+    _disturbed("stamps_ahead", "hand's stamps 2 s ahead", hand.stamped(lambda ns: ns + _AHEAD_NS),
+               motion=Motion.RESTS, warns=True),
     Exercise(
         name="buttons_silent", text="buttons silent for 1.5 s, hand goes on", inject=_mute,
-        undo=_unmute, allowed=0.65,
+        undo=_unmute, motion=Motion.HOLDS, allowed=lambda numbers: numbers.button_silence,
+        warns=True,
+    ),
+    Exercise(
+        name="fast_hand", text=f"hand shakes at {_SHAKEN:.1f} m/s, tool speed {_SLOW:g} m/s",
+        inject=_shake, undo=_calm, motion=Motion.LED, hand_speed=_SHAKEN, tool_speed=_SLOW,
+    ),
+    Exercise(
+        name="press_limit", text="servo_jv drives a joint into its limit", inject=_press_limit,
+        undo=_straighten, motion=Motion.LED, faults=(Fault.JOINT_LIMIT,),
+        told=lambda numbers: _PRESS + numbers.pressing_time,
     ),
     Exercise(
         name="second_master", text="second master for 0.5 s", inject=_second_master,
@@ -166,7 +213,8 @@ SAMPLES = (
         cures=(Cure.NOTHING, Cure.RESUME),
     ),
     Exercise(
-        name="flood", text="20,000 old samples at once", inject=_flood,
+        name="flood", text="20,000 old samples at once", inject=_flood, stands=after(1.0),
+        gap=lambda numbers: numbers.longest_pause, lost=1.0,
         undo=_leave(MASTER_MEASURED_CP), motion=Motion.GOES_ON,
         states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
     ),

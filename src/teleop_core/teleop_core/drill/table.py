@@ -43,11 +43,10 @@ def summary(outcomes: Sequence[Outcome]) -> list[str]:
     lines = []
     for outcome in outcomes:
         name, extra = outcome.exercise.name, outcome.extra
-        if "stop_s_median" in extra and name.startswith("stop_") and extra["repeats"] > 1:
-            stop = f"{1e3 * extra['stop_s_median']:.1f} ms, at most {1e3 * extra['stop_s']:.1f} ms"
-            rest = f"{1e3 * extra.get('rest_s_median', math.nan):.0f} ms"
-            text = f"{name}: zero speed after {stop} ({extra['repeats']:.0f} times), rest after"
-            lines.append(f"{text} {rest}")
+        if name.startswith("stop_") and extra.get("repeats", 1) > 1:
+            still = f"{1e3 * extra['still_s_median']:.1f} ms, median of {extra['repeats']:.0f}"
+            rest = f"the tip at rest after {1e3 * extra['rest_s_median']:.0f} ms"
+            lines.append(f"{name}: zero speed after {still}; {rest}")
     failed = [outcome for outcome in outcomes if outcome.failures()]
     for outcome in failed:
         lines.append(f"✗ {outcome.exercise.name}: {'; '.join(outcome.failures())}")
@@ -63,7 +62,7 @@ def _row(outcome: Outcome) -> list[str]:
         _number(1e3 * outcome.detected, 0),
         outcome.state_text,
         _travel(outcome),
-        f"{outcome.ratio:.3f}",
+        _number(outcome.measured("step_ratio").value, 3),
         outcome.recording,
         _recovered(outcome),
         "✗" if outcome.failures() else "✓",
@@ -71,9 +70,11 @@ def _row(outcome: Outcome) -> list[str]:
 
 
 def _travel(outcome: Outcome) -> str:
-    if outcome.exercise.motion is Motion.GOES_ON:
-        return f"goes on ({_number(1e3 * outcome.travel, 1)})"
-    return f"{_number(1e3 * outcome.travel, 1)} of {_number(1e3 * outcome.bound, 1)}"
+    found = outcome.measured("travel_m")
+    if outcome.exercise.motion is Motion.LED:
+        return "is led"
+    goes = "goes on, " if outcome.exercise.motion is Motion.GOES_ON else ""
+    return f"{goes}{_number(1e3 * found.value, 1)} of {_number(1e3 * found.most, 1)}"
 
 
 def _recovered(outcome: Outcome) -> str:
@@ -85,4 +86,4 @@ def _recovered(outcome: Outcome) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    return "–" if math.isnan(value) else f"{value:.{digits}f}"
+    return "–" if not math.isfinite(value) else f"{value:.{digits}f}"

@@ -1,16 +1,20 @@
 """Rig of a drill: all that can be done to a running session, on its topics and to its processes."""
 
+import re
 import signal
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
@@ -31,8 +35,12 @@ from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION
 from teleop_core.topics import SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
 
+_NUMBERS = re.compile(r"[-+]?[0-9][0-9.e]*")
+_EMPTY = {"operation.reported": Parameter.Type.STRING_ARRAY}
+_PERIOD_NS = 1_000_000_000  # of reports: what comes later tells of the time since the fault
 _ANSWER = 3.0  # patience with a service [s]
 _FOUND = 3.0  # patience with discovery [s]
+_DRIVE_PERIOD = 0.01
 _FRESH = 0.3  # a setpoint that is older is none of a running slave [s]
 
 
@@ -65,14 +73,18 @@ class LiveRig:
         self._node, self._own = (self._make_node("drill"), self._make_node("drill_hand"))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._stop = self._node.create_publisher(Bool, STOP_TOPIC, 10)
+        self._stop = self._node.create_publisher(  # as anybody's button, which keeps no state
+            Bool, STOP_TOPIC, 100,
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        )  # fmt: skip
+        self._speeds = self._node.create_publisher(JointState, "/slave/servo_jv", 10)
         self._services = {
             name: self._node.create_client(Trigger, f"/slave/{name}") for name in COMMANDS
         }
         self._settings = self._node.create_client(SetParameters, "/slave_sim/set_parameters")
         self._intruders: dict[str, Any] = {}
         self.begin_ns, self.warned, self.said = 0, dict[str, int](), ""
-        self._warned_before: set[str] = set()
+        self.woken_ns, self._warned_before = 0, dict[str, str]()
         self.tap = Tap(
             self._own, robot.joint_names, configuration.groups[SESSION].real_time,
             has_hand=master is Master.DRILL,
@@ -98,8 +110,12 @@ class LiveRig:
     def mark(self) -> None:
         """The fault begins now."""
         self.begin_ns, self.warned, self.said = time.time_ns(), {}, ""
+        self._warned_before = self._warnings()
+
+    def _warnings(self) -> dict[str, str]:
+        """What each node warns of now, but for the numbers, which change with every report."""
         told = self.observer.statuses.items()
-        self._warned_before = {name for name, status in told if status.level >= WARNING}
+        return {n: _NUMBERS.sub("", s.message) for n, s in told if s.level >= WARNING}
 
     def note(self, text: str) -> None:
         """Say something that belongs beside the state."""
@@ -114,22 +130,34 @@ class LiveRig:
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0.0:
             self.observer.listen(min(left, 0.02))
-            for name, status in tuple(self.observer.statuses.items()):
-                if status.level < WARNING:
-                    self._warned_before.discard(name)
-                elif name not in self.warned and name not in self._warned_before:
-                    age_ns = round(1e9 * (time.monotonic() - status.arrival))
-                    self.warned[name] = time.time_ns() - age_ns
+            for name, text in self._warnings().items():
+                arrival = self.observer.statuses[name].arrival
+                arrival_ns = time.time_ns() - round(1e9 * (time.monotonic() - arrival))
+                is_new = self._warned_before.get(name) != text
+                if name not in self.warned and (is_new or arrival_ns > self.begin_ns + _PERIOD_NS):
+                    self.warned[name] = arrival_ns
 
     def setpoint(self) -> Array:
         """Newest joint setpoint (n,) of the slave [rad or m]."""
         rows = self.tap.recent(SLAVE_SETPOINT_JS, 1)
         return np.array(rows[-1] if len(rows) else self._robot.home)
 
-    def effort_limit(self) -> Array:
-        """What the slave's drives can give, shape (n,) [N·m or N]."""
-        assert self._robot.drives is not None
-        return np.array(self._robot.drives.effort_limit)
+    def way_to_limit(self) -> Array:
+        """Way (n,) of one joint, that which moves the tip least, to its nearer limit [rad or m]."""
+        q, robot = self.setpoint(), self._robot
+        up, down = robot.upper - q, robot.lower - q
+        ways = np.where(up < -down, up, down)
+        moved = np.linalg.norm(robot.jacobian(q)[:3], axis=0) * np.abs(ways)
+        fastest = np.abs(ways) / np.array(robot.drives.speed_limit)  # type: ignore[union-attr]
+        joint = int(np.argmin(moved + fastest))
+        return np.where(np.arange(robot.n) == joint, ways, 0.0)
+
+    def drive(self, speeds: Array, seconds: float) -> None:
+        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            self._speeds.publish(JointState(velocity=speeds.tolist()))
+            self.wait(_DRIVE_PERIOD)
 
     def operation(self) -> dict[str, float]:
         """Newest report of the slave's operation; empty before the first."""
@@ -163,13 +191,19 @@ class LiveRig:
         self.session.send(node, signal.SIGKILL)
         self.session.await_end(node, 2.0)
 
-    def freeze(self, node: str, seconds: float) -> None:
-        """Stop a node's process for a time [s], then let it go on."""
+    def freeze(
+        self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None
+    ) -> None:
+        """Stop a node's process for a time [s], do something, then let it go on."""
         self.mark()
         self.session.send(node, signal.SIGSTOP)
+        begin = time.monotonic()
         try:
-            self.wait(seconds)
+            meanwhile()
+            self.wait(seconds - (time.monotonic() - begin))
         finally:
+            if self.is_composed or node == "slave_sim":
+                self.woken_ns = time.time_ns()
             self.session.send(node, signal.SIGCONT)
 
     def limit_files(self, node: str, room: int | None) -> None:
@@ -248,14 +282,21 @@ class LiveRig:
 
     def command(self, name: str) -> bool:
         """Ask the slave for something by service; whether it was done."""
-        found = self._call(self._services[name], Trigger.Request())
-        return bool(found is not None and found.success)
+        return self.commands(name)[0]
+
+    def commands(self, *names: str) -> list[bool]:
+        """As :meth:`command`, some at once, without waiting for the answers in between."""
+        if not all(self._services[name].wait_for_service(_FOUND) for name in names):
+            return [False] * len(names)
+        asked = [self._services[name].call_async(Trigger.Request()) for name in names]
+        found = [self._answer(one) for one in asked]
+        return [one is not None and one.success for one in found]
 
     def set(self, node: str, name: str, value: object) -> bool:
         """Set a parameter of a running node; whether it was taken."""
         assert node == "slave_sim", node
         entry = (
-            Parameter(name, Parameter.Type.DOUBLE_ARRAY, [])
+            Parameter(name, _EMPTY.get(name, Parameter.Type.DOUBLE_ARRAY), [])
             if value == []
             else Parameter(name, value=value)
         )
@@ -267,6 +308,9 @@ class LiveRig:
         """Answer of a service; None if there is none in time."""
         if not client.wait_for_service(_FOUND):
             return None
-        future = client.call_async(request)
+        return self._answer(client.call_async(request))
+
+    def _answer(self, future: Any) -> Any:
+        """What a service answered; None if it did not in time."""
         self._executor.spin_until_future_complete(future, _ANSWER)
         return future.result() if future.done() else None

@@ -22,6 +22,7 @@ from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.session.configuration import Configuration
 
+_NEVER_NS = 2**62
 START_TIMEOUT = 180.0
 _MASTER = "haptic_master"
 _BUSY = "while True: pass"
@@ -56,6 +57,7 @@ class DrillSession:
         self._others: list[subprocess.Popen[Any]] = []
         self._bystander: subprocess.Popen[str] | None = None
         self.recordings: list[Path] = []
+        self._begun_ns: list[int] = []
         names = [member.name for member in configuration.graph.members]
         self._nodes = [n for n in names if self._has_device or n != _MASTER]
 
@@ -83,6 +85,7 @@ class DrillSession:
     def _launch(self, process: str) -> None:
         if process in {RECORDER_NAME, SESSION_NODE}:
             self.recordings.append(self._folder / f"recording_{len(self.recordings) + 1}")
+            self._begun_ns.append(time.time_ns())
         # Kept open: a process that is started later reads it as well.
         file = tempfile.TemporaryFile("w+")  # noqa: SIM115
         file.write(self._parameters())
@@ -127,6 +130,11 @@ class DrillSession:
         self._children.clear()
         for file in self._files:
             file.close()
+
+    def until_ns(self, recording: Path) -> int:
+        """When the recording after one was begun [ns]; later than all without another."""
+        place = self.recordings.index(recording) + 1
+        return self._begun_ns[place] if place < len(self._begun_ns) else _NEVER_NS
 
     # -- what can be done to them ----------------------------------------------------------------
 

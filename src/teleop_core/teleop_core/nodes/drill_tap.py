@@ -1,17 +1,21 @@
 """Tap of a drill: the hand of the drill on its topics, and what the slave says, in one thread."""
 
+import struct
 import threading
 import time
+from array import array
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from rclpy.node import Node
 
-from teleop_core.bags.messages import layout, read_numbers
+from teleop_core.bags.messages import SECOND_NS, layout, read_numbers
 from teleop_core.drill import hand
 from teleop_core.drill.hand import Distortion, Sample
 from teleop_core.drill.measure import Trace
+from teleop_core.drill.numbers import Scheduling
+from teleop_core.drill.recordings import Counted
 from teleop_core.geometry import Array
 from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.streams import Subscription, message_type, profile
@@ -19,15 +23,22 @@ from teleop_core.session.layers import RealTimeParameters
 from teleop_core.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
+    NO_COMMAND_NS,
     SLAVE_MEASURED_CP,
+    SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
-    SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
+    SLAVE_TRUE_CP,
     TELEOP_STATE,
     Topic,
 )
 
-_HEARD = (SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_OPERATION, TELEOP_STATE)
+STREAMS_HEARD = (SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_TRUE_CP)
+"""Streams that are heard, and counted against the recording."""
+_HEARD = (*STREAMS_HEARD, SLAVE_OPERATION, TELEOP_STATE)
+_STAMP = struct.Struct("<iI")
+_DAY_NS = 86_400 * SECOND_NS
+_STAMP_AT = 4  # behind the encapsulation
 _QUEUE = 4000
 _BUTTONS_EVERY = 5
 _FAR_BEHIND = 0.1
@@ -56,6 +67,8 @@ class Tap:
         self.distortion: Distortion = hand.faithful
         self.is_mute, self._joint_names = False, joint_names
         self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
+        self._counted = {topic.name: (array("q"), array("q")) for topic in STREAMS_HEARD}
+        self._late: list[tuple[int, float]] = []
         self._subscriptions = [Subscription(node, t, f"/{t.name}", _QUEUE) for t in _HEARD]
         self._hand = _Hand(node, self) if has_hand else None
         self._is_running, self._lock = True, threading.Lock()
@@ -72,6 +85,7 @@ class Tap:
     def clear(self) -> None:
         """Forget what was heard, but the last of each topic that is sent where it changes."""
         with self._lock:
+            self._late.clear()
             for topic in _HEARD:
                 keep = -1 if topic in {SLAVE_OPERATION, TELEOP_STATE} else -400
                 self._heard[topic.name] = self._heard[topic.name][keep:]
@@ -82,13 +96,26 @@ class Tap:
             heard = list(self._heard[topic.name])
         form = layout(topic, self._joint_names)
         found = [(sent, number, form.decode_one(data)) for sent, number, data in heard]
-        sound = [(sent, number, one[1]) for sent, number, one in found if one is not None]
-        rows = [values for *_, values in sound]
+        sound = [(sent, number, one) for sent, number, one in found if one is not None]
+        rows = [values for *_, (_, values) in sound]
         return Trace(
             np.array([sent for sent, *_ in sound], np.int64),
             np.array([number for _, number, _ in sound], np.int64),
             np.array(rows) if rows else np.empty((0, form.width)),
+            np.array([stamp for *_, (stamp, _) in sound], np.int64),
         )
+
+    def counted(self) -> Counted:
+        """Of every stream: when each message since the start was sent, and its stamp [ns]."""
+        with self._lock:
+            both = {n: [np.array(a, np.int64) for a in two] for n, two in self._counted.items()}
+        return {name: (sent, stamps) for name, (sent, stamps) in both.items()}
+
+    def scheduling(self, since_ns: int) -> Scheduling:
+        """How late this thread was woken since a time [ns]."""
+        with self._lock:
+            late = [seconds for at_ns, seconds in self._late if at_ns >= since_ns]
+        return Scheduling(float(np.median(late)), max(late)) if late else Scheduling()
 
     def recent(self, topic: Topic, count: int) -> Array:
         """Values of the newest messages of a stream, shape (at most count, width)."""
@@ -125,9 +152,13 @@ class Tap:
             self._listen()
             due += hand.PERIOD
             now = time.monotonic()
-            if due < now - _FAR_BEHIND:
-                due = now
-            time.sleep(max(0.0, due - now))
+            if (
+                due <= now
+            ):  # its own work took longer than a period: nothing is known of the machine
+                due = now if due < now - _FAR_BEHIND else due
+                continue
+            time.sleep(due - now)
+            self._late.append((time.time_ns(), max(0.0, time.monotonic() - due)))
 
     def _listen(self) -> None:
         with self._lock:
@@ -136,7 +167,20 @@ class Tap:
                 while (taken := subscription.take()) is not None:
                     data, about = taken
                     number = about["publication_sequence_number"]
-                    heard.append((about["source_timestamp"], number, data))
+                    sent_ns = about["source_timestamp"]
+                    heard.append((sent_ns, number, data))
+                    self._count(subscription.topic.name, sent_ns, data)
+
+    def _count(self, name: str, sent_ns: int, data: bytes) -> None:
+        """Take note of a message of a stream; what the drill itself has forged is none."""
+        if name not in self._counted or len(data) < _STAMP_AT + _STAMP.size:
+            return
+        seconds, nanoseconds = _STAMP.unpack_from(data, _STAMP_AT)
+        stamp_ns = seconds * SECOND_NS + nanoseconds
+        if stamp_ns == NO_COMMAND_NS or abs(stamp_ns - sent_ns) < _DAY_NS:
+            sent, stamps = self._counted[name]
+            sent.append(sent_ns)
+            stamps.append(stamp_ns)
 
 
 class _Hand:

@@ -1,0 +1,274 @@
+"""Mutants: copies of the package with one safety broken, each of which the drill must find.
+
+    python tests/mutants.py --list
+    python tests/mutants.py stop_late braking_weak --composed
+
+A mutant is a copy of the package in a directory of its own with a few words of its source replaced,
+and comes first in the path of the processes that the drill starts; the drill itself is the sound
+one. What a mutant compiles is kept in its own directory, and used again in the next run.
+"""
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src/teleop_core/teleop_core"
+PLACE = Path(os.environ.get("TELEOP_MUTANTS", ROOT / "out/mutants"))
+"""Where the copies are."""
+PRIORITY = "real_time.priority=30"
+"""Of the loops and of the drill's own hand, where the system grants it: less noise."""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One broken safety.
+
+    Attributes:
+        name: By which it is asked for.
+        text: What is broken.
+        changes: Files in the package, each with text that stands in it once, and what replaces it.
+        rows: Exercises of the drill that must find it, at least one of them.
+        composed: Those in one process, if they are others.
+    """
+
+    name: str
+    text: str
+    changes: tuple[tuple[str, str, str], ...]
+    rows: tuple[str, ...]
+    composed: tuple[str, ...] | None = None
+
+    def rows_of(self, *, is_composed: bool) -> tuple[str, ...]:
+        """Exercises in one form; empty where that form does not have what is broken."""
+        return self.rows if self.composed is None or not is_composed else self.composed
+
+
+def _mutant(
+    name: str, text: str, file: str, before: str, after: str, *rows: str,
+    composed: tuple[str, ...] | None = None,
+) -> Mutant:  # fmt: skip
+    return Mutant(name, text, ((file, before, after),), rows, composed)
+
+
+_SLAVE, _COMMANDS, _WATCH = "nodes/slave_sim.py", "slave/commands.py", "operation/watch.py"
+_RECORDER, _STAGE, _STEP = "nodes/recorder.py", "slave/slave_sim.py", "slave/step.py"
+_RELEASED = """            self.request(Event.STOP)
+        elif self.state["state"] == State.FAULT:
+            self.request(Event.RESET)
+            self.request(Event.ENABLE)
+"""
+_SOME = """        came = [one for one in came if not (
+            one[1].name.startswith("slave/measured") and one[0] // 1000 % 10 < 3)]
+        came.sort(key=lambda message: message[0])
+"""
+_CLOSED = """            try:
+                self._writer.close()
+            except RecordingError:
+                self.exit_code = self.exit_code or 1  # the log"""
+_LATE = """self._held = [*getattr(self, "_held", []),
+                      *((due[0], one) for one in self._stop.take())]
+        ready = [one for at, one in self._held if due[0] - at >= 20_000_000]
+        self._held = [(at, one) for at, one in self._held if due[0] - at < 20_000_000]
+        for is_pressed in ready:"""
+MUTANTS = (
+    _mutant("stop_ignored", "nobody hears the stop button", _SLAVE,
+            "in self._stop.take():", "in ():", "stop_topic"),
+    _mutant("stop_late", "the stop button is heard 20 ms late", _SLAVE,
+            "for is_pressed in self._stop.take():", _LATE, "stop_topic"),
+    _mutant("stop_unlatched", "a released stop button enables the arm", _STAGE,
+            "            self.request(Event.STOP)\n", _RELEASED, "stop_latched"),
+    Mutant("press_lost", "the stop button's reader keeps one message",
+           (("nodes/operation.py", "history=HistoryPolicy.KEEP_ALL,",
+             "history=HistoryPolicy.KEEP_LAST, depth=1,"),
+            ("operation/presses.py", "missing = max(0, number - last - 1)", "missing = 0")),
+           ("stop_brief",)),
+    _mutant("stop_soft", "a stop brakes as softly as a pause", _STEP,
+            "AT_ONCE if s.state == _FAULT else AT_LIMITS", "AT_LIMITS", "stop_topic"),
+    _mutant("reset_not_needed", "enable ends a stop without reset", "operation/states.py",
+            "{_D: _E, _E: _E, _P: _E}", "{_D: _E, _E: _E, _P: _E, _F: _E}", "stop_latched"),
+    _mutant("heartbeat_ignored", "a silent stop button is none", _WATCH,
+            "if p.heartbeat_ns > 0 and", "if p.heartbeat_ns > 10**18 and", "heartbeat"),
+    _mutant("resume_moving", "resume is taken while the arm moves", "operation/states.py",
+            "and s.is_moving:", "and s.is_moving > 1:", "resume_early"),
+    _mutant("no_pause", "silence never pauses", _COMMANDS,
+            "0 < p.outage_ns < silence_ns", "0 < p.outage_ns < silence_ns - 10**18",
+            "master_silent"),
+    _mutant("timeout_long", "commands are in force for 0.5 s longer", _STAGE,
+            "round(parameters.command_timeout * 1e9)",
+            "round(parameters.command_timeout * 1e9) + 500_000_000", "master_silent"),
+    _mutant("braking_weak", "the arm brakes with a tenth of what it can", _STAGE,
+            'p["braking"] = drives', 'p["braking"] = 0.1 * drives', "master_silent", "disable"),
+    _mutant("steps_large", "setpoints move 1.5 times as fast as their drives", _COMMANDS,
+            "reach = p.speed_limit[i] * dt\n        step = min(max(s.filtered",
+            "reach = 1.5 * p.speed_limit[i] * dt\n        step = min(max(s.filtered",
+            "loss_heavy", "hiccup", "delay"),
+    _mutant("tool_fast", "nothing limits the speed of the tool", _COMMANDS,
+            "if step > most:", "if step > 1e9:", "fast_hand"),
+    _mutant("limits_off", "driven joints go beyond their limits", "slave/velocity.py",
+            """        step = min(step, _stoppable(p.upper[i] - s.setpoint[i], most))
+        step = max(step, -_stoppable(s.setpoint[i] - p.lower[i], most))
+        before = s.setpoint[i]
+        s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
+""", """        before = s.setpoint[i]
+        s.setpoint[i] = before + step
+""", "press_limit"),
+    _mutant("tracking_off", "no joint is too far from its setpoint", _WATCH,
+            "if not off <= p.lag[i]:", "if not off <= 1e9:", "stuck_tracking"),
+    _mutant("tip_off", "no tip is too far from its setpoint", _WATCH,
+            "if not square <= p.tip_error * p.tip_error:", "if not square <= 1e9:", "stuck_tip"),
+    _mutant("effort_off", "no drive is at its limit for too long", _WATCH,
+            "> p.effort_ticks:", "> 10**9:", "stuck_effort"),
+    _mutant("stall_unnoticed", "a loop that stood still goes on", _SLAVE,
+            "if 0.0 < longest < missed:", "if 0.0 < longest < missed - 1e9:", "freeze_slave_sim",
+            composed=("freeze_session",)),
+    _mutant("clock_unnoticed", "a stepped clock is none", _SLAVE,
+            "> _CLOCK_STEP_NS:", "> 10**30:", "clock_ahead", "clock_back"),
+    _mutant("second_publishers", "messages of all publishers are taken", "nodes/sender.py",
+            "if step != 1 and self._number", "if False and self._number",
+            "second_master", "second_commander", composed=("second_master",)),
+    _mutant("old_messages", "messages older than the last one are taken", "nodes/streams.py",
+            "check(self.topic.kind, stamp_ns, values, last_ns)",
+            "check(self.topic.kind, stamp_ns, values, None)", "replayed", "stamps_frozen"),
+    _mutant("plausibility_off", "a hand may be anywhere at once", "mapping/plausibility.py",
+            "    if not is_sound:\n", "    is_sound = True\n    if not is_sound:\n",
+            "teleport", "infinite"),
+    _mutant("buttons_forgotten", "silent buttons are released ones", "mapping/plausibility.py",
+            "return bool(s.is_lost)", "return False", "buttons_silent"),
+    _mutant("measured_lies", "the arm measures half of what it moves", _STEP,
+            "row.slave_measured_js[i] = s.measured[i]",
+            "row.slave_measured_js[i] = 0.5 * s.measured[i]", "loss"),
+    _mutant("recorder_late", "the recorder holds messages for 2 s", _RECORDER,
+            "HOLD_NS = 100_000_000", "HOLD_NS = 2_000_000_000", "kill_recorder",
+            composed=("kill_session",)),
+    _mutant("not_recorded", "30 % of slave/measured* are not recorded", _RECORDER,
+            "        came.sort(key=lambda message: message[0])\n", _SOME, "hiccup"),
+    _mutant("not_closed", "the recording is left open at the end", _RECORDER,
+            _CLOSED, _CLOSED.replace("self._writer.close()", "pass"), "hiccup"),
+)  # fmt: skip
+"""All of them."""
+SOUND = Mutant("sound", "nothing is broken", (), ())
+"""A copy with which no row may fail."""
+
+
+def changed(mutant: Mutant) -> dict[str, str]:
+    """Texts of the files of the package that a mutant changes.
+
+    Raises:
+        ValueError: A change does not fit the source: its text does not stand there once.
+    """
+    texts: dict[str, str] = {}
+    for file, before, after in mutant.changes:
+        text = texts.get(file) or (PACKAGE / file).read_text(encoding="utf-8")
+        if (times := text.count(before)) != 1:
+            reason = f"{before!r} stands {times} times in {file}, must once"
+            raise ValueError(f"mutant {mutant.name}: {reason}; change it as the source has changed")
+        texts[file] = text.replace(before, after)
+    return texts
+
+
+def tree(mutant: Mutant) -> Path:
+    """Directory that holds the mutant's package, made or brought up to date."""
+    texts, copy = changed(mutant), PLACE / mutant.name / "teleop_core"
+    is_new = not copy.exists()
+    for file in PACKAGE.rglob("*"):
+        name = str(file.relative_to(PACKAGE))
+        is_kernel = file.parent.name == "__pycache__" and ".nb" in file.name
+        if file.is_dir() or (file.parent.name == "__pycache__" and not (is_new and is_kernel)):
+            continue
+        _put(texts[name].encode() if name in texts else file.read_bytes(), copy / name)
+    if not (config := copy.parent / "config").exists():
+        config.symlink_to(ROOT / "config")
+    return copy.parent
+
+
+def _put(data: bytes, file: Path) -> None:
+    """Write a file, if that changes it."""
+    if file.exists() and file.read_bytes() == data:
+        return
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(data)
+
+
+def drilled(mutant: Mutant, rows: Sequence[str], *, is_composed: bool) -> dict[str, list[str]]:
+    """What the drill finds wrong with a mutant, by row."""
+    from teleop_core.drill import chosen
+    from teleop_core.nodes.drill import drill
+
+    os.environ["PYTHONPATH"] = str(tree(mutant))
+    with tempfile.TemporaryDirectory(prefix="mutant_") as folder:
+        outcomes = drill(
+            chosen(tuple(rows), is_composed=is_composed), Path(folder), _silent,
+            is_composed=is_composed, texts=(PRIORITY,),
+        )  # fmt: skip
+    return {one.exercise.name: one.failures() for one in outcomes}
+
+
+def _silent(_: str) -> None:
+    """Say nothing of single rows."""
+
+
+def hunt(mutants: Sequence[Mutant], *, is_composed: bool) -> list[str]:
+    """Drill mutants; returns the names of those that were not found."""
+    missed = []
+    for mutant in mutants:
+        if not (rows := mutant.rows_of(is_composed=is_composed)):
+            continue
+        begin = time.monotonic()
+        try:
+            found = drilled(mutant, rows, is_composed=is_composed)
+        except Exception as error:  # a session that does not start is not found by its rows
+            found = {}
+            print(f"  {type(error).__name__}: {error}", flush=True)
+        failures = [f"{row}: {text}" for row, texts in found.items() for text in texts]
+        if not failures:
+            missed.append(mutant.name)
+        way, took = "composed" if is_composed else "processes", time.monotonic() - begin
+        mark = "found" if failures else "MISSED"
+        print(f"{mark} {mutant.name} ({way}, {took:.0f} s): {'; '.join(failures)}", flush=True)
+    return missed
+
+
+def check_sound(mutants: Sequence[Mutant], *, is_composed: bool) -> list[str]:
+    """Do the rows of all mutants with a copy that is sound; returns what they find all the same."""
+    rows = {row: None for one in mutants for row in one.rows_of(is_composed=is_composed)}
+    found = drilled(SOUND, tuple(rows), is_composed=is_composed)
+    wrong = [f"{row}: {text}" for row, texts in found.items() for text in texts]
+    way = "composed" if is_composed else "processes"
+    print(f"sound ({way}): {len(found)} rows, {'; '.join(wrong) or 'none fails'}", flush=True)
+    return wrong if len(found) == len(rows) else [*wrong, "not all rows were done"]
+
+
+def main() -> int:
+    """Drill the mutants that are named, or all, in both forms; 0 if each was found."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("names", nargs="*", help="mutants (default: all, and the sound copy)")
+    parser.add_argument("--composed", action="store_true", help="in one process only")
+    parser.add_argument("--processes", action="store_true", help="in a process for each node only")
+    parser.add_argument("--list", action="store_true", dest="is_list")
+    asked = parser.parse_args()
+    chosen = [one for one in MUTANTS if not asked.names or one.name in asked.names]
+    if unknown := set(asked.names) - {one.name for one in chosen}:
+        parser.error(f"no mutant {', '.join(sorted(unknown))}; see --list")
+    if asked.is_list:
+        for one in MUTANTS:
+            print(f"{one.name:20} {one.text} ({', '.join(one.rows)})")
+        return 0
+    begin, wrong = time.monotonic(), []
+    for is_composed in (False, True):
+        if asked.processes if is_composed else asked.composed:
+            continue
+        if not asked.names:
+            wrong += check_sound(chosen, is_composed=is_composed)
+        wrong += hunt(chosen, is_composed=is_composed)
+    minutes = (time.monotonic() - begin) / 60.0
+    print(f"{len(chosen)} mutants, {minutes:.0f} minutes; {len(wrong)} not as they should be")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
