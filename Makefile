@@ -79,7 +79,7 @@ endurance: setup
 	$(BIN)/python benchmarks/endurance.py --count $(COUNT)
 
 # Copies of the package with one safety broken each: the drill must find every one, in both forms,
-# and nothing in a sound copy; half an hour. MUTANTS names some of them.
+# and nothing in a sound copy; about an hour on a busy machine. MUTANTS names some of them.
 drill-mutants: setup
 	$(BIN)/python tests/mutants.py $(MUTANTS)
 

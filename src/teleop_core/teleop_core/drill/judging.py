@@ -18,7 +18,7 @@ _HOPS = 4
 """Topics from the hand to the setpoint."""
 _FULL = 0.9
 """Share of the possible deceleration with which a setpoint must brake."""
-_LEAST = 0.5
+_LEAST = 0.8
 """Share of the hand's way that an arm that goes on must go."""
 _SLOW = 0.05
 """Share of the hand's speed below which the tip is at rest."""
