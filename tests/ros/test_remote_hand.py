@@ -124,7 +124,7 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
     peer.wait_value("haptic_master", "refused.hand/servo_cp.not_finite", lambda n: n > 0)
 
     buttons.forget()
-    deep = peer.publisher(HAND_BUTTONS, readers=0)  # its queue holds ten
+    deep = peer.publisher(HAND_BUTTONS, readers=0)
     peer.wait(deep.get_subscription_count, "a reader of the buttons")
     for pressed in ([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]):
         peer.send(HAND_BUTTONS, time.time_ns(), pressed)

@@ -26,7 +26,7 @@ class Quality(Enum):
 
     STREAM = "offered reliable, read best effort, keep last 1: only the newest sample matters"
     LATCHED = "reliable, transient local, keep last 1: late joiners get the last value"
-    REPORT = "reliable, keep last 10: rare reports"
+    REPORT = "reliable, keep last 10: each message counts"
 
 
 class Limit(IntEnum):
@@ -271,8 +271,8 @@ HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Where a person wants the stylus, who is the hand of ``operator=remote``; silence lets go of it.
 
 As ``hand/buttons`` it comes from outside: no stage writes it, and it is not recorded."""
-HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base")
-"""Buttons that this person presses and releases."""
+HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT)
+"""Buttons that this person presses and releases: each message counts, so it is sent reliably."""
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (

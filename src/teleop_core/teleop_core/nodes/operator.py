@@ -15,6 +15,7 @@ from teleop_core.errors import SessionError
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription
 from teleop_core.operation import State, operation_text
+from teleop_core.operation.states import AT_REST_ONLY
 from teleop_core.topics import OPERATION, SLAVE_OPERATION
 
 _PERIOD = 0.01
@@ -119,16 +120,30 @@ class Operator:
         self._until(lambda: self._button.listeners > 0, must=False)
         for _ in range(5):
             self._button.say(is_pressed=False)
-            self._turn()
+            self.listen()
 
     def go_on(self) -> list[str]:
-        """Release the stop, and reset and enable, or resume, every arm; what they answer."""
+        """Release the stop, and reset and enable, or resume, every arm; what they answer.
+
+        An arm that was stopped before it was homed homes then.
+        """
         self.release()
         told = []
         for arm, state in self.arms.items():
-            words = ("resume",) if state.values["state"] == State.PAUSED else ("reset", "enable")
-            told += [self.command(word, arm)[1] for word in words]
+            words = ["resume"] if state.values["state"] == State.PAUSED else ["reset", "enable"]
+            if not state.values["is_homed"] and "enable" in words:
+                words.append("home")
+            told += [self._command_at_rest(word, arm) for word in words]
         return told
+
+    def _command_at_rest(self, name: str, arm: str) -> str:
+        """Send a command again until the arm has come to rest for it; what it answers."""
+        deadline = time.monotonic() + self._patience
+        while (answer := self.command(name, arm)[1]).endswith(AT_REST_ONLY):
+            if time.monotonic() > deadline:
+                break
+            self.listen()
+        return answer
 
     def command(self, name: str, arm: str = "") -> tuple[bool, str]:
         """Send a state command to an arm; whether it was taken, and the arm's answer.
@@ -156,10 +171,10 @@ class Operator:
                 if must:
                     raise SessionError(f"no {what}")
                 return False
-            self._turn()
+            self.listen()
         return True
 
-    def _turn(self) -> None:
+    def listen(self) -> None:
         """Take what has come; look for arms."""
         for name, kinds in self._node.get_topic_names_and_types():
             if name.endswith(f"/{SLAVE_OPERATION.name}") and name not in self._reports and kinds:

@@ -166,6 +166,10 @@ def command_event(name: str) -> Event:
     return Event[name.upper()]
 
 
+AT_REST_ONLY = "the arm is not at rest yet; try again"
+"""End of the answer to a command that an arm takes at rest only."""
+
+
 def answer_text(event: Event, answer: Answer, state: State) -> str:
     """What became of an event, in words that say what would help.
 
@@ -183,7 +187,7 @@ def answer_text(event: Event, answer: Answer, state: State) -> str:
         pressed = "release the emergency stop, then reset" if event is Event.RESET else "reset"
         return f"{name} refused: an emergency stop is latched; {pressed} first"
     if answer is Answer.BRAKING:
-        return f"{name} refused: the arm is not at rest yet; try again"
+        return f"{name} refused: {AT_REST_ONLY}"
     allowed = [other.name for other in State if TABLE[other, event] >= 0]
     hint = {
         State.FAULT: "; reset first, then enable", State.DISABLED: "; enable first",

@@ -1,0 +1,155 @@
+"""Emergency stops of running sessions: time from the message to the first setpoint that is still.
+
+    python benchmarks/stops.py --count 100                   # composed and in five processes
+    python benchmarks/stops.py --count 100 --load 4          # beside four busy processes
+
+A button as anybody would write it (std_msgs/Bool, no priority) is pressed at random times while
+the arm moves. The time ends where the slave publishes the first setpoint that equals the one
+before, by the time stamp of the middleware.
+"""
+
+import argparse
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rclpy.context import Context
+from rclpy.node import Node
+from std_msgs.msg import Bool
+
+from teleop_core.bags.layouts import layout
+from teleop_core.nodes.children import environment, free_domain
+from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.operator import Operator
+from teleop_core.nodes.streams import Subscription
+from teleop_core.robots import load_robot
+from teleop_core.topics import SLAVE_SETPOINT_JS
+
+_JOINTS = load_robot("rcrt1").joint_names
+_PATIENCE = 120.0
+_STILL = 60  # equal setpoints that are a standstill
+_MOVES = 5e-4  # what the fastest joint comes on in as many ticks [rad or m]
+
+
+class Tap:
+    """Setpoints of a session and when they were sent, and a stop button."""
+
+    def __init__(self, domain: int) -> None:
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain)
+        self._node = Node("stops", context=self._context, use_global_arguments=False)
+        topic = SLAVE_SETPOINT_JS
+        self._setpoints = Subscription(self._node, topic, f"/{topic.name}", 5000)
+        self._layout = layout(topic, _JOINTS)
+        self.button = self._node.create_publisher(Bool, STOP_TOPIC, 10)
+        self.rows: list[tuple[int, Any]] = []
+
+    def take(self) -> None:
+        """Take what has come: time of sending [ns] and joints."""
+        while (taken := self._setpoints.take()) is not None:
+            found = self._layout.decode_one(taken[0])
+            if found is not None:
+                self.rows.append((int(taken[1]["source_timestamp"]), np.array(found[1])))
+
+    def wait(self, moves: bool) -> None:
+        """Wait until the last setpoints go on, or are all the same."""
+        deadline = time.monotonic() + _PATIENCE
+        while True:
+            self.take()
+            last = np.array([row for _, row in self.rows[-_STILL:]])
+            if len(last) == _STILL:
+                way = np.ptp(last, axis=0).max()
+                if (way > _MOVES) if moves else way == 0.0:
+                    return
+            if time.monotonic() > deadline:
+                raise SystemExit(f"the arm does not {'move' if moves else 'stop'}")
+            time.sleep(1e-3)
+
+    def close(self) -> None:
+        """Leave."""
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+
+def one_stop(tap: Tap) -> float:
+    """Time from the message to the first still setpoint [s]."""
+    tap.wait(moves=True)
+    time.sleep(random.uniform(0.0, 0.05))
+    tap.take()
+    tap.rows.clear()
+    pressed_ns = time.time_ns()
+    tap.button.publish(Bool(data=True))
+    tap.wait(moves=False)
+    stamps = np.array([stamp for stamp, _ in tap.rows])
+    moved = np.abs(np.diff([row for _, row in tap.rows], axis=0)).max(axis=1) > 0.0
+    first = int(np.flatnonzero(moved)[-1]) + 2 if moved.any() else 1
+    tap.button.publish(Bool(data=False))
+    return float(stamps[first] - pressed_ns) * 1e-9
+
+
+def session(folder: Path, domain: str, priority: int, is_composed: bool) -> subprocess.Popen[bytes]:
+    """Start a session in which the hand never rests."""
+    command = [sys.executable, "-m", "teleop_core.cli", "live", "--out", str(folder / "bag")]
+    command += ["--scenario", "free_motion", "--duration", "3600"]
+    for setting in (
+        f"real_time.priority={priority}",
+        "operator.approach_time=1.0",
+        "haptic_master.patience=0.0",
+    ):
+        command += ["--set", setting]
+    return subprocess.Popen(
+        command + ["--composed"] * is_composed, stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": domain},
+    )  # fmt: skip
+
+
+def measure(count: int, priority: int, is_composed: bool) -> list[float]:
+    """Times of some stops of one session [s]."""
+    environment()
+    domain = free_domain()
+    with tempfile.TemporaryDirectory() as folder:
+        running = session(Path(folder), domain, priority, is_composed)
+        tap, found = Tap(int(domain)), []
+        try:
+            with Operator(int(domain), patience=_PATIENCE) as operator:
+                while not operator.look()[""].values["is_homed"]:
+                    operator.listen()
+                for _ in range(count):
+                    found.append(one_stop(tap))
+                    operator.go_on()
+        finally:
+            tap.close()
+            running.send_signal(signal.SIGINT)
+            running.wait(60)
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=100, help="stops of each kind")
+    parser.add_argument("--priority", type=int, default=30, help="SCHED_FIFO of the session; 0: no")
+    parser.add_argument("--load", type=int, default=0, help="busy processes beside the session")
+    parser.add_argument("--kinds", nargs="+", default=["composed", "five"])
+    given = parser.parse_args()
+    busy = [subprocess.Popen([sys.executable, "-c", "while 1: pass"]) for _ in range(given.load)]
+    try:
+        for kind in given.kinds:
+            times = 1e3 * np.sort(measure(given.count, given.priority, kind == "composed"))
+            within = np.count_nonzero(times <= 2.0)
+            print(f"{kind}, priority {given.priority}, load {os.getloadavg()[0]:.1f}: median "
+                  f"{np.median(times):.2f} ms, within 2 ms {within} of {len(times)}, largest "
+                  f"{', '.join(f'{t:.1f}' for t in times[-3:])} ms", flush=True)  # fmt: skip
+    finally:
+        for process in busy:
+            process.kill()
+
+
+if __name__ == "__main__":
+    main()
