@@ -67,14 +67,14 @@ def wide_and_narrow(url: str, folder: Path) -> None:
     """Take the three."""
     with Tab(folder / "wide", 1400, 900) as tab:
         tab.visit(url)
-        tab.shows("follows · box on", 60)
+        tab.shows("follows · box on", 180)
         keep(tab, "console.png", AT_A_WALL)
         toggle_dark(tab)
         tab.click("Settings")
         keep(tab, "console_dark.png")
     with Tab(folder / "narrow", 800, 900) as tab:
         tab.visit(url)
-        tab.shows("ENABLED")
+        tab.shows("ENABLED", 60)
         toggle_dark(tab)
         tab.click("Plots")
         keep(tab, "console_800.png")
@@ -87,7 +87,7 @@ def replay(folder: Path) -> None:
     tc.run(SCENARIO, duration=12.0, out=out, arms=["left", "right"], settings=settings)
     with served(folder, out) as console, Tab(folder / "replay", 800, 900) as tab:
         tab.visit(console.url)
-        tab.shows("Play")
+        tab.shows("Play", 120)
         toggle_dark(tab)
         tab.fill("time", "9.5")
         tab.key("Enter")

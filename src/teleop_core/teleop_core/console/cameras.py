@@ -15,8 +15,8 @@ _FROM = np.array([-0.80, -0.42, 0.48])
 _WIDE, _HIGH = 0.875, 0.8  # parts of a picture that may be filled across and upwards
 ASPECT = 1.2
 """Width over height of a wide window with the panel beside it."""
-_PHONE = 0.75  # width over height below which the panel covers the lower part
-_CLEAR = (0.5, 0.3)  # middle and half height of what is clear then, of half the picture, upwards
+_PHONE = 0.75  # width over height below which a panel may cover the lower part, as on phones
+_CLEAR = (0.35, 0.6)  # middle and half height of what is used then, of half the picture, upwards
 
 
 @dataclass(frozen=True, eq=False)
