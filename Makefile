@@ -58,7 +58,11 @@ test-slow: setup crtk_msgs
 # Broken files, texts and messages, other ones each time; an hour. The tests have a short form of it.
 FUZZ_CASES ?= 1000000
 fuzz: setup
-	TELEOP_FUZZ_CASES=$(FUZZ_CASES) $(BIN)/pytest -q tests/fuzz
+	@mkdir -p $(OUT) && rm -f $(OUT)/fuzz_cases.txt
+	TELEOP_FUZZ_CASES=$(FUZZ_CASES) TELEOP_FUZZ_COUNTS=$(CURDIR)/$(OUT)/fuzz_cases.txt \
+	    $(BIN)/pytest -q -n 2 tests/fuzz
+	@awk '{ n += $$1 } END { print n " cases tried; by target: $(OUT)/fuzz_cases.txt" }' \
+	    $(OUT)/fuzz_cases.txt
 
 # Of kernels, run as plain Python: compiled code leaves no trace.
 coverage: setup

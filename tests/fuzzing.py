@@ -17,6 +17,7 @@ says how many there are in all: 20,000 in every test run, the same ones each tim
 """
 
 import functools
+import inspect
 import os
 import resource
 import signal
@@ -84,6 +85,7 @@ def fuzz(
     def decorate(test: Callable) -> Callable:
         @functools.wraps(test)
         def case(*arguments: object, **drawn: object) -> None:
+            _done.append(None)
             with lawful():
                 test(*arguments, **drawn)
 
@@ -92,9 +94,31 @@ def fuzz(
             derandomize=CASES == USUAL, phases=(Phase.explicit, Phase.generate, Phase.shrink),
             suppress_health_check=list(HealthCheck),
         )  # fmt: skip
-        return chosen(given(**strategies)(case))
+        tried = chosen(given(**strategies)(case))
+
+        def counted(**fixtures: object) -> None:
+            _done.clear()
+            try:
+                tried(**fixtures)
+            finally:
+                _tell(target)
+
+        counted.__name__, counted.__doc__ = test.__name__, test.__doc__
+        counted.__signature__ = inspect.signature(tried)  # type: ignore[attr-defined]
+        return counted
 
     return decorate
+
+
+_done: list[None] = []
+"""One for each case of the test that runs now."""
+
+
+def _tell(target: str) -> None:
+    """Add how many cases were tried to the file of ``TELEOP_FUZZ_COUNTS``, if there is one."""
+    if place := os.environ.get("TELEOP_FUZZ_COUNTS"):
+        with open(place, "a", encoding="utf-8") as file:
+            file.write(f"{len(_done):8} {target}\n")
 
 
 @contextmanager
