@@ -356,3 +356,24 @@ def test_a_bag_that_was_cut_off_is_told(tmp_path):
     file.write_bytes(file.read_bytes()[:-50])
     with pytest.raises(tc.RecordingError, match="teleop recover"):
         tc.import_recording(folder, tmp_path / "out")
+
+
+@pytest.mark.parametrize("is_ros2", [True, False])
+def test_both_masters_of_the_da_vinci_kit_and_its_pedal_are_two_arms(tmp_path, is_ros2):
+    maker = Maker(is_ros2)
+    messages = []
+    for i, (stamp, log) in enumerate(zip(STAMPS, LOGS, strict=True)):
+        for arm in ("MTML", "MTMR", "PSM1"):
+            messages.append((f"/{arm}/measured_cp", log, maker.pose(i, "PoseStamped", stamp)))
+        if i % 50 == 0:
+            pedal = maker.joy(stamp, [int(i >= 100)])
+            messages += [("/console/clutch", log, pedal), ("/footpedals/camera", log, pedal)]
+    write, name = (write2, "kit") if is_ros2 else (write1, "kit.bag")
+    report = tc.import_recording(
+        write(tmp_path / name, messages), tmp_path / "bag", preset="dvrk", axes=("+x", "+y", "+z")
+    )
+    assert [one.arm for one in (report, *report.others)] == ["left", "right"]
+    for prefix in ("", "right/"):
+        values = report.recording[f"{prefix}master/measured_cp"].values
+        np.testing.assert_allclose(values, POSES, atol=1e-12)
+        assert report.recording[f"{prefix}master/buttons"]["clutch"].tolist() == [0.0, 1.0]

@@ -2,11 +2,14 @@
 
 import argparse
 import re
+import shlex
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from teleop_core.commands.arguments import command, out_argument
-from teleop_core.exchange.options import BUTTONS, LENGTHS, TIMES_NS
+from teleop_core.errors import ParameterError
+from teleop_core.exchange.options import BUTTONS, LENGTHS, TIMES_NS, ImportOptions
+from teleop_core.exchange.presets import PRESETS
 from teleop_core.texts import printable
 
 _IMPORT = """\
@@ -21,6 +24,12 @@ examples:
   teleop import mocap.txt --out bags/mocap --rate 100 --position 1-3 --matrix 4-12
   teleop import tool.csv --out bags/tool --euler ZYX yaw pitch roll --angles deg --axes +y -x +z
   teleop import user.bag --out bags/user --topic /MTMR/measured_cp --buttons clutch=0,mode=2
+files of known systems:
+%s
+  teleop import Suturing_B001.txt --out bags/suturing --preset jigsaws
+both hands of one file, with options of each hand beside those of all:
+  teleop import two.csv --out bags/two --time t --arm left "--position lx ly lz" \\
+      --arm right "--position rx ry rz"
 then:
   teleop replay bags/hand --out bags/hand_replayed
 """
@@ -34,12 +43,25 @@ def add(commands: Any) -> None:
 
 def _add_import(commands: Any) -> None:
     parser = command(commands, "import", _import, "make a recording of a file of others")
-    parser.description, parser.epilog = _IMPORT, _EXAMPLES
+    listed = "\n".join(f"  --preset {name:9} {one.text}" for name, one in PRESETS.items())
+    parser.description, parser.epilog = _IMPORT, _EXAMPLES % listed
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    # `--axes +y -x +z`: -x is a value; argparse lets only what looks like a number be one.
-    parser._negative_number_matcher = re.compile(r"-([xyz]|\d+|\d*\.\d+)$")
     parser.add_argument("file", type=Path, metavar="FILE", help="file or directory to import")
     out_argument(parser)
+    parser.add_argument(
+        "--preset", choices=sorted(PRESETS), help="options for files of a known system, see below"
+    )
+    parser.add_argument(
+        "--arm", nargs=2, action="append", default=[], metavar=("NAME", "OPTIONS"),
+        help="one of several hands of the file, and what is said of it alone",
+    )  # fmt: skip
+    _options(parser)
+
+
+def _options(parser: argparse.ArgumentParser) -> None:
+    """What can be said of one hand."""
+    # `--axes +y -x +z`: -x is a value; argparse lets only what looks like a number be one.
+    parser._negative_number_matcher = re.compile(r"-([xyz]|\d+|\d*\.\d+)$")
     _time(parser.add_argument_group("time"))
     _place(parser.add_argument_group("position and orientation"))
     _buttons(parser.add_argument_group("buttons"))
@@ -109,6 +131,10 @@ def _changes(group: Any) -> None:
     group.add_argument(
         "--axes", nargs=3, metavar=("X", "Y", "Z"),
         help="the master's x, y, z as axes of the file, such as +y -x +z",
+    )  # fmt: skip
+    group.add_argument(
+        "--handedness", choices=("right", "left"),
+        help="left: axes as in game engines; --axes must mirror then (default: right)",
     )  # fmt: skip
     group.add_argument("--scale", type=float, metavar="X", help="multiplies positions (default: 1)")
     group.add_argument(
@@ -188,13 +214,38 @@ def _export(arguments: argparse.Namespace) -> int:
 
 
 def _import(arguments: argparse.Namespace) -> int:
-    from teleop_core.exchange import ImportOptions, import_recording
+    from teleop_core.exchange import import_recording
 
-    given = vars(arguments)
-    names = ImportOptions.__dataclass_fields__
-    changes = {name: given[name] for name in names if given.get(name) is not None}
-    report = import_recording(arguments.file, arguments.out, **changes)
+    arms = {name: _given(_of_arm(name, text)) for name, text in arguments.arm}
+    report = import_recording(
+        arguments.file, arguments.out, preset=arguments.preset or "", arms=arms,
+        **_given(arguments),
+    )  # fmt: skip
     print(printable(str(report)))
     print(f"{arguments.out}: {report.duration:.1f} s imported; next: "
           f"teleop replay {arguments.out} --out {arguments.out}_replayed")  # fmt: skip
     return 0
+
+
+class _OfArm(argparse.ArgumentParser):
+    """Parser of what is said of one hand."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ParameterError("--arm", self.prog, f"options of the import; {message}")
+
+
+def _of_arm(name: str, text: str) -> argparse.Namespace:
+    parser = _OfArm(prog=name, add_help=False)
+    _options(parser)
+    try:
+        words = shlex.split(text)
+    except ValueError as error:
+        raise ParameterError("--arm", text, f"options of the import ({error})") from error
+    return parser.parse_args(words)
+
+
+def _given(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Options that were given, by name."""
+    given = vars(arguments)
+    names = ImportOptions.__dataclass_fields__
+    return {name: given[name] for name in names if given.get(name) is not None}

@@ -1,6 +1,6 @@
 """Bag source: recordings of ROS 1 and 2 whose topics are the motion and the buttons of a hand."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,7 @@ class BagSource:
         UnknownNameError: The topic or frame is not there.
     """
 
-    has_time, time_unit, bad_rows = True, "ns", 0
+    has_time, time_unit, bad_rows, is_unit_said = True, "ns", 0, True
 
     def __init__(self, path: Path, options: ImportOptions) -> None:
         self.path, self._options = path, options
@@ -85,9 +85,10 @@ class BagSource:
     def _pose_topic(self) -> str:
         found = [n for n, kind in self._types.items() if kind in POSES or kind in TRANSFORMS]
         if self._options.topic:
-            wanted = plain(self._options.topic)
-            if wanted not in self._types:
-                raise UnknownNameError("--topic", wanted, sorted(found or self._types))
+            wanted = _named(self._options.topic, self._types)
+            if wanted is None:
+                named = plain(self._options.topic)
+                raise UnknownNameError("--topic", named, sorted(found or self._types))
             if wanted not in found:
                 listed = ", ".join(sorted(found)) or "none"
                 reason = f"{wanted} is a {self._types[wanted]}, no pose; topics of poses: {listed}"
@@ -126,9 +127,10 @@ class BagSource:
         found = [name for name, kind in self._types.items() if kind == JOY]
         if self._options.buttons == "none":
             return ""
-        if wanted := plain(self._options.buttons_topic):
-            if wanted not in found:
-                raise UnknownNameError("--buttons-topic", wanted, sorted(found) or ["none"])
+        if given := self._options.buttons_topic:
+            wanted = _named(given, found)
+            if wanted is None:
+                raise UnknownNameError("--buttons-topic", plain(given), sorted(found) or ["none"])
             return wanted
         if MASTER_BUTTONS.name in found or len(found) == 1:
             return MASTER_BUTTONS.name if MASTER_BUTTONS.name in found else found[0]
@@ -197,6 +199,16 @@ class BagSource:
         if not finite.all():
             names = np.array(["x", "y", "z", "orientation"])[finite == 0]
             raise RecordingError(self.path, f"{self._topic}: {', '.join(names)} holds no numbers")
+
+
+def _named(wanted: str, names: Iterable[str]) -> str | None:
+    """The topic that is called so, or alone ends so; of ``a|b`` the first; None without one."""
+    known = list(names)
+    for name in map(plain, wanted.split("|")):
+        ends = [one for one in known if name and f"/{one}".endswith(f"/{name}")]
+        if name in known or len(ends) == 1 or ("|" in wanted and not name):
+            return name if name in known or not name else ends[0]
+    return None
 
 
 def _holds(path: Path, *ends: str) -> bool:

@@ -21,6 +21,8 @@ MOST_STRANGE = 0.01
 TOLD_LENGTH = 1e-3
 """Difference of a quaternion's length from 1 from which on it is told."""
 _NO_TIME = np.iinfo(np.int64).min
+FARTHEST = 5.0
+"""Coordinate of a hand [m] beyond which somebody must say that it is in metres."""
 
 
 @dataclass(eq=False)
@@ -57,13 +59,15 @@ class _Parts:
     usable: list[NDArray[np.bool_]]
     buttons: list[NDArray[np.uint8]]
     finite: NDArray[np.float64]
+    farthest: float = 0.0
 
 
 def gather(source: Source, options: ImportOptions, spool: Spool) -> Gathered:
     """Read all of a source.
 
     Raises:
-        RecordingError: It holds no rows, or a column of nothing, or its orientations are none.
+        RecordingError: It holds no rows, or a column of nothing, or its orientations are none, or
+            nobody says in which unit places far beyond a hand's reach are.
     """
     parts = _Parts([], [], [], [], np.zeros(4))
     scale = LENGTHS[source.unit]
@@ -72,6 +76,8 @@ def gather(source: Source, options: ImportOptions, spool: Spool) -> Gathered:
         spool.add(rows)
         is_number: NDArray[np.bool_] = np.isfinite(rows)
         parts.finite += [*is_number[:, :3].sum(axis=0), is_number[:, 3:].all(axis=1).sum()]
+        sizes = np.abs(rows[:, :3][is_number[:, :3]])
+        parts.farthest = max(parts.farthest, float(sizes.max(initial=0.0)))
         parts.usable.append(np.asarray(is_number.all(axis=1)))
         parts.times.append(block.time)
         if block.log_ns is not None:
@@ -105,6 +111,12 @@ def _check(source: Source, parts: _Parts, count: int) -> None:
         raise RecordingError(source.path, f"{_strange(attitudes.kind)} in {share:.3g} % of the rows"
                              f"{_hint(attitudes.kind, attitudes.mirrored)}")  # fmt: skip
     source.check(parts.finite)
+    if parts.farthest > FARTHEST and not source.is_unit_said:
+        reason = (
+            f"places are up to {parts.farthest:,.4g} m from the origin, if they are in metres; say "
+            "their unit: --unit mm, or --unit m if they are"
+        )
+        raise RecordingError(source.path, reason)
 
 
 def _strange(kind: str) -> str:

@@ -4,20 +4,24 @@ import hashlib
 import json
 import shlex
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import asdict, replace
+from itertools import zip_longest
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.bags.arms import ARMS_KEY
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 from teleop_core.exchange.gathering import gather
 from teleop_core.exchange.motion import Motion
 from teleop_core.exchange.opening import open_source
 from teleop_core.exchange.options import ImportOptions, Option
+from teleop_core.exchange.presets import options_of
 from teleop_core.exchange.report import ImportReport, summary
 from teleop_core.exchange.spool import Spool
 from teleop_core.exchange.times import Stamps
@@ -28,7 +32,13 @@ _READ = 1 << 20
 
 
 def import_recording(
-    file: Path | str, out: Path | str, options: ImportOptions | None = None, **changes: Option
+    file: Path | str,
+    out: Path | str,
+    options: ImportOptions | None = None,
+    *,
+    preset: str = "",
+    arms: Mapping[str, Mapping[str, Option]] = MappingProxyType({}),
+    **changes: Option,
 ) -> ImportReport:
     """Make a recording of a file: CSV, TSV, Parquet, rosbag2 (MCAP, db3) or a ROS 1 bag.
 
@@ -40,10 +50,15 @@ def import_recording(
         file: What is imported.
         out: Directory of the recording, made here; nothing is left there after an error.
         options: What is taken of the file; what is not said is guessed and told.
+        preset: Options for files of a known system:
+            :data:`~teleop_core.exchange.presets.PRESETS`.
+        arms: Several hands of one file, each with options beside those of all: ``{"left":
+            {"position": "1-3"}, "right": {"position": "4-6"}}``. The first is the default arm.
         **changes: Options by name: ``position=("x", "y", "z"), unit="mm"``.
 
     Returns:
-        What was found; ``report.recording`` is the recording, ``print(report)`` shows it.
+        What was found; ``report.recording`` is the recording, ``print(report)`` shows it. Of
+        several hands it is that of the first, and ``report.others`` has the others.
 
     Raises:
         RecordingError: The file is missing, damaged, empty, or no motion; or ``out`` exists.
@@ -51,46 +66,63 @@ def import_recording(
         UnknownNameError: A column or topic is not there; those that are there are listed.
     """
     path, out = Path(file), Path(out)
-    wanted = (options or ImportOptions()).changed(**changes)
+    wanted = options_of(options or ImportOptions(), preset, arms, changes)
     if out.exists():
         raise RecordingError(out, "exists already; choose another --out")
-    with opened(path, wanted) as motion:
-        report = summary(path.name, out, motion)
-        write(motion, out, _about(path, out, wanted, report))
+    with ExitStack() as spools:
+        motions = {
+            arm: _motion(path, one, spools.enter_context(Spool(7))) for arm, one in wanted.items()
+        }
+        first_ns = min(int(motion.stamp_ns[0]) for motion in motions.values())
+        for motion in motions.values():
+            motion.begin(first_ns)
+        found = [summary(path.name, out, motion, arm) for arm, motion in motions.items()]
+        report = replace(found[0], others=tuple(found[1:]))
+        write(motions, out, _about(path, out, wanted, report))
     return report
 
 
-@contextmanager
-def opened(path: Path, options: ImportOptions) -> Iterator[Motion]:
-    """Motion of a file, as long as it is needed."""
-    source = open_source(path, options)
-    with Spool(7) as spool:
-        yield Motion(path, gather(source, options, spool), options)
+def _motion(path: Path, options: ImportOptions, spool: Spool) -> Motion:
+    return Motion(path, gather(open_source(path, options), options, spool), options)
 
 
-def write(motion: Motion, out: Path, metadata: dict[str, str]) -> None:
-    """Record a motion; the directory is there as a whole or not at all."""
-    presses = motion.presses()
-    topics = [MASTER_MEASURED_CP] + ([MASTER_BUTTONS] if presses is not None else [])
+Block = dict[Topic, tuple[Stamps, Array, Stamps]]
+
+
+def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) -> None:
+    """Record the motion of each arm, the default one first; the directory is whole or not there."""
+    hands = [_Hand(arm if number else "", m) for number, (arm, m) in enumerate(motions.items())]
+    topics = [topic for hand in hands for topic in hand.topics]
     try:
         with BagWriter(out, topics, (), metadata=metadata) as writer:
-            written = 0
-            for stamps, poses in motion.blocks():
-                block: dict[Topic, tuple[Stamps, Array, Stamps]] = {
-                    MASTER_MEASURED_CP: (stamps, poses, stamps)
-                }
-                if presses is not None:
-                    end = int(np.searchsorted(presses[0], stamps[-1], side="right"))
-                    block[MASTER_BUTTONS] = _pressed(presses, written, end)
-                    written = end
-                writer.write_block(block)
-            if presses is not None:
-                writer.write_block({MASTER_BUTTONS: _pressed(presses, written, len(presses[0]))})
+            for blocks in zip_longest(*(hand.blocks() for hand in hands), fillvalue={}):
+                writer.write_block({t: part for block in blocks for t, part in block.items()})
     except BaseException as error:
         # A directory that another process made in the meantime is not ours to remove.
         if not (isinstance(error, RecordingError) and "exists already" in error.reason):
             shutil.rmtree(out, ignore_errors=True)
         raise
+
+
+class _Hand:
+    """Topics and blocks of one arm; its buttons stand in the block of the poses at their time."""
+
+    def __init__(self, arm: str, motion: Motion) -> None:
+        self._motion, self._presses = motion, motion.presses()
+        self._poses, self._buttons = MASTER_MEASURED_CP.of_arm(arm), MASTER_BUTTONS.of_arm(arm)
+        self.topics = [self._poses] + [self._buttons] * (self._presses is not None)
+
+    def blocks(self) -> Iterator[Block]:
+        written = 0
+        for stamps, poses in self._motion.blocks():
+            block: Block = {self._poses: (stamps, poses, stamps)}
+            if self._presses is not None:
+                end = int(np.searchsorted(self._presses[0], stamps[-1], side="right"))
+                block[self._buttons] = _pressed(self._presses, written, end)
+                written = end
+            yield block
+        if self._presses is not None:
+            yield {self._buttons: _pressed(self._presses, written, len(self._presses[0]))}
 
 
 def _pressed(
@@ -100,12 +132,18 @@ def _pressed(
     return stamps, presses[1][begin:end].astype(np.float64), stamps
 
 
-def _about(path: Path, out: Path, options: ImportOptions, report: ImportReport) -> dict[str, str]:
+def _about(
+    path: Path, out: Path, options: Mapping[str, ImportOptions], report: ImportReport
+) -> dict[str, str]:
     """Names and texts by which an import can be repeated."""
     from teleop_core import __version__
 
-    words = ["teleop", "import", path.name, "--out", out.name, *options.as_arguments()]
-    return {
+    words = ["teleop", "import", path.name, "--out", out.name]
+    for arm, one in options.items():
+        own = one.as_arguments()
+        words += ["--arm", arm, shlex.join(own)] if arm else own
+    named = {} if "" in options else {ARMS_KEY: " ".join(options)}
+    return named | {
         "version": __version__,
         "imported_from": path.name,
         "imported_sha256": checksum(path),

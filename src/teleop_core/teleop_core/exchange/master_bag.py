@@ -125,7 +125,7 @@ def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
     """Streams of one arm."""
     source = open_source(path, options)
     with Spool(7) as spool:
-        motion = Motion(path, gather(source, options, spool), options, is_moved=False)
+        motion = Motion(path, gather(source, options, spool), options)
         blocks = [poses for _, poses in motion.blocks()]
         presses = motion.presses()
     stamps, poses = motion.stamp_ns, np.concatenate(blocks)

@@ -13,7 +13,6 @@ from teleop_core.exchange.options import ImportOptions
 from teleop_core.exchange.orientation import continuous, from_matrices, products
 from teleop_core.exchange.times import SECOND_NS, Stamps, gaps, ordered
 from teleop_core.geometry import Array
-from teleop_core.mapping.parameters import axis_map
 from teleop_core.portable import product
 
 ROWS = 20_000
@@ -53,7 +52,6 @@ class Motion:
         path: The file, for messages.
         gathered: Its rows.
         options: What becomes of them.
-        is_moved: Whether stamps that begin near 0 are moved, so that they begin at 1 s.
 
     Attributes:
         stamp_ns: Times (N,) [ns], rising.
@@ -66,9 +64,7 @@ class Motion:
         RecordingError: Times go back too often or stand still, or fewer than two rows are left.
     """
 
-    def __init__(
-        self, path: Path, gathered: Gathered, options: ImportOptions, *, is_moved: bool = True
-    ) -> None:
+    def __init__(self, path: Path, gathered: Gathered, options: ImportOptions) -> None:
         self._path, self._gathered, self._options = path, gathered, options
         self.told, self.strange = list(gathered.told), gathered.strange
         filled = 0
@@ -90,10 +86,8 @@ class Motion:
         )  # fmt: skip
         self._check()
         self.gaps = gaps(self.stamp_ns, options.gap)
-        self._turn = axis_map("--axes", options.signed_axes)
-        self._quaternion = from_matrices(self._turn[None])[0]
-        self._shift_ns = self._start() if is_moved else 0
-        self.stamp_ns += self._shift_ns
+        self._turn = options.axis_map()
+        self._shift_ns = 0
         self._origin = np.zeros(3)
         self._origin = self._center()
 
@@ -120,13 +114,13 @@ class Motion:
             what = f"{c.samples} usable rows of {c.rows}; a motion needs two"
             raise RecordingError(self._path, f"holds {what}")
 
-    def _start(self) -> int:
-        """What is added to all stamps [ns]: those that begin near 0 begin at 1 s."""
-        first = int(self.stamp_ns[0])
-        if first >= SECOND_NS:
-            return 0
-        self.told.append(f"stamps begin at 1 s (in the file at {first / SECOND_NS:g} s)")
-        return SECOND_NS - first
+    def begin(self, first_ns: int) -> None:
+        """Move the stamps, once, so that a time [ns] near 0 becomes 1 s; later ones stay."""
+        if first_ns >= SECOND_NS:
+            return
+        self.told.append(f"stamps begin at 1 s (in the file at {first_ns / SECOND_NS:g} s)")
+        self._shift_ns = SECOND_NS - first_ns
+        self.stamp_ns += self._shift_ns
 
     def losses(self) -> list[str]:
         """Rows that were left out or changed, in words."""
@@ -163,9 +157,16 @@ class Motion:
             part = slice(begin, begin + ROWS)
             rows = self._gathered.spool.chosen(self._rows[part])
             place = self._options.scale * product(rows[:, :3], self._turn.T) - self._origin
-            turns = continuous(products(self._quaternion, rows[:, 3:]), last)
+            turns = continuous(self._turned(rows[:, 3:]), last)
             last = turns[-1]
             yield self.stamp_ns[part], np.column_stack((place, turns))
+
+    def _turned(self, quaternions: Array) -> Array:
+        """Attitudes (n, 4) in the master's axes; a mirror turns those of the body as well."""
+        if self._options.handedness == "right":
+            return products(from_matrices(self._turn[None])[0], quaternions)
+        # A turn of the file about an axis is the opposite turn about the mirrored axis.
+        return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], self._turn.T)))
 
     def presses(self) -> tuple[Stamps, NDArray[np.uint8]] | None:
         """Stamps (n,) [ns] and buttons (n, 3) where they change, the first time; None without."""

@@ -72,7 +72,17 @@ def find_positions(names: Sequence[str]) -> list[tuple[int, ...]]:
     good = [(stem, columns) for stem, columns in found.items() if not _NOT_PLACES.search(stem)]
     named = [columns for stem, columns in found.items() if _PLACES.search(stem)]
     bare = [columns for stem, columns in good if not stem.strip("_")]
-    return bare or named or [columns for _, columns in good]
+    return bare or named or [columns for _, columns in good] or _after_a_name(names)
+
+
+def _after_a_name(names: Sequence[str]) -> list[tuple[int, ...]]:
+    """Columns ``Tool X``, ``Y``, ``Z`` side by side, of which the first alone has the name."""
+    plain_names = [plain(name) for name in names]
+    return [
+        (i, i + 1, i + 2)
+        for i, name in enumerate(plain_names[:-2])
+        if name.endswith("_x") and plain_names[i + 1 : i + 3] == ["y", "z"]
+    ]
 
 
 def find_quaternion(names: Sequence[str]) -> tuple[int, ...]:

@@ -3,7 +3,10 @@
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
+import numpy as np
+
 from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.geometry import Array
 
 Columns = tuple[str, ...]
 """Names of columns; or their numbers, counted from 1; ``4-12`` stands for nine of them."""
@@ -29,6 +32,7 @@ _CHOICES = {
     "center": ("keep", "mean", "middle", "start"),
     "missing": ("drop", "interpolate"),
     "backwards": ("auto", "refuse", "drop", "sort"),
+    "handedness": ("right", "left"),
 }
 _COUNTS = {
     "time": (0, 1, 2), "position": (0, 3), "quaternion": (0, 4), "matrix": (0, 9),
@@ -67,11 +71,15 @@ class ImportOptions:
         mode: As ``clutch``.
         threshold: Above it a button is pressed.
         skip: Lines to leave out at the beginning of a text.
-        topic: Topic of the poses in a bag; empty if there is only one.
+        topic: Topic of the poses in a bag, or its end; empty if there is only one.
         frame: Child frame, for a topic of transforms.
-        buttons_topic: Topic of the Joy messages; empty if there is at most one.
+        buttons_topic: Topic of the Joy messages, or its end; empty if there is at most one. Of
+            several with ``|`` between them the first one there is taken; an empty last one stands
+            for no buttons.
         buttons: Which button of the Joy is which: ``"clutch=0,mode=2"``; ``none``: no buttons.
         axes: The master's x, y and z as axes of the file: ``("+y", "-x", "+z")``.
+        handedness: Of the file's axes: ``right``; or ``left``, as in game engines: ``axes`` then
+            must mirror, and attitudes are mirrored with them.
         scale: All positions are multiplied by it.
         center: What comes to zero: ``mean`` of the positions, ``middle`` of their range, or their
             ``start``; ``keep``: nothing.
@@ -107,6 +115,7 @@ class ImportOptions:
     buttons_topic: str = ""
     buttons: str = ""
     axes: Columns = ("+x", "+y", "+z")
+    handedness: str = "right"
     scale: float = 1.0
     center: str = "keep"
     missing: str = "drop"
@@ -130,9 +139,27 @@ class ImportOptions:
     def _check_axes(self) -> None:
         if len(self.axes) != 3 or not set(self.signed_axes) <= set(AXES):
             raise ParameterError("--axes", self.axes, "three of " + ", ".join(AXES))
+        self.axis_map()
+
+    def axis_map(self) -> Array:
+        """Matrix (3, 3) from the file's axes to the master's; a mirror of left-handed axes.
+
+        Raises:
+            ParameterError: An axis is used twice, or the map is a mirror and must not, or must be.
+        """
         from teleop_core.mapping.parameters import axis_map  # compiled: not for `--help`
 
-        axis_map("--axes", self.signed_axes)
+        x, *others = self.signed_axes
+        if self.handedness == "right":
+            return axis_map("--axes", (x, *others))
+        mirror = np.diag([-1.0, 1.0, 1.0])
+        try:
+            return np.asarray(
+                mirror @ axis_map("--axes", (x.translate(str.maketrans("+-", "-+")), *others))
+            )
+        except ParameterError:
+            needed = "three axes at right angles that mirror, for --handedness left"
+            raise ParameterError("--axes", self.axes, needed) from None
 
     def _check_columns(self) -> None:
         for name, counts in _COUNTS.items():

@@ -45,6 +45,8 @@ class ImportReport:
         gaps: Begin and length [s] of each gap, the longest first.
         told: What was taken, guessed and changed.
         warnings: What looks wrong.
+        arm: Name of the hand; empty if there is one alone.
+        others: Reports of the further hands of the same file.
     """
 
     file: str
@@ -62,6 +64,8 @@ class ImportReport:
     gaps: tuple[tuple[float, float], ...]
     told: tuple[str, ...]
     warnings: tuple[str, ...]
+    arm: str = ""
+    others: "tuple[ImportReport, ...]" = ()
 
     @property
     def recording(self) -> "Recording":
@@ -79,7 +83,8 @@ class ImportReport:
         middle, low, high = self.period_ms
         x, y, z = (f"{1e3 * value:.1f}" for value in self.range)
         median, fast = (f"{1e3 * value:.0f}" for value in self.speed)
-        out = [
+        out = [f"arm       {self.arm}"] * bool(self.arm)
+        out += [
             f"taken     {text}" for text in self.told
         ] + [
             f"samples   {self._samples()}",
@@ -102,10 +107,10 @@ class ImportReport:
         return f"{len(self.gaps)}: {shown}{more}" if not more else shown + more
 
     def __str__(self) -> str:
-        return "\n".join(self.lines())
+        return "\n".join(line for one in (self, *self.others) for line in one.lines())
 
 
-def summary(file: str, out: Path | None, motion: Motion) -> ImportReport:
+def summary(file: str, out: Path | None, motion: Motion, arm: str = "") -> ImportReport:
     """Report of a motion; reads all of it."""
     found = _Figures(motion)
     period = spread_ms(motion.stamp_ns)
@@ -118,7 +123,7 @@ def summary(file: str, out: Path | None, motion: Motion) -> ImportReport:
         duration=duration, rate=rate, period_ms=period,
         range=(float(extent[0]), float(extent[1]), float(extent[2])), rotation=found.rotation,
         speed=found.speed(), fastest=found.fastest, gaps=motion.gaps, told=tuple(motion.told),
-        warnings=tuple(_warnings(motion, found, extent, rate)),
+        warnings=tuple(_warnings(motion, found, extent, rate)), arm=arm,
     )  # fmt: skip
 
 

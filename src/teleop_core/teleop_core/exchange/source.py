@@ -55,6 +55,7 @@ class Source(Protocol):
         told: What was taken, in words.
         time_unit: Unit of the times: ``auto`` if it is to be guessed.
         unit: Unit of the positions.
+        is_unit_said: Whether the file or an option says it; else it is taken for metres.
         attitudes: How orientations are read; counts those that are none.
         has_time: Whether blocks have times.
     """
@@ -63,6 +64,7 @@ class Source(Protocol):
     told: list[str]
     time_unit: str
     unit: str
+    is_unit_said: bool
     attitudes: Attitudes
     has_time: bool
 

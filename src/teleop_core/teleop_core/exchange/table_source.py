@@ -53,7 +53,7 @@ class TableSource:
         self._columns = Columns(time, position, orientation, self._buttons(taken))
         self.has_time = bool(time)
         self.time_unit = self._time_unit(time)
-        self.unit = self._unit(position)
+        self.unit, self.is_unit_said = self._unit(position)
 
     # -- which columns ---------------------------------------------------------------------------
 
@@ -204,9 +204,17 @@ class TableSource:
                 found[button] = column_of(self._table, wanted, option(button))
             elif self._table.is_named:
                 column = names.find_button(self._table.names, button)
-                if column is not None and column not in taken and self._is_button(column):
+                if column is None or column in taken:
+                    continue
+                if self._is_button(column):
                     found[button] = column
                     self._told(f"button {button}", (column,))
+                else:
+                    name = self._table.names[column]
+                    self.told.append(
+                        f"no button {button}: {name!r} holds more than 0 and 1, true and false "
+                        f"(--{button} takes it, pressed above --threshold)"
+                    )
         return found
 
     def _is_button(self, column: int) -> bool:
@@ -222,13 +230,14 @@ class TableSource:
         named = names.unit_of(self._table.names, time)
         return named if self._options.time_unit == "auto" and named else self._options.time_unit
 
-    def _unit(self, position: tuple[int, ...]) -> str:
+    def _unit(self, position: tuple[int, ...]) -> tuple[str, bool]:
+        """Unit of the position, and whether anybody says it."""
         if self._options.unit != "auto":
-            return self._options.unit
+            return self._options.unit, True
         named = names.unit_of(self._table.names, position)
         if named in {"mm", "cm", "in"}:
             self.told.append(f"positions in {named}, as the names say")
-        return named if named in {"m", "mm", "cm", "in"} else "m"
+        return (named, True) if named in {"m", "mm", "cm", "in"} else ("m", False)
 
     # -- rows ------------------------------------------------------------------------------------
 

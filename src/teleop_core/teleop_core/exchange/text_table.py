@@ -89,6 +89,8 @@ class TextTable:
     def sample(self, column: int) -> Numbers:
         """As of any table."""
         cells = [row[column] if column < len(row) else "" for row in self._form.rows]
+        if self._is_truth(column):
+            return np.array([cell.strip().lower() == "true" for cell in cells], np.int64)
         if self.is_clock(column):
             return np.array(pd.to_datetime(cells).as_unit("ns").astype("int64"), np.int64)
         if cells and all(re.fullmatch(r"[+-]?\d{1,18}", cell.strip()) for cell in cells):
@@ -99,6 +101,11 @@ class TextTable:
         """As of any table."""
         rows = self._form.rows
         return bool(rows) and column < len(rows[0]) and bool(_CLOCK.match(rows[0][column].strip()))
+
+    def _is_truth(self, column: int) -> bool:
+        """Whether a column holds ``True`` and ``False``, as pandas and Unity write them."""
+        cells = {row[column].strip().lower() for row in self._form.rows if column < len(row)}
+        return bool(cells) and cells <= {"true", "false"}
 
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
         """As of any table."""
@@ -131,6 +138,8 @@ class TextTable:
     def _type(self, column: int) -> pa.DataType:
         if self.is_clock(column):
             return pa.timestamp("ns")
+        if self._is_truth(column):
+            return pa.bool_()
         return pa.int64() if self.sample(column).dtype.kind == "i" else pa.float64()
 
     def _bad_row(self, row: pc.InvalidRow) -> str:
@@ -141,7 +150,8 @@ class TextTable:
         form = self._form
         names = [f"c{i}" for i in range(form.width)]
         wanted = sorted(dict.fromkeys(columns))
-        types = {names[c]: "float64" if self._type(c) == pa.float64() else "Int64" for c in wanted}
+        kinds = {pa.float64(): "float64", pa.bool_(): "boolean"}
+        types = {names[c]: kinds.get(self._type(c), "Int64") for c in wanted}
         reader = pd.read_csv(
             self.path, sep=_BLANK, header=None, names=names, usecols=[names[c] for c in wanted],
             skiprows=form.head, chunksize=ROWS, engine="c",
@@ -194,13 +204,15 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
         raise RecordingError(path, "holds no rows of numbers")
     separator = _separator(body)
     rows = [cells(line, separator) for line in body]
-    begin = next((i for i, row in enumerate(rows) if _has_numbers(row)), None)
+    with_numbers = [row for row in rows if _has_numbers(row)]
+    width = Counter(map(len, with_numbers)).most_common(1)[0][0] if with_numbers else 0
+    # Lines before the table may hold numbers too, as `NO_OF_FRAMES 720` does, but not as many.
+    begin = next((i for i, row in enumerate(rows) if len(row) == width and _has_numbers(row)), None)
     if begin is None:
         reason = "holds no rows of numbers" if len(rows) < 3 else "holds text, not numbers"
         raise RecordingError(path, reason)
     head = [comment_cells for comment_cells in [cells(comment, separator)] if not begin]
     head = rows[:begin] or head
-    width = Counter(len(row) for row in rows[begin:]).most_common(1)[0][0]
     names = _head(head, width)
     skipped = _lines_before(lines, first, begin)
     decimal = "," if separator != "," and _has_decimal_commas(rows[begin:]) else "."
@@ -223,7 +235,7 @@ def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
     The line of names is the last one that has as many cells as there are columns, except for a
     line of units below it.
     """
-    padded = [[*row, ""] if len(row) == width - 1 else row for row in rows]
+    padded = [[*row, ""] if len(row) == width - 1 else _cut(row, width) for row in rows]
     fitting = [row for row in padded if len(row) == width and any(cell.strip() for cell in row)]
     fitting = [row for row in fitting if not _has_numbers(row)]
     if not fitting:
@@ -235,6 +247,11 @@ def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
             for name, unit in zip(fitting[-2], units, strict=True)
         )
     return tuple(fitting[-1])
+
+
+def _cut(row: list[str], width: int) -> list[str]:
+    """Row without empty cells beyond so many, as of a line that ends in a separator."""
+    return row if any(cell.strip() for cell in row[width:]) else row[:width]
 
 
 def cells(line: str, separator: str) -> list[str]:

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.bags.arms import ARMS_KEY
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
@@ -137,8 +138,10 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     Raises:
         TeleopError: The stored configuration is not one.
     """
-    text = bag.metadata.get("configuration")
+    text, arms = bag.metadata.get("configuration"), bag.metadata.get(ARMS_KEY, "").split()
     layer = parse_text(text, f"{bag.path}: configuration") if text else {}
+    if arms and not text:  # an import of several hands
+        layer = {SESSION: {"arms": tuple(arms)}}
     _begin_at_home(layer)
     return layer, bag.metadata.get("scenario", "")
 
