@@ -33,26 +33,26 @@ from teleop_core.texts import LONGEST_LINE, printable
 USUAL = 20_000
 CASES = int(os.environ.get("TELEOP_FUZZ_CASES", USUAL))
 SHARES = {
-    "CDR": 0.29,
-    "chunks": 0.19,
-    "command calibrate": 0.01,
-    "command console": 0.01,
-    "command evaluate": 0.01,
-    "command export": 0.01,
-    "command import": 0.01,
-    "command play": 0.01,
-    "command reach": 0.01,
-    "command recover": 0.01,
-    "command replay": 0.01,
-    "configurations": 0.03,
-    "imports": 0.06,
+    "CDR": 0.33,
+    "chunks": 0.22,
+    "command calibrate": 0.0075,
+    "command console": 0.0075,
+    "command evaluate": 0.0075,
+    "command export": 0.0075,
+    "command import": 0.0075,
+    "command play": 0.0075,
+    "command reach": 0.0075,
+    "command recover": 0.0075,
+    "command replay": 0.0075,
+    "configurations": 0.02,
+    "imports": 0.05,
     "metadata": 0.06,
     "recordings": 0.08,
     "robot tables": 0.01,
-    "settings": 0.08,
-    "state commands": 0.08,
+    "settings": 0.06,
+    "state commands": 0.06,
     "stored configurations": 0.02,
-    "table of rests": 0.01,
+    "table of rests": 0.02,
 }
 """Part of all cases that each target gets; less where a case takes long."""
 TIME = 60
@@ -85,7 +85,9 @@ def fuzz(
     def decorate(test: Callable) -> Callable:
         @functools.wraps(test)
         def case(*arguments: object, **drawn: object) -> None:
-            _done.append(None)
+            _untold.append(target)
+            if len(_untold) == _TOLD:
+                _tell()
             with lawful():
                 test(*arguments, **drawn)
 
@@ -97,11 +99,10 @@ def fuzz(
         tried = chosen(given(**strategies)(case))
 
         def counted(**fixtures: object) -> None:
-            _done.clear()
             try:
                 tried(**fixtures)
             finally:
-                _tell(target)
+                _tell()
 
         counted.__name__, counted.__doc__ = test.__name__, test.__doc__
         counted.__signature__ = inspect.signature(tried)  # type: ignore[attr-defined]
@@ -110,15 +111,18 @@ def fuzz(
     return decorate
 
 
-_done: list[None] = []
-"""One for each case of the test that runs now."""
+_untold: list[str] = []
+"""Target of each case that is not in the file of counts yet."""
+_TOLD = 500
 
 
-def _tell(target: str) -> None:
+def _tell() -> None:
     """Add how many cases were tried to the file of ``TELEOP_FUZZ_COUNTS``, if there is one."""
-    if place := os.environ.get("TELEOP_FUZZ_COUNTS"):
+    place = os.environ.get("TELEOP_FUZZ_COUNTS")
+    if place and _untold:
         with open(place, "a", encoding="utf-8") as file:
-            file.write(f"{len(_done):8} {target}\n")
+            file.write(f"{len(_untold):8} {_untold[0]}\n")
+    _untold.clear()
 
 
 @contextmanager

@@ -81,7 +81,8 @@ def folder(tmp_path_factory) -> Path:
 def session(folder) -> bytes:
     """A recording of ours, of 60 ms."""
     path = folder / "whole"
-    tc.run("coarse_box", duration=0.06, out=path, settings={"recorder.compression": "none"})
+    tc.run("coarse_box", duration=0.06, out=path, settings={"recorder.compression": "none",
+           "recorder.tf_rate": 0.0})  # fmt: skip
     return (path / "whole_0.mcap").read_bytes()
 
 

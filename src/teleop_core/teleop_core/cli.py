@@ -6,6 +6,7 @@ Imports stand inside the commands: ``teleop --help`` answers at once.
 import argparse
 import sys
 import warnings
+from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -93,6 +94,7 @@ def _take_parts(files: list[Path]) -> None:
     load_own_parts(files)
 
 
+@cache
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="teleop",
