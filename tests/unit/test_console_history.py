@@ -73,3 +73,12 @@ def test_what_does_not_follow_does_not_count():
         scores.add(0.03 * i, seen((1, 0, 0), (0, 0.01 * i, 0), is_following=False))
     assert (scores.time, scores.way, scores.largest) == (0.0, 0.0, 0.0)
     assert "0.0 s" in scores.text()
+
+
+def test_what_the_clutch_holds_does_not_count_as_followed():
+    scores = LiveScores()
+    for i in range(400):
+        view = seen((1, 0, 0), (0, 0.01, 0))
+        view.state["is_clutched"] = float(i >= 100)
+        scores.add(0.03 * i, view)
+    assert scores.time == pytest.approx(99 * 0.03)

@@ -226,9 +226,10 @@ def test_attribute_that_a_score_has_not_leads_to_its_values(bag):
     assert not hasattr(score, "jerk")
 
 
-def test_score_tells_what_it_is_in_two_lines_and_as_a_table(bag):
+def test_score_tells_what_it_is_in_three_lines_and_as_a_table(bag):
     score = evaluate(bag)
-    first, second = repr(score).splitlines()
+    first, verdict, second = repr(score).splitlines()
+    assert verdict == score.verdict.text
     assert "cubic" in first
     assert "6.0 s" in first
     assert second == "position error 1.000 mm RMS, 1.000 mm at most"

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
         TeleopError,
         UnknownNameError,
     )
-    from teleop_core.evaluation import Key, Metric, Score, register_metric
+    from teleop_core.evaluation import Key, Metric, Score, frame_of, register_metric
     from teleop_core.exchange import (
         ExportReport,
         ImportOptions,
@@ -82,7 +82,7 @@ _PLACES = {
         "TeleopError",
         "UnknownNameError",
     ),
-    "evaluation": ("Key", "Metric", "Score", "register_metric"),
+    "evaluation": ("Key", "Metric", "Score", "frame_of", "register_metric"),
     "exchange": (
         "ExportReport",
         "ImportOptions",
@@ -148,6 +148,7 @@ __all__ = [
     "export_recording",
     "fit_plant",
     "following",
+    "frame_of",
     "import_recording",
     "kernel",
     "list_robots",

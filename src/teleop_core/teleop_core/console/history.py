@@ -85,7 +85,7 @@ class LiveScores:
     The scores of a recording come from every sample; these are a look at them on the way.
 
     Attributes:
-        time: How long it has followed [s].
+        time: How long it has followed the hand [s]; what the clutch holds does not count.
         way: Length of the tip's path [m].
         rms: Root mean square of the distance between wanted and measured place [m].
         largest: Largest such distance [m].
@@ -101,10 +101,11 @@ class LiveScores:
     _last: tuple[float, Array] | None = None
 
     def add(self, time: float, view: ArmView) -> None:
-        """Take account of what is known at a time [s]; only what follows counts."""
+        """Take account of what is known at a time [s]; only what follows the hand counts."""
         reference, place = view.get(SLAVE_SERVO_CP), view.get(SLAVE_MEASURED_CP)
         force = view.get(MASTER_MEASURED_CF)
-        if reference is None or place is None or not view.state.get("is_following"):
+        is_led = view.state.get("is_following") and not view.state.get("is_clutched")
+        if reference is None or place is None or not is_led:
             self._last = None
             return
         if self._last is not None and 0.0 < (step := time - self._last[0]) < 1.0:

@@ -11,7 +11,7 @@ from teleop_core.evaluation.figure import Figure, line, time_axis
 from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.evaluation.registry import METRICS
 from teleop_core.evaluation.rows import Row, row, spread_rows
-from teleop_core.evaluation.score import Score, Session, key_table, keys
+from teleop_core.evaluation.score import Score, Session, frame_of, key_table, keys
 from teleop_core.evaluation.scoring import evaluate, scores
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.tracking import Tracked, tracked
@@ -34,6 +34,7 @@ __all__ = [
     "Tracked",
     "Window",
     "evaluate",
+    "frame_of",
     "key_table",
     "keys",
     "line",

@@ -12,6 +12,7 @@ from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.scoring import Study, studies
 from teleop_core.evaluation.span import Seconds
 from teleop_core.evaluation.table import score_tables
+from teleop_core.texts import printable
 
 
 def evaluate_bags(
@@ -44,6 +45,9 @@ def evaluate_bags(
             check_place(file)
     found = [study for path in paths for study in studies(Bag(path), span=span)]
     scores = [study.score for study in found]
+    for score in scores:
+        line = f"{score.session.place}: {score.verdict}"
+        console.print(printable(line), markup=False, highlight=False, soft_wrap=True)
     for table in score_tables(scores, console.width):
         console.print(table)
     if json_file is not None:

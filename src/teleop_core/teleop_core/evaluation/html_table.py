@@ -14,26 +14,29 @@ _MARKS = {True: " ✓", False: " ✗", None: ""}
 
 
 def html_table(scores: Sequence[Score]) -> str:
-    """Table of the page: two columns per score, measured and published."""
+    """Table of the page: a column per score, and one beside those with published figures."""
+    found = side_by_side(scores)
+    columns = list(zip(*(line.rows for line in found), strict=True))
+    are_compared = [any(row.published for row in rows) for rows in columns]
     heads, kinds = "", ""
-    for score in scores:
+    for score, is_beside in zip(scores, are_compared, strict=False):
         mode = published_for(score.session.gain, score.session.robot, score.session.plant)
-        heads += f'<th colspan="2">{escape(score.session.place)}</th>'
+        heads += f'<th colspan="{1 + is_beside}">{escape(score.session.place)}</th>'
         kinds += "<th><small>measured</small></th>"
-        kinds += f"<th><small>published{f', {mode.mode}' if mode else ''}</small></th>"
+        kinds += f"<th><small>published{f', {mode.mode}' if mode else ''}</small></th>" * is_beside
     lines = [f"<thead><tr><th></th><th></th>{heads}</tr><tr><th></th><th></th>{kinds}</tr></thead>"]
-    for group, members in groupby(side_by_side(scores), key=lambda line: line.group):
-        span = 2 + 2 * len(scores)
+    for group, members in groupby(found, key=lambda line: line.group):
+        span = 2 + len(scores) + sum(are_compared)
         lines.append(f'<tr class="group"><th colspan="{span}">{escape(group)}</th></tr>')
-        lines += map(_line, members)
+        lines += (_line(line, are_compared) for line in members)
     return "<table>" + "\n".join(lines) + "</table>"
 
 
-def _line(line: Line) -> str:
+def _line(line: Line, are_compared: Sequence[bool]) -> str:
     cells = "".join(
         f'<td class="value {_CLASSES[row.is_met]}">{escape(row.value)}</td>'
-        f'<td class="published">{escape(row.published)}</td>'
-        for row in line.rows
+        + f'<td class="published">{escape(row.published)}</td>' * is_beside
+        for row, is_beside in zip(line.rows, are_compared, strict=True)
     )
     return f'<tr><td>{escape(line.label)}</td><td class="unit">{escape(line.unit)}</td>{cells}</tr>'
 
@@ -42,7 +45,10 @@ def compact_table(score: Score) -> str:
     """Table for a notebook, which brings no style of its own."""
     session = score.session
     head = f"<b>{escape(session.place)}</b> · {escape(' · '.join(facts(session)))}"
-    lines = [f'<tr><th colspan="4" style="text-align:left">{head}</th></tr>']
+    lines = [
+        f'<tr><th colspan="4" style="text-align:left">{head}<br>{escape(score.verdict.text)}</th>'
+        "</tr>"
+    ]
     for group, members in groupby(side_by_side([score]), key=lambda line: line.group):
         lines.append(f'<tr><th colspan="4" style="text-align:left">{escape(group)}</th></tr>')
         lines += (_compact_line(line.rows[0]) for line in members)

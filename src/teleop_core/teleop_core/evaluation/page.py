@@ -13,17 +13,20 @@ from plotly.offline import get_plotlyjs, get_plotlyjs_version
 from teleop_core.evaluation.bands import Band
 from teleop_core.evaluation.figure import Figure, Numbers, is_against_time
 from teleop_core.evaluation.html_table import html_table
+from teleop_core.evaluation.overview import overview
 from teleop_core.evaluation.packing import bits_within, deflated, pack
 from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_core.evaluation.preview import preview
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE
 from teleop_core.evaluation.score import Score, facts
 from teleop_core.evaluation.scoring import Study
+from teleop_core.evaluation.summary import is_compared, side_by_side
 from teleop_core.evaluation.traces import spacing_s
 
 _ROOM = 6_800_000
 """Bytes for the curves of a recording: with everything else a page of it stays below 10 MB."""
 
+_HEADER = "<h1>Teleoperation report</h1>"
 REPLAYS = 7
 """Recordings of a page with replays: browsers keep 16 pictures in space, and each has another."""
 
@@ -35,10 +38,12 @@ def report_page(studies: Sequence[Study]) -> str:
     recording show the same time, down to single samples. Texts from recordings are escaped.
     """
     sections, drawn, arrays = [], [], Arrays(len(studies))
+    plotted: list[list[Figure]] = []
     for number, study in enumerate(studies):
         plots = study.figures()
         if len(studies) > REPLAYS:
             plots = [plot for plot in plots if "meta" not in plot.layout]
+        plotted.append(plots)
         places = [f"plot-{number}-{i}" for i in range(len(plots))]
         sections.append(_section(number, study, plots, places))
         for place, plot in zip(places, plots, strict=True):
@@ -51,12 +56,16 @@ def report_page(studies: Sequence[Study]) -> str:
     found = {"recordings": recordings, "arrays": arrays.packed(), "figures": drawn}
     data = json.dumps(found, allow_nan=False)
     scores = [study.score for study in studies]
-    table = f'<div class="card table">{html_table(scores)}</div>'
+    opening = overview(scores, plotted, [study.bands for study in studies])
+    table = (
+        f'<details class="card table"><summary>All figures</summary>{_note(scores)}'
+        f"{html_table(scores)}</details>"
+    )
     return PAGE.format(
         policy=POLICY,
         title=escape("Teleoperation: " + ", ".join(score.session.title for score in scores)),
         style=style(),
-        body="\n".join((_header(scores), table, *sections)),
+        body="\n".join((_HEADER, opening, table, *sections)),
         data=data.replace("<", "\\u003c"),  # nothing inside can end the script element
         plotly=deflated(get_plotlyjs().encode()),
         library=f"plotly.js {get_plotlyjs_version()}",
@@ -126,17 +135,14 @@ def _kept_s(score: Score) -> float:
     return spacing_s(samples, score.session.duration_s)
 
 
-def _header(scores: Sequence[Score]) -> str:
-    links = "".join(
-        f'<a href="#recording-{i}">{escape(score.session.place)}</a>'
-        for i, score in enumerate(scores)
-    )
+def _note(scores: Sequence[Score]) -> str:
+    """What the marks mean, where published figures stand beside ours."""
+    if not is_compared(side_by_side(scores)):
+        return ""
     return (
-        "<h1>Teleoperation report</h1>\n"
-        f'<p class="facts">Scores beside the published figures of the RCRT-1 ({escape(SOURCE)}), '
+        f'<p class="facts">Beside the published figures of the RCRT-1 ({escape(SOURCE)}), '
         "presumably taken against the filtered reference too. ✓ agrees, ✗ does not: position RMS "
-        f"within {100.0 * POSITION_SHARE:.0f} %, angles within a factor of {ANGLE_FACTOR:g}.</p>\n"
-        f"<nav>{links}</nav>"
+        f"within {100.0 * POSITION_SHARE:.0f} %, angles within a factor of {ANGLE_FACTOR:g}.</p>"
     )
 
 

@@ -1,8 +1,8 @@
 """Score: everything that is measured on one arm of a recording, and its keys in JSON."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import NoReturn, TypeVar, cast
+from typing import TYPE_CHECKING, NoReturn, TypeVar, cast
 
 from teleop_core.errors import EvaluationError, UnknownNameError
 from teleop_core.evaluation.accumulators import Delay, Spread
@@ -17,6 +17,12 @@ from teleop_core.evaluation.metrics.topics import TopicScore
 from teleop_core.evaluation.plain import Leaf, Plain, Values, leaves, plain
 from teleop_core.evaluation.registry import METRICS, SESSION
 from teleop_core.evaluation.rows import Row, number
+from teleop_core.evaluation.verdict import Verdict, verdict_of
+
+if TYPE_CHECKING:
+    import pandas
+
+VERDICT = "verdict"
 
 SESSION_KEYS = (
     Key("session.name", "1", "name of the recording"),
@@ -29,6 +35,8 @@ SESSION_KEYS = (
     Key("session.plant", "1", "what the simulated slave was; null if no simulator is told of"),
     Key("session.controller", "1", "its control law; null if unknown"),
     Key("session.from_s|to_s", "s", "what was scored, since the first message"),
+    Key("verdict.text", "1", "one line that names the worst first"),
+    Key("verdict.worst", "1", "key of the worst; null if nothing is beyond what is fine"),
 )
 """Keys of what is told about a recording, beside those of its metrics."""
 Record = TypeVar("Record")
@@ -124,7 +132,7 @@ class Score:
             UnknownNameError: There is no such key; the alternatives are listed.
             EvaluationError: A text stands there.
         """
-        found = self._leaves()
+        found = self.to_dict()
         if key not in found:
             metric = key.partition(".")[0]
             near = [name for name in found if name.startswith(f"{metric}.")]
@@ -158,18 +166,27 @@ class Score:
         hint = f"{name!r} is none; values of any metric: score.value({name + '.rms'!r})"
         raise AttributeError(f"attribute of a Score: {hint}")
 
+    @property
+    def verdict(self) -> Verdict:
+        """One line that names the worst first."""
+        found = {result.name: result.json for result in self.results if result.json is not None}
+        return verdict_of(_by_key(found))
+
     def to_json(self) -> dict[str, Plain]:
         """The score as plain dictionaries with the keys of :func:`keys`."""
         found = {result.name: result.json for result in self.results if result.json is not None}
-        return {SESSION: plain(self.session), **found}
+        about: dict[str, Plain] = {SESSION: plain(self.session), VERDICT: plain(self.verdict)}
+        return {**about, **found}
 
-    def _leaves(self) -> dict[str, Leaf]:
-        return {".".join(path): value for path, value in leaves(self.to_json()).items()}
+    def to_dict(self) -> dict[str, Leaf]:
+        """Every value by its key, in one dictionary: a row of a data frame."""
+        return _by_key(self.to_json())
 
     def __repr__(self) -> str:
         error = self.position_error_mm
         return (
             f"Score of {self.session.place}: {', '.join(facts(self.session))}\n"
+            f"{self.verdict}\n"
             f"position error {number(error.rms)} mm RMS, {number(error.max)} mm at most"
         )
 
@@ -254,6 +271,17 @@ class Score:
     def topics(self) -> dict[str, TopicScore]:
         """Messages of each topic and how many are missing."""
         return cast(dict[str, TopicScore], self.record("topics", dict))
+
+
+def _by_key(tree: Mapping[str, Plain]) -> dict[str, Leaf]:
+    return {".".join(path): value for path, value in leaves(tree).items()}
+
+
+def frame_of(scores: Iterable[Score]) -> "pandas.DataFrame":
+    """Scores as a data frame: a row for each, a column for each key of any of them."""
+    import pandas
+
+    return pandas.DataFrame([score.to_dict() for score in scores])
 
 
 def facts(session: Session) -> Iterator[str]:

@@ -6,6 +6,9 @@ from typing import NamedTuple
 from teleop_core.evaluation.rows import MISSING, Row
 from teleop_core.evaluation.score import Score
 
+_NOTHING = {MISSING, "0/0/0", "0, 0", "0/0"}
+"""Values that say nothing."""
+
 
 class Line(NamedTuple):
     """One line of a table: group, label and unit, and one row per score."""
@@ -26,13 +29,23 @@ def summary(score: Score) -> list[Row]:
 
 
 def side_by_side(scores: Sequence[Score]) -> list[Line]:
-    """Lines of a table of several scores; a row that a score lacks is a dash."""
+    """Lines of a table of several scores; a row that a score lacks is a dash.
+
+    Lines that say nothing of any of them are left out: dashes, and delays of nothing, as in virtual
+    time.
+    """
     found = [{_place(row): row for row in summary(score)} for score in scores]
     places = dict.fromkeys(place for rows in found for place in rows)
-    return [
+    lines = [
         Line(*place, tuple(rows.get(place) or Row(*place, MISSING) for rows in found))
         for place in places
     ]
+    return [line for line in lines if any(row.value not in _NOTHING for row in line.rows)]
+
+
+def is_compared(lines: Sequence[Line]) -> bool:
+    """Whether a published figure stands beside any value."""
+    return any(row.published for line in lines for row in line.rows)
 
 
 def _place(row: Row) -> tuple[str, str, str]:

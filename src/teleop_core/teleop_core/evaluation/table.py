@@ -10,11 +10,15 @@ from rich.table import Table
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE, published_for
 from teleop_core.evaluation.rows import MISSING, Row
 from teleop_core.evaluation.score import Score, Session
-from teleop_core.evaluation.summary import side_by_side
+from teleop_core.evaluation.summary import is_compared, side_by_side
 from teleop_core.texts import printable
 
 MET, NOT_MET = "✓", "✗"
 COLUMN_WIDTH = 18
+CAPTION = (
+    f"{MET} agrees, {NOT_MET} does not, with (the published figure; {SOURCE}): position RMS "
+    f"within {100.0 * POSITION_SHARE:.0f} %, angles within a factor of {ANGLE_FACTOR:g}"
+)
 
 
 def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
@@ -31,20 +35,18 @@ def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
 
 def score_table(scores: Sequence[Score]) -> Table:
     """One column per score; each figure beside what was published, with a tick if both agree."""
-    caption = (
-        f"{MET} agrees, {NOT_MET} does not, with (the published figure; {SOURCE}): position RMS "
-        f"within {100.0 * POSITION_SHARE:.0f} %, angles within a factor of {ANGLE_FACTOR:g}"
-    )
+    lines = side_by_side(scores)
+    caption = CAPTION if is_compared(lines) else None
     table = Table(
         box=SIMPLE, caption=caption, caption_justify="left", pad_edge=False, padding=(0, 1, 0, 0)
     )
     table.add_column("", no_wrap=True)
     for score in scores:
         table.add_column(escape(printable(heading(score.session))), justify="left", no_wrap=True)
-    for group, lines in groupby(side_by_side(scores), key=lambda line: line.group):
+    for group, members in groupby(lines, key=lambda line: line.group):
         table.add_section()
         table.add_row(f"[bold]{escape(group)}[/bold]")
-        for line in lines:
+        for line in members:
             unit = f" [dim]{escape(line.unit)}[/dim]" if line.unit else ""
             table.add_row(f"  {escape(line.label)}{unit}", *map(_cell, line.rows))
     return table

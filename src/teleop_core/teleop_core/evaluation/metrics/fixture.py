@@ -108,8 +108,13 @@ class FixtureMetric(Metric):
         )
 
     def rows(self) -> list[Row]:
-        """All of it, the slave beside the overshoot that was published of a box."""
+        """All of it, the slave beside the overshoot that was published of a box.
+
+        None if no fixture ever was on.
+        """
         score = self.values()
+        if not score.on_s:
+            return []
         share = None if score.outside_share is None else 100.0 * score.outside_share
         kind = score.kind or BOX.name
         is_comparable = kind == BOX.name and self._gains.published is not None

@@ -1,0 +1,111 @@
+"""Overview: what a report page opens with, each session beside the others."""
+
+from collections.abc import Iterator, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from teleop_core.evaluation.bands import Band
+from teleop_core.evaluation.figure import Figure, Numbers
+from teleop_core.evaluation.preview import preview
+from teleop_core.evaluation.rows import number
+from teleop_core.evaluation.score import Score
+from teleop_core.evaluation.verdict import SHARE, Verdict, percent
+
+SHOWN = 5
+"""Figures of a session."""
+_FIGURES = (
+    (SHARE, "%", "of the time followed"),
+    ("asked_error_mm.max", "mm", "at most from where the hand led"),
+    ("position_error_mm.rms", "mm", "RMS from the reference"),
+    ("orientation_error_deg.angle.rms", "°", "RMS turned off it"),
+    ("fixture.penetration_max_mm", "mm", "at most out of the fixture"),
+    ("latency_ms.total.p99", "ms", "from hand to setpoint, 99 of 100"),
+    ("force_n.max", "N", "at most on the hand"),
+    ("motion.hand.speed_median_mm_s", "mm/s", "median speed of the hand"),
+)
+_OFTEN_NOTHING = {"latency_ms.total.p99", "force_n.max", "fixture.penetration_max_mm"}
+_SIZE, _MARGIN, _POINTS = 200, 10, 400
+
+
+def overview(
+    scores: Sequence[Score], figures: Sequence[Sequence[Figure]], bands: Sequence[Sequence[Band]]
+) -> str:
+    """Card of each session: verdict, five figures, the path from above, the error against time."""
+    cards = [
+        f'<article class="card session"><h2><a href="#recording-{i}">{escape(score.session.place)}'
+        f"</a></h2>{_verdict(score.verdict)}{_figures(score)}{_pictures(plots, of_time)}</article>"
+        for i, (score, plots, of_time) in enumerate(zip(scores, figures, bands, strict=True))
+    ]
+    return f'<div class="sessions">{"".join(cards)}</div>'
+
+
+def _verdict(found: Verdict) -> str:
+    kind = "good" if found.is_good else "bad"
+    return f'<p class="verdict {kind}">{escape(found.text)}</p>'
+
+
+def _figures(score: Score) -> str:
+    found = list(_known(score))[:SHOWN]
+    items = (
+        f"<div><dd>{value}<small> {escape(unit)}</small></dd><dt>{escape(text)}</dt></div>"
+        for value, unit, text in found
+    )
+    return f'<dl class="figures">{"".join(items)}</dl>'
+
+
+def _known(score: Score) -> Iterator[tuple[str, str, str]]:
+    """Value, unit and meaning of figures that the score has, and that say something."""
+    values = score.to_dict()
+    for key, unit, text in _FIGURES:
+        value = values.get(key)
+        if key == SHARE and isinstance(value, float):
+            yield percent(value), unit, text
+        elif isinstance(value, int | float) and not (value == 0.0 and key in _OFTEN_NOTHING):
+            yield number(value), unit, text
+
+
+def _pictures(plots: Sequence[Figure], bands: Sequence[Band]) -> str:
+    path = next((drawn for plot in plots if (drawn := _path(plot))), "")
+    curve = next((drawn for plot in plots if (drawn := preview(plot, bands))), "")
+    return f'<div class="pictures">{path}{curve}</div>'
+
+
+def _path(plot: Figure) -> str:
+    """The curves of a plot in space, seen from above; empty for other plots."""
+    curves = [trace for trace in plot.traces if trace.get("type") == "scatter3d" and _drawn(trace)]
+    if not curves or "meta" in plot.layout:
+        return ""
+    points = [_thin(trace["x"], trace["y"]) for trace in curves]
+    whole = np.concatenate(points)
+    low, high = whole.min(axis=0), whole.max(axis=0)
+    scale = (_SIZE - 2 * _MARGIN) / max(float((high - low).max()), 1e-6)
+    lines = "".join(_line(trace, (xy - 0.5 * (low + high)) * scale, trace is curves[-1])
+                    for trace, xy in zip(curves, points, strict=True))  # fmt: skip
+    told = f"from above, {high[0] - low[0]:.3g} × {high[1] - low[1]:.3g} mm"
+    return (
+        f'<figure><svg viewBox="0 0 {_SIZE} {_SIZE}" role="img" aria-label="path from above">'
+        f"{lines}</svg><small>{told}</small></figure>"
+    )
+
+
+def _drawn(trace: dict[str, Any]) -> bool:
+    arrays = [trace.get(axis) for axis in "xy"]
+    return all(isinstance(a, np.ndarray) and len(a) > 1 for a in arrays) and "lines" in str(
+        trace.get("mode", "")
+    )
+
+
+def _thin(x: Numbers, y: Numbers) -> Numbers:
+    points = np.column_stack((x, y)).astype(np.float64)
+    points = points[np.isfinite(points).all(axis=1)]
+    thin: Numbers = points[:: max(1, len(points) // _POINTS)]
+    return thin if len(thin) else np.zeros((1, 2))
+
+
+def _line(trace: dict[str, Any], points: Numbers, is_last: bool) -> str:
+    color = trace.get("line", {}).get("color")
+    color = color if isinstance(color, str) else "#c2370a" if is_last else "#9ed0fb"
+    places = " ".join(f"{0.5 * _SIZE + x:.1f},{0.5 * _SIZE - y:.1f}" for x, y in points.tolist())
+    return f'<polyline points="{places}" fill="none" stroke="{escape(color)}" stroke-width="1.5"/>'

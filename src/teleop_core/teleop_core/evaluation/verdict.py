@@ -1,0 +1,139 @@
+"""Verdict: one line about a score that names the worst first."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from teleop_core.evaluation.plain import Leaf
+from teleop_core.evaluation.published import BOX_OVERSHOOT_MM
+
+SHARE = "reach.followed_share"
+NAMED = 3
+"""Concerns that a verdict names."""
+# From where on something is a concern. Assumed, but for the overshoot of a fixture and the share of
+# the time followed, below which no published figure is compared.
+_FOLLOWED, _DRIFT_MM, _ERROR_MM, _LATENCY_MS, _SHARE = 0.99, 5.0, 1.0, 20.0, 1e-3
+_CAUSES = {
+    "joint": "at a joint's end", "workspace": "beyond the workspace", "speed": "joints too slow",
+    "singularity": "near a singularity", "aligning": "aligned anew",
+}  # fmt: skip
+Values = Mapping[str, Leaf]
+"""Numbers of a score by their keys."""
+
+
+class Concern(NamedTuple):
+    """Something wrong: how many times beyond what is fine, its key, and in words."""
+
+    weight: float
+    key: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is to be said of a score first.
+
+    Attributes:
+        text: One line, the worst first.
+        worst: Key of the worst; None if nothing is beyond what is fine.
+    """
+
+    text: str
+    worst: str | None
+
+    @property
+    def is_good(self) -> bool:
+        """Whether nothing is beyond what is fine."""
+        return self.worst is None
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def verdict_of(values: Values) -> Verdict:
+    """Verdict on the numbers of a score, by their keys."""
+    found = [c for concerns in _CONCERNS for c in concerns(values) if c.weight > 1.0]
+    found.sort(key=lambda concern: -concern.weight)
+    if found:
+        return Verdict("; ".join(concern.text for concern in found[:NAMED]), found[0].key)
+    parts = ["nothing stands out"]
+    if (share := _number(values, SHARE)) is not None:
+        parts.append(f"followed {percent(share)} % of the time")
+    if (error := _number(values, "position_error_mm.rms")) is not None:
+        parts.append(f"{error:.3g} mm RMS from its reference")
+    return Verdict(f"{parts[0]}: {', '.join(parts[1:])}" if parts[1:] else parts[0], None)
+
+
+def _number(values: Values, key: str) -> float | None:
+    value = values.get(key)
+    return None if value is None or isinstance(value, str) else float(value)
+
+
+def percent(share: float) -> str:
+    """Text in percent, rounded down, so that 100 means always."""
+    return f"{math.floor(1000.0 * share + 1e-9) / 10.0:g}"
+
+
+def _drift(values: Values) -> Iterator[Concern]:
+    """Off where the hand led: more than the lag of filters, which is in the command error too."""
+    key = "asked_error_mm.max"
+    off, lag = _number(values, key), _number(values, "command_error_mm.max") or 0.0
+    if off is not None:
+        yield Concern((off - lag) / _DRIFT_MM, key, f"up to {off:.3g} mm from where the hand led")
+
+
+def _following(values: Values) -> Iterator[Concern]:
+    share = _number(values, SHARE)
+    if share is None:
+        return
+    shares = {text: _number(values, f"reach.{name}_share") for name, text in _CAUSES.items()}
+    causes = [f"{100.0 * s:.1f} % {text}" for text, s in shares.items() if s and s >= _SHARE]
+    text = f"followed {percent(share)} % of the time"
+    text += f" ({', '.join(causes)})" if causes else ""
+    yield Concern((1.0 - share) / (1.0 - _FOLLOWED), SHARE, text)
+
+
+def _beyond(key: str, fine: float, text: str) -> Callable[[Values], Iterator[Concern]]:
+    """Concern about one number, which stands in the text."""
+
+    def concern(values: Values) -> Iterator[Concern]:
+        value = _number(values, key)
+        if value is not None:
+            yield Concern(value / fine, key, text.format(value))
+
+    return concern
+
+
+def _messages(values: Values) -> Iterator[Concern]:
+    """Lost messages, of all topics."""
+    missing = sum(
+        int(value) for key, value in values.items()
+        if key.startswith("topics.") and key.endswith(".missing") and isinstance(value, int | float)
+    )  # fmt: skip
+    count = sum(
+        int(value) for key, value in values.items()
+        if key.startswith("topics.") and key.endswith(".count") and isinstance(value, int | float)
+    )  # fmt: skip
+    if missing:
+        share = missing / max(1, count + missing)
+        yield Concern(
+            share / _SHARE, "topics", f"{missing} messages missing ({100.0 * share:.2g} %)"
+        )
+
+
+def _ticks(values: Values) -> Iterator[Concern]:
+    done, missed = _number(values, "ticks.executed"), _number(values, "ticks.missed")
+    if done and missed:
+        yield Concern(
+            missed / done / _SHARE, "ticks.missed", f"{missed:.0f} control ticks left out"
+        )
+
+
+_CONCERNS: tuple[Callable[[Values], Iterator[Concern]], ...] = (
+    _drift, _following, _messages, _ticks,
+    _beyond("position_error_mm.rms", _ERROR_MM, "{:.3g} mm RMS from its reference"),
+    _beyond("fixture.penetration_max_mm", BOX_OVERSHOOT_MM, "{:.3g} mm out of the fixture"),
+    _beyond("contact.feeding", 0.5, "{:.0f} contacts whose wall gave back more than it took"),
+    _beyond("latency_ms.total.p99", _LATENCY_MS, "{:.3g} ms from hand to setpoint in 1 of 100"),
+)  # fmt: skip
