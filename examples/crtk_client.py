@@ -8,10 +8,14 @@ import sys
 import time
 from collections.abc import Callable
 
-import rclpy
-from crtk_msgs.msg import OperatingState
-from geometry_msgs.msg import PoseStamped
-from rclpy.node import Node
+try:
+    import rclpy
+    from crtk_msgs.msg import OperatingState
+    from geometry_msgs.msg import PoseStamped
+    from rclpy.node import Node
+except ModuleNotFoundError as error:
+    what = "make crtk_msgs" if error.name == "crtk_msgs" else "pip install 'teleop_core[ros]'"
+    sys.exit(f"needs {error.name}, which is not installed: {what}")
 
 AXES = "xyz"
 WAY = 0.01  # [m]

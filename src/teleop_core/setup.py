@@ -37,6 +37,7 @@ setup(
     },
     python_requires=">=3.11",
     install_requires=[
+        "argcomplete",
         "numpy",
         "numba>=0.68,<0.69",
         "mcap",

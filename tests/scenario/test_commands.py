@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from numba.core import event
 from scipy.spatial.transform import Rotation
 
 from teleop_core import topics
@@ -254,12 +255,32 @@ def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop, tmp_path):
     assert b"simulating" in shown
 
 
-def test_long_compiling_is_told_while_no_tick_was_made(capsys):
-    progress = Progress()
-    say_compiling(progress)
-    progress(1, 10)
-    say_compiling(progress)
+def test_compiling_is_told_while_something_compiles_and_at_no_other_time(capsys):
+    assert not say_compiling()
+    assert capsys.readouterr().err == ""
+    with event.trigger_event("numba:compile"):  # what numba itself does around its compiler
+        assert say_compiling()
     assert capsys.readouterr().err == f"{COMPILING}, once for this graph …\n"
+
+
+def test_sessions_of_an_experiment_are_counted():
+    progress = Progress()
+    for done in (1, 5, 10, 1, 10, 3):
+        progress(done, 10)
+    assert progress.sessions == 3
+
+
+def test_the_shell_completes_commands_and_options(tmp_path):
+    for line, expected in (("teleop ev", "evaluate"), ("teleop import --pre", "--preset")):
+        answer = tmp_path / "answer"
+        environment = os.environ | {
+            "_ARGCOMPLETE": "1", "COMP_LINE": line, "COMP_POINT": str(len(line)),
+            "_ARGCOMPLETE_STDOUT_FILENAME": str(answer), "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
+        }  # fmt: skip
+        subprocess.run(
+            [sys.executable, "-m", "teleop_core.cli"], env=environment, check=False, timeout=60
+        )
+        assert answer.read_text() == expected
 
 
 @pytest.mark.slow

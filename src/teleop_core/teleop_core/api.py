@@ -11,7 +11,7 @@ The command line is a thin layer on this module.
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,13 +53,19 @@ from teleop_core.session.virtual import VirtualTime
 from teleop_core.stage import STAGES, Stage
 from teleop_core.topics import Topic
 
+if TYPE_CHECKING:
+    import pandas
+
 __all__ = ["OperatorLike", "Progress", "configuration", "replay", "run"]
 
 Progress = Callable[[int, int], None]
 """Called with ticks done and ticks in all, after every simulated second."""
-OperatorLike = str | Path | Operator | Motion | NDArray[np.float64] | tuple[Array, Array]
+OperatorLike: TypeAlias = Union[
+    str, Path, Operator, Motion, NDArray[np.float64], tuple[Array, Array], "pandas.DataFrame"
+]
 """An operator: its name; a CSV table or recording; a part; ``motion(times)``; an array whose
-columns are time [s] and what :data:`~teleop_core.operators.Motion` says; or times and rows."""
+columns are time [s] and what :data:`~teleop_core.operators.Motion` says; times and rows; or a data
+frame with columns called as those of such a table."""
 Setting = float | str | bool | Sequence[float] | Sequence[str]
 """Value of a parameter."""
 
@@ -327,6 +333,9 @@ def _operator_settings(operator: OperatorLike) -> dict[str, object]:
             needed = "(N, 4), (N, 7) or (N, 10): time [s], then the columns of a motion"
             raise ParameterError("operator", f"an array {operator.shape}", needed)
         part = following(name, operator[:, 0], operator[:, 1:])
+    elif hasattr(operator, "columns"):
+        name = "frame"
+        part = following(name, *_of_frame(operator))
     elif isinstance(operator, tuple):
         name = "array"
         part = following(name, *operator)
@@ -336,6 +345,25 @@ def _operator_settings(operator: OperatorLike) -> dict[str, object]:
         name = f"own_{name}"
     OPERATORS.add(name, part, replace=True)
     return {"operator.kind": name}
+
+
+def _of_frame(frame: "pandas.DataFrame") -> tuple[Array, Array]:
+    """Times (N,) [s] and motion (N, 3, 6 or 9) of a frame that is called as an operator's file.
+
+    Raises:
+        ParameterError: It has no time, no place, or columns of another name.
+    """
+    from teleop_core.operators.recorded import COLUMNS
+
+    named = frame if "t" in frame else frame.reset_index(names="t")
+    needed = f"columns of {', '.join(COLUMNS)}; t may be the index, and x, y, z are needed"
+    names = [str(name) for name in named.columns]
+    if not set(COLUMNS[:4]) <= set(names) <= set(COLUMNS):
+        raise ParameterError("operator", f"a frame of {', '.join(names)}", needed)
+    width = 4 if set(names) <= set(COLUMNS[:4]) else 7 if set(names) <= set(COLUMNS[:7]) else 10
+    whole = named.reindex(columns=COLUMNS[:width], fill_value=0.0)
+    values = np.asarray(whole.to_numpy(dtype=np.float64))
+    return values[:, 0], values[:, 1:]
 
 
 def _file_settings(path: Path) -> dict[str, object]:

@@ -4,6 +4,7 @@ Imports stand inside the commands: ``teleop --help`` answers at once.
 """
 
 import argparse
+import os
 import sys
 import warnings
 from functools import cache
@@ -60,6 +61,10 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point of ``teleop``; returns the exit code: 0, 2 for wrong use, 130 for Ctrl-C."""
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what can come next
+        from argcomplete import autocomplete
+
+        autocomplete(_parser())
     parsed = _parser().parse_args(arguments)
     warnings.showwarning = _note  # type: ignore[assignment]
     try:

@@ -236,7 +236,8 @@ def build(group: type[Group], values: Mapping[str, object], prefix: str = "") ->
     declared = {spec.name: spec for spec in specs(group)}
     for name, value in values.items():
         if name not in declared:
-            raise UnknownNameError(f"parameter {prefix}", name, declared)
+            whose = f" of {prefix.rstrip('.')}" if prefix else ""
+            raise UnknownNameError(f"parameter{whose}", name, declared)
         checked = tuple(value) if isinstance(value, list) else value
         dataclasses.replace(declared[name], name=prefix + name).check(checked)
     return _make(group, values)

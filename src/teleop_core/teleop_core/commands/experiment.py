@@ -2,6 +2,8 @@
 
 import argparse
 import json
+import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,10 +67,14 @@ def _outcomes(names: tuple[str, ...], seed: int) -> "list[Outcome]":
     found = [EXPERIMENTS.find(name) for name in dict.fromkeys(names) or EXPERIMENTS.names()]
     bench, outcomes = Bench(seed), []
     for number, experiment in enumerate(found, start=1):
+        begin = time.monotonic()
         with shown_progress(f"{number} of {len(found)}, {experiment.name}") as progress:
             bench.progress = progress
             outcomes.append(experiment.run(bench))
             progress(1, 1)
+        if len(found) > 1 and not sys.stderr.isatty():  # where there is no bar
+            took = time.monotonic() - begin
+            print(f"{number} of {len(found)}, {experiment.name}: {took:.0f} s", file=sys.stderr)
     return outcomes
 
 

@@ -5,16 +5,20 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+PATIENCE = 2.0
+"""Time [s] after which somebody wants to know why nothing happens."""
+
 
 class Progress:
-    """What a session tells of its ticks; shown by a bar if there is one."""
+    """What sessions tell of their ticks, one after the other; shown by a bar if there is one."""
 
     def __init__(self) -> None:
-        self.ticks = 0
+        self.ticks = self.sessions = 0
         self.show: Callable[[int, int], None] | None = None
 
     def __call__(self, done: int, total: int) -> None:
         """Take how many ticks are done, of how many."""
+        self.sessions += done < self.ticks or not self.sessions
         self.ticks = done
         if self.show is not None:
             self.show(done, total)
@@ -30,20 +34,28 @@ class Progress:
 @contextmanager
 def shown_progress(text: str) -> Iterator[Progress]:
     """Progress bar on a terminal, nothing when piped."""
-    progress = Progress()
-    patience = threading.Timer(2.0, say_compiling, (progress,))
-    patience.daemon = True
-    patience.start()
+    progress, ended = Progress(), threading.Event()
+    threading.Thread(target=_watch, args=(progress, ended), daemon=True).start()
     try:
         yield from _shown(text, progress)
     finally:
-        patience.cancel()
+        ended.set()
 
 
-def say_compiling(progress: Progress) -> None:
-    """Say what takes so long before the first tick."""
-    if not progress.ticks:
+def _watch(progress: Progress, ended: threading.Event) -> None:
+    """Wait for what takes long, and say it."""
+    wait = PATIENCE
+    while not ended.wait(wait) and not progress.ticks and not say_compiling():
+        wait = 0.2
+
+
+def say_compiling() -> bool:
+    """Say that kernels are compiled, if any are now; whether that was said."""
+    from teleop_core.kernels.progress import is_compiling
+
+    if is_compiling():
         print("compiling kernels, once for this graph …", file=sys.stderr)
+    return is_compiling()
 
 
 def _shown(text: str, progress: Progress) -> Iterator[Progress]:
@@ -51,11 +63,19 @@ def _shown(text: str, progress: Progress) -> Iterator[Progress]:
         yield progress
         return
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
-    columns = (TextColumn(text), BarColumn(), TextColumn("{task.percentage:.0f} %"))
-    with Bar(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f} %"),
+        TimeElapsedColumn(), TimeRemainingColumn(),
+    )  # fmt: skip
+    with Bar(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(text, total=None)
-        progress.show = lambda done, total: bar.update(task, completed=done, total=total)
+
+        def show(done: int, total: int) -> None:
+            number = f", session {progress.sessions}" if progress.sessions > 1 else ""
+            bar.update(task, completed=done, total=total, description=text + number)
+
+        progress.show = show
         yield progress
