@@ -28,8 +28,7 @@ files of known systems:
 %s
   teleop import Suturing_B001.txt --out bags/suturing --preset jigsaws
 both hands of one file, with options of each hand beside those of all:
-  teleop import two.csv --out bags/two --time t --arm left "--position lx ly lz" \\
-      --arm right "--position rx ry rz"
+  teleop import two.csv --out bags/two --arm left "--position 2-4" --arm right "--position 5-7"
 then:
   teleop replay bags/hand --out bags/hand_replayed
 """
