@@ -367,7 +367,7 @@ class _Hand:
         threading.Thread(target=self._press, args=(name,), daemon=True).start()
 
     def _press(self, name: str) -> None:
-        with self._pressing:
+        with self._pressing, suppress(RuntimeError):  # rclpy, once the link is closed
             self._say(np.array([0.0, name == "fixture", name == "mode"]))
             time.sleep(_PRESS)
             self._say(np.zeros(3))
