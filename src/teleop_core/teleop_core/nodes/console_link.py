@@ -262,13 +262,12 @@ class LiveLink:
         return bool(answer.success), str(answer.message)
 
     def press(self, *, is_pressed: bool) -> None:
-        """Press or release the emergency stop of all arms; a release is said several times.
+        """Press or release the emergency stop of all arms.
 
         A stop is said again at every :meth:`view` until all arms have said that it is in force.
         """
         self._is_pressed = is_pressed
-        for _ in range(1 if is_pressed else 3):
-            self._button.say(is_pressed=is_pressed)
+        self._button.say(is_pressed=is_pressed)
 
     def _insist(self, view: View) -> None:
         """Say a stop again that some arm has not confirmed."""

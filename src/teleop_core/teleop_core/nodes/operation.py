@@ -43,9 +43,17 @@ class StopButton:
     def __init__(self, node: Any) -> None:
         profile = QoSProfile(depth=1, reliability=_RELIABLE, durability=_LATCHED)
         self._own = node.create_publisher(Bool, STOP_TOPIC, profile)
+        self._is_released = False
 
     def say(self, *, is_pressed: bool) -> None:
-        """Say that it is pressed, or that it is not; from any thread."""
+        """Say that it is pressed, or that it is not; from any thread.
+
+        A release is said once: the middleware sends the last message again until it has arrived,
+        and one that is missing before it would count as a press.
+        """
+        if self._is_released and not is_pressed:
+            return
+        self._is_released = not is_pressed
         self._own.publish(Bool(data=is_pressed))
 
     @property

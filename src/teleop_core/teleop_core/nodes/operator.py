@@ -118,9 +118,8 @@ class Operator:
         """Say that the emergency stop is not pressed; what it stopped stays stopped."""
         self.look()
         self._until(lambda: self._button.listeners > 0, must=False)
-        for _ in range(5):
-            self._button.say(is_pressed=False)
-            self.listen()
+        self._button.say(is_pressed=False)
+        self.listen()
 
     def go_on(self) -> list[str]:
         """Release the stop, and reset and enable, or resume, every arm; what they answer.
