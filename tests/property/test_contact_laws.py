@@ -1,6 +1,7 @@
 """Laws of contact: damped walls take more energy than they give back, whoever leans on them."""
 
 import math
+from collections import deque
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from teleop_core.evaluation.metrics.contact import TOUCH_J
 from teleop_core.mapping.motion_scaling import MotionScaling
 from teleop_core.mapping.parameters import FixtureParameters, MotionScalingParameters
+from teleop_core.mapping.walls import passive_stiffness
 from teleop_core.master.haptic_master import (
     REST_POSITION,
     ButtonParameters,
@@ -26,8 +28,11 @@ RENDERED = DeviceParameters().stiffness  # what the device can render on x, y, z
 SLIVER = 5e-7  # a touch may give so much more than it took [J]: 0.1 N over 5 µm
 
 
-def session(motion, seconds, hand=None, device=None, seed=1, **fixture):
-    """Places (N, 3) [m], forces (N, 3) [N] of a hand with a device in a box, without a slave."""
+def session(motion, seconds, hand=None, device=None, seed=1, delay=0, **fixture):
+    """Places (N, 3) [m], forces (N, 3) [N] of a hand with a device in a box, without a slave.
+
+    The wall's force comes ``delay`` ticks late.
+    """
     register_operator("leaning", motion, replace=True)
     master = HapticMaster(
         HapticMasterParameters(
@@ -41,6 +46,7 @@ def session(motion, seconds, hand=None, device=None, seed=1, **fixture):
     felt, told = master.signals, scaling.signals
     feel, tell = master.load(), scaling.load()
     places, forces = np.empty((2, round(seconds * 1e3), 3))
+    late = deque([np.zeros(6)] * delay)
     for i in range(len(places)):
         if i % 500 == 0:
             master.prepare(500)
@@ -52,7 +58,8 @@ def session(motion, seconds, hand=None, device=None, seed=1, **fixture):
         told["slave_setpoint_cp"] = told["slave_servo_cp"]
         told["slave_setpoint_cp_ns"] = i * TICK_NS
         tell()
-        felt["master_servo_cf"] = told["master_servo_cf"]
+        late.append(told["master_servo_cf"].copy())
+        felt["master_servo_cf"] = late.popleft()
     return places, forces
 
 
@@ -125,6 +132,27 @@ def test_an_undamped_wall_feeds_slow_contacts_of_a_trembling_hand_a_damped_one_n
         fed[wall] = (returned / taken)[is_contact].max()
     assert fed["soft"] > 1.02
     assert fed["damped"] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "delay", "feeds"),
+    [
+        (1000.0, 0, False),
+        (330.0, 1, False),
+        (140.0, 3, False),
+        (1260.0, 0, True),
+        (1000.0, 1, True),
+    ],
+)
+def test_a_wall_is_passive_within_its_bound_and_not_far_beyond_it(
+    stiffness, delay, feeds, own_parts
+):
+    bound = passive_stiffness(10.0, 1e-3, 1e-3 * delay, 0.26, 0.055e-3)
+    assert (stiffness > bound * (1.0 + 1e-9)) is feeds
+    taken, returned, _ = energies(*session(slow, 8.0, delay=delay, stiffness=stiffness)).T
+    is_contact = np.maximum(taken, returned) >= TOUCH_J
+    assert is_contact.sum() >= 2
+    assert ((returned > taken)[is_contact].any()) == feeds
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

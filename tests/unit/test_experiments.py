@@ -195,6 +195,13 @@ def test_readings_have_the_printed_statistics_and_are_steps_of_the_ruler(name):
     assert np.array_equal(as_read(np.array(which.read_mm), which.step_mm), which.read_mm)
 
 
+def test_errors_of_the_accuracy_test_are_those_that_its_tables_print():
+    assert AXES["y"].error_mm[0] == 0.39
+    assert [AXES["y"].error_mm[k] for k in (5, 9)] == [-1.03, -1.15]
+    for which in AXES.values():  # within the rounding of their own readings
+        assert np.abs(which.error_mm - published_errors(which)).max() < 0.012
+
+
 # -- filter ----------------------------------------------------------------------------------------
 
 

@@ -149,7 +149,7 @@ def test_other_robots_stick_by_their_drive_table_and_are_made_as_drawn(name):
 def test_a_plant_of_ones_own_moves_the_slave():
     def physics(parameters, robot):
         made = PLANTS.find("ideal").physics(None, robot)
-        return type(made)(**(vars(made) | {"bias": np.full(robot.n, 0.5)}))
+        return type(made)(**(vars(made) | {"bias": 0.5 * np.eye(robot.n)[0]}))
 
     plant = register_plant(Plant("leaning", PLANTS.find("ideal").parameters, physics))
     try:

@@ -67,6 +67,7 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "master_slave": f"{_PLACE}.master_slave:MASTER_SLAVE",
         "controllers": f"{_PLACE}.controllers:CONTROLLERS",
         "gravity": f"{_PLACE}.gravity:GRAVITY",
+        "robustness": f"{_PLACE}.robustness:ROBUSTNESS",
         "shares": f"{_PLACE}.shares:SHARES",
         "points24": f"{_PLACE}.points24:POINTS24",
         "mma_frames": f"{_PLACE}.mma_frames:MMA_FRAMES",

@@ -32,6 +32,12 @@ from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 # What the text reads from its plots once the tip rests [mm].
 _AT_REST_MM = (0.091, 0.432, 0.432, 0.128, 0.142, 0.075)
 _POINT_3_Z_MM = 0.332
+# What it reads of the way there: the largest errors, of two points alone, and when they and the
+# rest come [s]; the axis of these times is wrong, see the notes.
+_LARGEST_MM = (None, 1.521, 1.524, None, None, None)
+_PEAK_S = (0.08, 0.0, 0.0, 0.08, 0.02, 0.02)
+_SETTLED_S = (None, 0.12, 0.12, 0.10, None, None)
+_REST = 0.1  # of the largest error less that at rest, within which an error has settled
 _SPEED, _SETTLE_S = 0.5, 1.0  # share of the speed limits; rest after the move
 _CURVE = 4  # of how many samples one is drawn
 _SCALES = np.array([math.degrees(1.0), math.degrees(1.0), 1e3, *[math.degrees(1.0)] * 3])
@@ -91,6 +97,15 @@ def _rest_mm(found: Response) -> float:
     return float(np.linalg.norm(found.error_mm[-1]))
 
 
+def _transient(found: Response) -> tuple[float, float, float]:
+    """Largest error on the way [mm], when it is, and when the error has settled at rest [s]."""
+    error = np.linalg.norm(found.error_mm, axis=1)
+    peak, room = int(error.argmax()), _REST * (error.max() - error[-1])
+    off = np.flatnonzero(np.abs(error - error[-1]) > room)
+    settled = found.times[int(off[-1])] if len(off) else 0.0
+    return float(error[peak]), float(found.times[peak]), float(settled)
+
+
 def _measure(bench: Bench) -> Findings:
     predicted, ours = _responses(bench, PREDICTED), _responses(bench, OURS)
     rows = [
@@ -107,12 +122,18 @@ def _measure(bench: Bench) -> Findings:
             ours=abs(float(ours[2].error_mm[-1, 2])), within=factor(1.6),
             group="read from its plots")
     )  # fmt: skip
-    rows += [
-        Row(quantity=f"largest error on the way, point {k}", unit="mm", group="on the way",
-            predicted=float(np.linalg.norm(found.error_mm, axis=1).max()),
-            ours=float(np.linalg.norm(other.error_mm, axis=1).max()))
-        for k, (found, other) in enumerate(zip(predicted, ours, strict=True), start=1)
-    ]  # fmt: skip
+    for text, unit, printed_of, number in (
+        ("largest error", "mm", _LARGEST_MM, 0),
+        ("time of it", "s", _PEAK_S, 1),
+        ("settled at", "s", _SETTLED_S, 2),
+    ):
+        rows += [
+            Row(quantity=f"{text}, point {k}", unit=unit, group="on the way, of figures 7.4-7.14",
+                published=printed, predicted=_transient(found)[number],
+                ours=_transient(other)[number])
+            for k, (printed, found, other) in enumerate(
+                zip(printed_of, predicted, ours, strict=True), start=1)
+        ]  # fmt: skip
     figures = [
         figure
         for k, found in enumerate(predicted, start=1)
@@ -124,7 +145,8 @@ def _measure(bench: Bench) -> Findings:
 _NOTES = (
     "The source's plots end after 0.15 s, in which its drives cannot make these moves: they need "
     "0.5 to 1.7 s. Moves here take half of the speed limits. Its plots are of one run each, and "
-    "so is what is predicted.",
+    "so is what is predicted. Times read from them are printed for the record, not compared: their "
+    "axis is wrong by a factor of 4 to 11, and errors at a start from rest cannot be 1.5 mm.",
 )
 
 

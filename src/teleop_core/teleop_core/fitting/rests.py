@@ -37,7 +37,7 @@ class Mover:
         parameters: Its parameters; it starts at home whatever they say.
         faults: The arm's faults in place of its own; None for its own.
         speed: Share of the speed limits that the moves use.
-        settle: Time at rest after each move [s].
+        settle: Time at rest after each move [s]; where joints stick, the rests do not depend on it.
         is_smooth: Whether encoders and drives have no steps, for a fit needs slopes.
     """
 

@@ -24,7 +24,7 @@ class FixtureParameters:
     kind: Choice = choice(FIXTURES, "box", doc="shape of the fixture")
     wall: str = parameter(
         "damped", choices=tuple(WALLS),
-        doc="damped: spring and damper up to max_force, gives back less energy than it took; "
+        doc="damped: spring and damper up to max_force, passive if soft enough (up to 1000 N/m); "
         "hard: the same, as steep as sampling allows; source: the published spring, full after "
         "1 mm; soft: a spring; step: max_force at once, which buzzes",
     )  # fmt: skip

@@ -3,7 +3,8 @@
 The source's wall is a spring that ends in a constant force (:func:`wall_force`). Sampled, it gives
 back more energy than it took: its force is that of the place at the beginning of a period and is
 held for all of it, so it is too small on the way in and too large on the way out, by half a
-period's way. A damped wall (:func:`damped_wall`) makes up for it.
+period's way. A damped wall (:func:`damped_wall`) makes up for it, as far as
+:func:`passive_stiffness`.
 
 A passivity controller (Hannaford and Ryu 2002), which cuts the force where the energy that a
 contact took is used up, was tried on top and left out: with a reading in steps and a device that
@@ -34,9 +35,12 @@ SOFT_ZONE = 1e-3
 """Depth over which the source's wall reaches its full force [m] (Vongbunyong 2008, section 7.6)."""
 HARD_STIFFNESS = 3300.0
 """Stiffness of the hard wall [N/m]: full force after 1 mm, as the source's. No axis of the device
-renders more, and the damper keeps it passive up to about this; dry friction of 0.26 N keeps steps
-of the reading of 0.055 mm from ringing up to 2 · 0.26 / 0.055e-3 = 9500 N/m (Abbott and Okamura
-2005, K <= 2 f / step)."""
+renders more. It is not passive: contacts give back up to twice what they took
+(:func:`passive_stiffness`), and dry friction of the device takes the rest."""
+# Of the wall's damping so much counts [N·s/m], and so large a share of it: measured on the
+# simulated device over slow presses, tremor, hovering and sliding. Steps of the reading, the lag of
+# the rate and the bending of the device use up the rest; more damping than this does not help.
+_DAMPING_COUNTS, _SHARE_COUNTS = 10.0, 0.05
 
 
 class Wall(NamedTuple):
@@ -66,7 +70,7 @@ WALLS = {
     "soft": Wall(None, 0.0, is_damped=False),
     "step": Wall(math.inf, 0.0, is_damped=False),
 }
-"""Walls by name. ``damped`` and ``hard`` hold the hand without feeding it; ``source`` is what the
+"""Walls by name. ``damped`` is passive up to :func:`passive_stiffness`; ``source`` is what the
 source built, ``soft`` the same with a stiffness of one's own, ``step`` its limit without a zone."""
 
 
@@ -100,7 +104,9 @@ def _along(rate: Array, depth: Array, length: float) -> float:
 def damped_wall(
     p: Any, s: Any, place: Array, depth: Array, length: float, period: float, force: Array
 ) -> None:
-    """Write the push (3,) [N] of a wall that gives back less than it took.
+    """Write the push (3,) [N] of a wall that gives back less than it took, if it is soft enough.
+
+    How soft is :func:`passive_stiffness`.
 
     Spring and damper, together between a twentieth of the spring's force and the largest force. The
     damping is at least stiffness times period: twice what a force lacks that is held for a period.
@@ -131,6 +137,30 @@ def damped_wall(
     push = min(max(spring + damping * speed, _LEAST * spring), p.max_force)
     for i in range(3):
         force[i] = -push * depth[i] / length if length > 0.0 else 0.0
+
+
+def passive_stiffness(
+    damping: float, period: float, delay: float, friction: float, step: float
+) -> float:
+    """Stiffness up to which contacts with a damped wall give back no more than they took [N/m].
+
+    On the safe side of what the simulated device shows: 1000 N/m at 1 kHz without delay, where
+    1260 give back more than they took, and 333 with a delay of 1 ms, where 1000 do and 500 do not.
+
+    Args:
+        damping: Of the wall [N·s/m]; 0 for a wall that is a spring alone, which never is passive.
+        period: Of the device's samples [s].
+        delay: Of the force beyond it [s].
+        friction: Dry friction of the device [N].
+        step: Of its reading [m]; 0: none.
+
+    Source:
+        Colgate and Schenkel 1997, K (T / 2 + delay) <= b, with the share of b that counts measured
+        here; Abbott and Okamura 2005, K <= 2 friction / step.
+    """
+    counted = _SHARE_COUNTS * min(damping, _DAMPING_COUNTS)
+    ringing = 2.0 * friction / step if step > 0.0 else math.inf
+    return min(counted / (0.5 * period + delay), ringing)
 
 
 @inner

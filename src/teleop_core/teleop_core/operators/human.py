@@ -25,6 +25,9 @@ from teleop_core.portable import dot, length
 _TRIES = 50  # targets that are drawn before one anywhere in the region is taken
 _LINES = 16  # sines that tremor is made of, per axis
 _TREMOR_BAND = (8.0, 12.0)
+# Middle and half width of the peak of its spectrum, and where it is cut off [Hz]: the peak is known
+# to lie within the band, its width is assumed.
+_PEAK, _HALF_WIDTH, _CUT = 10.0, 1.5, (4.0, 20.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,19 +256,24 @@ class _Walk:
 def tremor(size: float, rng: np.random.Generator) -> Motion:
     """Tremor of the tip: times (N,) [s] to offsets (N, 3) [m], the same for the same times.
 
-    Sines of random frequencies within 8 to 12 Hz and random phases, which come close to noise of
-    that band and never repeat.
+    Sines of random frequencies and phases, which come close to noise and never repeat. There are
+    most of them near 10 Hz and fewer farther away, so that the spectrum is that of a resonance.
 
     Args:
-        size: Root mean square of the length of the offset [m].
+        size: Root mean square of the length of the offset within 8 to 12 Hz [m].
         rng: Random numbers.
 
     Source:
         Rice 1944, section 2.8: noise as a sum of sines. Band: Elble and Koller 1990.
     """
-    rates = 2.0 * math.pi * rng.uniform(*_TREMOR_BAND, (3, _LINES))
+    first, last = (math.atan((edge - _PEAK) / _HALF_WIDTH) for edge in _CUT)
+    low, high = (math.atan((edge - _PEAK) / _HALF_WIDTH) for edge in _TREMOR_BAND)
+    places = (np.arange(_LINES) + rng.uniform(0.0, 1.0, (3, _LINES))) / _LINES
+    angles = first + (last - first) * places
+    rates = 2.0 * math.pi * (_PEAK + _HALF_WIDTH * np.sin(angles) / np.cos(angles))
     phases = rng.uniform(0.0, 2.0 * math.pi, (3, _LINES))
-    amplitude = size * math.sqrt(2.0 / (3 * _LINES))
+    share = (high - low) / (last - first)  # of its power within the band
+    amplitude = size * math.sqrt(2.0 / (3 * _LINES * share))
 
     def motion(times: Array) -> Array:
         found: Array = amplitude * np.sin(times[:, None, None] * rates + phases).sum(axis=2)

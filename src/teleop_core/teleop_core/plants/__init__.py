@@ -18,8 +18,8 @@ from teleop_core.robots.robot import Robot
 __all__ = ["PLANTS", "Physics", "Plant", "register_plant"]
 
 PER_JOINT = (
-    "viscous", "coulomb", "friction_speed", "bristle", "wander", "bias", "effort_step",
-    "encoder_step", "play",
+    "viscous", "coulomb", "friction_speed", "bristle", "wander", "wander_travel", "bias",
+    "effort_step", "encoder_step", "play", "drive_gain", "gear_stiffness", "motor_inertia",
 )  # fmt: skip
 
 
@@ -34,7 +34,7 @@ class Physics:
             [rad/s or m/s].
         bristle: Stiffness of dry friction that sticks [N·m/rad or N/m]; 0 where it does not.
         wander: Standard deviation of dry friction over its mean.
-        wander_time: Time over which it changes [s], > 0.
+        wander_travel: Way that a joint slips while it changes [rad or m], > 0.
         bias: Effort that the amplifier adds [N·m or N].
         effort_step: Smallest difference of effort that the drive makes [N·m or N]; 0: none.
         encoder_step: Smallest difference that is measured [rad or m].
@@ -43,6 +43,12 @@ class Physics:
         tip_geometry: Row of :func:`teleop_core.robots.dh_kernels.fk` for the true links; empty for
             the robot's own forward kinematics.
         dynamics: Parameter row of the true dynamics; empty for those that the control law knows.
+        effort_delay: Time from an asked effort to the motor's, beyond the tick [s]: whole ticks.
+        drive_gain: Effort that drives give over the one that is asked of them; None: 1.
+        gear_stiffness: Stiffness of gears that bend [N·m/rad or N/m]; 0, or None, for those that
+            do not.
+        motor_inertia: Inertia of the motors, seen through their gears [kg·m² or kg], which the
+            dynamics contain; of use where gears bend.
     """
 
     viscous: Array
@@ -50,7 +56,7 @@ class Physics:
     friction_speed: Array
     bristle: Array
     wander: Array
-    wander_time: float
+    wander_travel: Array
     bias: Array
     effort_step: Array
     encoder_step: Array
@@ -58,9 +64,16 @@ class Physics:
     coupling: Array
     tip_geometry: Array
     dynamics: Array
+    effort_delay: float = 0.0
+    drive_gain: Array | None = None
+    gear_stiffness: Array | None = None
+    motor_inertia: Array | None = None
 
     def __post_init__(self) -> None:
         n = len(np.atleast_1d(self.viscous))
+        for name, usual in (("drive_gain", 1.0), ("gear_stiffness", 0.0), ("motor_inertia", 1.0)):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.full(n, usual))
         for name in PER_JOINT:
             array = np.array(getattr(self, name), dtype=np.float64)
             if array.shape != (n,):

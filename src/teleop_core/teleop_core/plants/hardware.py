@@ -11,16 +11,21 @@ import numpy as np
 from teleop_core.controllers import per_joint
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array
+from teleop_core.kernels import pointer
 from teleop_core.parameters import parameter
 from teleop_core.plants import Physics, Plant
+from teleop_core.robots.drives import ACCELERATION
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.link_errors import true_chain
 from teleop_core.robots.robot import Robot
+from teleop_core.slave.rigid_body import write_model
 
+FASTEST_GEAR = 1500.0
+"""Frequency [rad/s] of a gear on its spring up to which steps of half a tick follow it."""
 FAULTS = {
     "friction": "dry friction",
     "sticking": "that dry friction sticks, and is not smooth",
-    "wandering": "dry friction that changes as time goes by",
+    "wandering": "dry friction that changes as a joint moves on",
     "bias": "amplifiers that give effort when none is asked for",
     "weights": "weights that the control law does not know",
     "drive_steps": "efforts in steps of the converter",
@@ -60,13 +65,32 @@ class HardwareParameters:
         doc="at which a joint swings on its friction before it slips",
         source="assumed: a joint gives by a few encoder counts before it slips",
     )  # fmt: skip
-    wander_time: float = parameter(
-        1.0, unit="s", lower=0.01, upper=1000.0, doc="over which dry friction changes",
-        source="assumed: runs of the precision test, seconds apart, differ as if drawn anew",
+    wander_travel: float = parameter(
+        2000.0, unit="encoder counts", lower=1.0, upper=1e7,
+        doc="way on which dry friction changes as a joint slips; at rest it stays",
+        source="assumed: about a turn of the motor, in which gears and bearings meet themselves",
     )  # fmt: skip
     drive_bits: int = parameter(
         14, lower=4, upper=32, doc="of the converter that commands the amplifier, peak to peak",
         source="assumed: usual for cards of analog outputs; the source names no number",
+    )  # fmt: skip
+    # Faults that no source of the RCRT-1 speaks of; `teleop experiment robustness` turns them on.
+    effort_delay: float = parameter(
+        0.0, unit="s", lower=0.0, upper=0.03,
+        doc="from the control law to the motor, beyond the tick, in whole ticks",
+        source="assumed: none; buses of drives take 1 to 5 ms",
+    )  # fmt: skip
+    drive_gain: float = parameter(
+        1.0, lower=0.1, upper=20.0, doc="effort of the drives over the one asked for",
+        source="assumed: 1; torque constants are good to some 10 %",
+    )  # fmt: skip
+    gear_stiffness: tuple[float, ...] = parameter(
+        (), unit="N·m/rad or N/m", lower=0.0, fixed=True,
+        doc="stiffness of each gear between motor, with its encoder, and link; 0 or empty: rigid",
+    )  # fmt: skip
+    motor_inertia: tuple[float, ...] = parameter(
+        (), unit="kg·m² or kg", lower=1e-12, fixed=True,
+        doc="of each motor through its gear, a part of its axis's; where gears bend. Empty: known",
     )  # fmt: skip
 
 
@@ -98,6 +122,7 @@ def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
         values = per_joint(robot, f"plant.hardware.{name}", given, getattr(faults, name))
         return np.zeros(robot.n) if fault in out else values
 
+    ones = np.ones(robot.n)
     zero, bristle = np.zeros(robot.n), drives.inertia * parameters.bristle_frequency**2
     return Physics(
         viscous=drives.viscous,
@@ -105,7 +130,7 @@ def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
         friction_speed=drives.friction_speed,
         bristle=zero if "sticking" in out else bristle,
         wander=number("wander", "wandering"),
-        wander_time=parameters.wander_time,
+        wander_travel=parameters.wander_travel * drives.encoder_step,
         bias=number("bias", "bias"),
         effort_step=(
             zero if "drive_steps" in out else 2.0 * drives.effort_limit / 2.0**parameters.drive_bits
@@ -115,7 +140,49 @@ def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
         coupling=np.zeros((robot.n, robot.n)) if "play" in out else faults.coupling,
         tip_geometry=np.zeros(0) if "links" in out else _tip_geometry(robot, faults),
         dynamics=np.zeros(0) if "weights" in out else _dynamics(robot, faults, parameters.weights),
+        effort_delay=parameters.effort_delay,
+        drive_gain=parameters.drive_gain * ones,
+        gear_stiffness=_gears(robot, parameters),
+        motor_inertia=_motors(robot, parameters),
     )
+
+
+def _motors(robot: Robot, parameters: HardwareParameters) -> Array:
+    """Inertias of the motors (n,), seen through their gears: the robot's, or half of the axes'."""
+    faults, drives = faults_of(robot), robot.drives
+    assert drives is not None
+    known = faults.motors if len(faults.motors) else 0.5 * drives.inertia
+    return per_joint(robot, "plant.hardware.motor_inertia", parameters.motor_inertia, known)
+
+
+def _gears(robot: Robot, parameters: HardwareParameters) -> Array:
+    """Stiffness of the gears (n,).
+
+    Raises:
+        ParameterError: A gear that bends with no inertia of a link behind it, or that swings too
+            fast for the ticks.
+    """
+    given, n, model = parameters.gear_stiffness, robot.n, robot.dynamics
+    stiffness = per_joint(robot, "plant.hardware.gear_stiffness", given, np.zeros(n))
+    if not stiffness.any():
+        return stiffness
+    assert model is not None
+    out, motors = np.empty(n + n * n), _motors(robot, parameters)
+    row, home = model.parameters.copy(), robot.home.copy()
+    write_model(pointer(model.acceleration, ACCELERATION), row, home, np.zeros(n), out)
+    links = np.diag(out[n:].reshape(n, n)) - motors
+    for i in np.flatnonzero(stiffness):
+        of = f"plant.hardware.gear_stiffness of {robot.joint_names[i]}"
+        if links[i] <= 1e-9 * motors[i]:
+            raise ParameterError(
+                of, stiffness[i], "0: in this model its motor is all that it moves"
+            )
+        most = FASTEST_GEAR**2 * motors[i] * links[i] / (motors[i] + links[i])
+        if stiffness[i] > most:
+            raise ParameterError(
+                of, stiffness[i], f"<= {most:.3g}, which swings at {FASTEST_GEAR} rad/s"
+            )
+    return stiffness
 
 
 def _dynamics(robot: Robot, faults: Hardware, weights: tuple[str, ...]) -> Array:

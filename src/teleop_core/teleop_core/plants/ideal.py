@@ -17,7 +17,7 @@ def ideal_physics(parameters: NoParameters, robot: Robot) -> Physics:
         friction_speed=drives.friction_speed,
         bristle=zero,
         wander=zero,
-        wander_time=1.0,
+        wander_travel=np.ones(robot.n),
         bias=zero,
         effort_step=zero,
         encoder_step=drives.encoder_step,

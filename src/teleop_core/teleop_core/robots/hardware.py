@@ -13,7 +13,7 @@ from teleop_core.robots.drives import read_only
 from teleop_core.robots.link_errors import LinkErrors
 
 NUMBERS = ("coulomb", "bias", "wander", "play")
-ENTRIES = (*NUMBERS, "coupling", "links", "dynamics")
+ENTRIES = (*NUMBERS, "coupling", "links", "dynamics", "motors")
 NOT_NEGATIVE = ("coulomb", "wander", "play")
 
 
@@ -31,6 +31,7 @@ class Hardware:
             one behind its encoder.
         links: How the links, and the zeros of the joints, differ from the drawing; None: not.
         dynamics: Parameter row of the true dynamics; empty when they are as the control law knows.
+        motors: Inertias of the motors through their gears (n,) [kg·m² or kg]; empty: not known.
         sources: Each name above to how its numbers are known, as of
             :func:`teleop_core.parameters.parameter`.
 
@@ -47,6 +48,7 @@ class Hardware:
     coupling: Array
     links: LinkErrors | None = None
     dynamics: Array = field(default_factory=lambda: np.zeros(0))
+    motors: Array = field(default_factory=lambda: np.zeros(0))
     sources: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -68,6 +70,7 @@ class Hardware:
         if self.links is not None and self.links.n != n:
             raise ShapeError("hardware.links", n, self.links.n)
         object.__setattr__(self, "dynamics", read_only("dynamics", self.dynamics))
+        object.__setattr__(self, "motors", read_only("motors", self.motors))
         self._check_sources()
 
     def _check_sources(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.link_errors import LinkErrors
-from teleop_core.robots.rcrt1_dynamics import link_row
+from teleop_core.robots.rcrt1_dynamics import LINKS, link_row
 
 _FIT = "fitted: to tables 7.1-7.6 with the gains of source_pid, by `teleop fit`"
 # What is left of the accuracy test once d3 is mended, 0.352 mm, over the 37 mm from wrist to tip
@@ -30,11 +30,12 @@ _DRAWN[2, 2] = 5.5e-3  # d3
 HARDWARE = Hardware(
     coulomb=np.array([0.0880, 0.251, 1.0, 6.08e-3, 5.62e-4, 5.10e-4]),
     bias=np.array([0.0445, 0.0, 0.0, 0.0, 0.0, 0.0]),
-    wander=np.array([0.36, 0.20, 0.20, 0.43, 0.67, 0.75]),
+    wander=np.array([0.27, 0.16, 0.16, 0.30, 0.62, 0.76]),
     play=np.array([0.0, 0.0, 0.0, 0.0, _PLAY, _PLAY]),
     coupling=_COUPLING,
     links=LinkErrors.from_vector(_DRAWN.ravel()),
     dynamics=link_row(m2b_L0b=0.0135),
+    motors=np.array([LINKS[f"J{i}"] for i in range(1, 7)]),
     sources={
         "coulomb": f"{_FIT}; of d3, which an integrator brings to its target: assumed",
         "bias": _FIT,
@@ -42,6 +43,7 @@ HARDWARE = Hardware(
         "play": "assumed: half of what the accuracy test leaves once d3 is mended",
         "coupling": "derived: radii r5 / r6 of the tendons' pulleys",
         "links": "fitted: d3 to tables E.1-E.3; the others assumed, one draw of the tolerances",
+        "motors": "published: table A.1, its unit derived; of joints 3 to 6 assumed",
         "dynamics": f"{_FIT}; m2b L0b of the four-bar, which the published controller neglects",
     },
 )

@@ -2,25 +2,75 @@
 
 from teleop_core.graph import BUILT_IN
 from teleop_core.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.mapping.walls import WALLS
+from teleop_core.mapping.walls import WALLS, passive_stiffness
 from teleop_core.master.device import DeviceParameters
 from teleop_core.master.haptic_master import HapticMasterParameters
 from teleop_core.session.configuration import Configuration
+from teleop_core.signals import DT
+from teleop_core.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
 
 _MASTER, _MAPPING = BUILT_IN[:2]
 
 
-def notes_of(configuration: Configuration) -> list[str]:
-    """One line for each thing that may not be meant; none where all is well."""
+def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
+    """One line for each thing that may not be meant; none where all is well.
+
+    Args:
+        configuration: Of the session.
+        transport: Time that a sample takes from the device to the wall and back, beside declared
+            delays [s].
+    """
     found = list(configuration.graph.notes)
     for arm in configuration.graph.namespaces:
         master, mapping = (configuration.group(name, arm) for name in (_MASTER, _MAPPING))
         if isinstance(master, HapticMasterParameters) and isinstance(
             mapping, MotionScalingParameters
         ):
-            note = rendered_note(master.device, mapping.fixture)
-            found += [f"arm {arm!r}: {note}" if arm else note] if note else []
+            delay = transport + _delay(configuration, arm)
+            told = (
+                rendered_note(master.device, mapping.fixture),
+                passive_note(master.device, mapping.fixture, delay),
+            )
+            found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
     return found
+
+
+def _delay(configuration: Configuration, arm: str) -> float:
+    """Declared delays on the way from the device's samples to its force [s]."""
+    around = (MASTER_MEASURED_CP.name, MASTER_SERVO_CF.name)
+    ends = {MASTER_MEASURED_CP.name: _MAPPING, MASTER_SERVO_CF.name: _MASTER}
+    return sum(
+        link.delay
+        for link in configuration.graph.links
+        if link.port.name in around
+        and link.reader.arm == arm
+        and link.reader.stage.name == ends[link.port.name]
+    )
+
+
+def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: float) -> str:
+    """What a wall gives back that is stiffer than passive; empty where it is not.
+
+    Args:
+        device: The device.
+        fixture: The wall.
+        delay: Of its force beyond the tick [s].
+    """
+    wall = WALLS[fixture.wall]
+    stiffness = wall.spring(fixture.stiffness, fixture.max_force)
+    damping = fixture.damping if wall.is_damped else 0.0
+    most = passive_stiffness(damping, DT, delay, device.friction, device.position_resolution)
+    if stiffness <= most * (1.0 + 1e-9) or fixture.max_force == 0.0:
+        return ""
+    until = (
+        f"with {1e3 * (DT + delay):.3g} ms from sample to force it is passive up to {most:.0f} N/m"
+    )
+    if not wall.is_damped:
+        until = "it is not damped"
+    return (
+        f"the {fixture.wall} wall of {stiffness:.0f} N/m may give back more energy than it took: "
+        f"{until}"
+    )
 
 
 def rendered_note(device: DeviceParameters, fixture: FixtureParameters) -> str:

@@ -42,25 +42,35 @@ def friction(p: Any, s: Any, i: int, moved: float, speed: float) -> float:
 
 @inner
 def bend(p: Any, s: Any, i: int, moved: float) -> None:
-    """Bend the bristle of joint ``i`` by a whole step, as far as dry friction carries it."""
+    """Bend the bristle of joint ``i`` by a whole step, as far as dry friction carries it.
+
+    The rest of the way slips, and is added to ``s.slipped``.
+    """
+    slip = moved
     if p.bristle[i] > 0.0:
         most = p.coulomb[i] * s.grip[i] / p.bristle[i]
-        s.bent[i] = min(max(s.bent[i] + moved, -most), most)
+        bent = s.bent[i] + moved
+        s.bent[i] = min(max(bent, -most), most)
+        slip = bent - s.bent[i]
+    s.slipped[i] += abs(slip)
 
 
 @inner
 def wander(p: Any, s: Any) -> None:
-    """Let the dry friction of all joints change for a tick: first-order noise of mean 1.
+    """Let the dry friction of joints that slipped change: first-order noise of mean 1 over the way.
 
-    The share never falls below a tenth, and its noise is uniform within a tick, hence normal
-    over the time in which it changes.
+    Teeth and balls meet other places of their paths as a joint moves on; at rest they stay, and so
+    does what they hold. The share never falls below a tenth, and its noise is uniform within a
+    tick, hence normal over the way on which it changes.
     """
     for i in range(s.grip.shape[0]):
-        if p.wander[i] > 0.0:
+        if p.wander[i] > 0.0 and s.slipped[i] > 0.0:
+            kept = 1.0 - min(s.slipped[i] / p.wander_travel[i], 1.0)
             s.noise[i] = s.noise[i] * _MULTIPLIER % _MODULUS
             drawn = math.sqrt(12.0) * (s.noise[i] / _MODULUS - 0.5)
-            s.astray[i] += math.sqrt(2.0 * p.wander_rate) * drawn - p.wander_rate * s.astray[i]
+            s.astray[i] = kept * s.astray[i] + math.sqrt(1.0 - kept * kept) * drawn
             s.grip[i] = max(1.0 + p.wander[i] * s.astray[i], 0.1)
+        s.slipped[i] = 0.0
 
 
 def bristle_damping(bristle: Any, inertia: Any) -> Any:

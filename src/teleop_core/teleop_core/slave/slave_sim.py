@@ -29,12 +29,14 @@ from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.robot import Robot
 from teleop_core.signals import DT, assign
+from teleop_core.slave.elastic import gear_damping
 from teleop_core.slave.friction import bristle_damping
 from teleop_core.slave.handover import missing_effort
 from teleop_core.slave.motion import MotionCommands
 from teleop_core.slave.stability import check_friction, check_stable, loop_key
 from teleop_core.slave.step import SPEED_LAG, Arm, slave_records, slave_step
 from teleop_core.slave.trajectory import shortest_move_time
+from teleop_core.slave.transmission import LONGEST_DELAY
 from teleop_core.stage import RunningStage, Stage
 from teleop_core.topics import (
     NO_COMMAND_NS,
@@ -214,6 +216,11 @@ class SlaveSim(RunningStage):
         relieved = self._gravity(arm.model) * self.parameters["compensated"]
         held = self._gravity(arm.dynamics) - relieved - self.parameters["bias"]
         self._law.begin(arm.memory, np.array(s["measured"]), held)
+        stiffness = self.parameters["gear_stiffness"]
+        bent = np.divide(
+            self._gravity(arm.dynamics), stiffness, out=np.zeros_like(home), where=stiffness > 0.0
+        )
+        s["link"] = home - bent
         row, transform = self.signals, np.empty((4, 4))
         row["slave_setpoint_js"] = home
         row["slave_setpoint_js_ns"] = row["slave_setpoint_cp_ns"] = s["command_stamp_ns"]
@@ -258,7 +265,9 @@ class SlaveSim(RunningStage):
         for name in PER_JOINT:
             p[name] = getattr(physics, name)
         p["bristle_damping"] = bristle_damping(physics.bristle, drives.inertia)
-        p["wander_rate"] = self.dt / physics.wander_time
+        p["gear_damping"] = gear_damping(physics.gear_stiffness, physics.motor_inertia)
+        p["has_gears"] = np.any(physics.gear_stiffness)
+        p["delay_ticks"] = min(round(physics.effort_delay / self.dt), LONGEST_DELAY)
         p["lower"], p["upper"] = robot.lower, robot.upper
         p["effort_limit"], p["speed_limit"] = drives.effort_limit, drives.speed_limit
         self.arm.limit[:] = drives.effort_limit

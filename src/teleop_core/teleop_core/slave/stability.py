@@ -33,8 +33,8 @@ _ROOM = 0.8
 # Where classical Runge-Kutta ends to be stable: -h times a real pole.
 _STABLE = 2.785
 _RIGID = 1e9  # acceleration and speed without a bound
-_LOOP = (*PER_JOINT, "bristle_damping", "lower", "upper", "effort_limit", "speed_limit",
-         "compensated", "steps")  # fmt: skip
+_LOOP = (*PER_JOINT, "bristle_damping", "gear_damping", "lower", "upper", "effort_limit",
+         "speed_limit", "compensated", "steps", "delay_ticks")  # fmt: skip
 _ARM = ("gains", "dynamics", "model", "geometry", "coupling")
 _passed: set[tuple[object, ...]] = set()
 

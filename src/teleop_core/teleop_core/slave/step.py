@@ -32,11 +32,12 @@ from teleop_core.slave.commands import (
     plan_move,
     take_command,
 )
+from teleop_core.slave.elastic import integrate_elastic
 from teleop_core.slave.friction import wander
 from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.rigid_body import write_model
-from teleop_core.slave.transmission import follow_encoders
+from teleop_core.slave.transmission import LONGEST_DELAY, drive, follow_encoders
 from teleop_core.slave.velocity import advance_velocity
 from teleop_core.topics import NO_COMMAND_NS
 
@@ -49,23 +50,35 @@ SPEED_LAG = 5e-3
 
 def slave_records(n: int) -> tuple[Any, Any]:
     """Parameter and state record of an arm with ``n`` joints."""
-    joints = (*PER_JOINT, "bristle_damping", "lower", "upper", "effort_limit", "speed_limit",
-              "compensated", "start", "braking", "acceleration", "lag", "rest_speed")  # fmt: skip
-    scalars = ("filter_gain", "filter_zero", "filter_pole", "wander_rate", "start_speed",
+    joints = (*PER_JOINT, "bristle_damping", "gear_damping", "lower", "upper", "effort_limit",
+              "speed_limit", "compensated", "start", "braking", "acceleration", "lag",
+              "rest_speed")  # fmt: skip
+    scalars = ("filter_gain", "filter_zero", "filter_pole", "start_speed",
                "tool_speed", "tool_acceleration")  # fmt: skip
-    counts = ("is_filtered", "steps", "timeout_ns", "interpolation")
+    counts = ("is_filtered", "steps", "timeout_ns", "interpolation", "delay_ticks", "has_gears")
     rows = [(name, "f8", (n,)) for name in joints]
     numbers = [(name, "f8") for name in scalars] + [(name, "i8") for name in counts]
     moved = ("command", "filtered", "setpoint", "target", *WAY_FIELDS, "step", "move_from",
              "move_to", "drive", "asked")  # fmt: skip
-    plant = ("measured", "speed", "bent", "grip", "astray", "carried")
+    plant = (
+        "measured",
+        "speed",
+        "bent",
+        "grip",
+        "astray",
+        "slipped",
+        "carried",
+        "link",
+        "link_speed",
+    )
     state: list[Field] = [(name, "f8", (n,)) for name in (*moved, *plant)]
     state += [(name, "i8", (n,)) for name in ("noise", "full_ticks")] + [("tool_step", "f8")]
+    state += [("late", "f8", (LONGEST_DELAY + 1, n))]
     state += [("twist", "f8", (6,))]
     stamps = (
         "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "refused_before", "in_row",
         "is_stream", "gap_ns", "moved_ticks", "move_ticks", "ticks", "span", "motion", "driven_ns",
-        "asked_ns",
+        "asked_ns", "driven",
     )  # fmt: skip
     whole = [*state, *((name, "i8") for name in stamps), *OPERATION_STATE]
     return records([*rows, *numbers, *OPERATION_PARAMETERS])[0], records(whole)[0]
@@ -134,20 +147,6 @@ def _control(p: Any, s: Any, arm: Any, dt: float) -> None:
 
 
 @inner
-def _drive(p: Any, arm: Any) -> None:
-    """Make of the effort asked for the one that the motors give."""
-    for i in range(arm.q.shape[0]):
-        asked, limit, step = arm.effort[i], arm.limit[i], p.effort_step[i]
-        if step > 0.0:
-            asked = round(asked / step) * step
-        arm.effort[i] = min(max(asked + p.bias[i], -limit), limit)
-        # The motor gives no drive beyond its rated speed, fading out over the next tenth.
-        over = abs(arm.dq[i]) / p.speed_limit[i] - 1.0
-        if over > 0.0 and arm.effort[i] * arm.dq[i] > 0.0:
-            arm.effort[i] *= max(0.0, 1.0 - 10.0 * over)
-
-
-@inner
 def _go_on(p: Any, s: Any, arm: Any, row: Any, before: Array, dt: float) -> None:
     """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
     if s.state == _ENABLED and s.is_busy and not s.must_plan:
@@ -198,6 +197,32 @@ def _moves(p: Any, s: Any) -> bool:
     return moving > 0
 
 
+@inner
+def _see_joints(p: Any, s: Any, arm: Any) -> None:
+    """Write where the joints truly are, behind gears that bend and tendons with play."""
+    if p.has_gears:
+        copy(s.link, arm.joints)
+        follow_encoders(p, s, arm.joints, arm.coupling, arm.tip)
+    else:
+        follow_encoders(p, s, arm.q, arm.coupling, arm.tip)
+
+
+@inner
+def _move_on(p: Any, s: Any, arm: Any, dt: float) -> None:
+    """Move the arm by a tick: by its brakes, or under the effort of its drives."""
+    if is_braked(p, s):
+        _brake(p, s, arm, dt)
+        for i in range(arm.q.shape[0]):
+            s.link[i] += arm.dq[i] * dt
+            s.link_speed[i] = arm.dq[i]
+    elif p.has_gears:
+        integrate_elastic(
+            arm.acceleration, arm.dynamics, p, s, p.steps, arm.effort, arm.q, arm.dq, dt
+        )
+    else:
+        integrate(arm.acceleration, arm.dynamics, p, s, p.steps, arm.effort, arm.q, arm.dq, dt)
+
+
 @kernel
 def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     """One control tick: write the slave's setpoint, measured and true topics and its operation.
@@ -233,7 +258,7 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     pose_from_transform(arm.T, row.slave_setpoint_cp)
     _measure(p, s, arm.q, dt)
     _control(p, s, arm, dt)
-    _drive(p, arm)
+    drive(p, s, arm)
     braked = is_braked(p, s)
     for i in range(n):
         if braked:
@@ -244,7 +269,7 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
         row.slave_measured_js[2 * n + i] = arm.effort[i]
     arm.fk(arm.measured, arm.geometry, arm.T)
     pose_from_transform(arm.T, row.slave_measured_cp)
-    follow_encoders(p, s, arm.q, arm.coupling, arm.tip)
+    _see_joints(p, s, arm)
     arm.tip_fk(arm.tip, arm.tip_geometry, arm.T)
     pose_from_transform(arm.T, row.slave_true_cp)
     row.slave_setpoint_js_ns = row.slave_setpoint_cp_ns = s.command_stamp_ns
@@ -256,7 +281,4 @@ def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     measure_rest(s, row.slave_measured_cp, row.now_ns)
     tell(s, row.slave_operation)
     wander(p, s)
-    if is_braked(p, s):
-        _brake(p, s, arm, dt)
-    else:
-        integrate(arm.acceleration, arm.dynamics, p, s, p.steps, arm.effort, arm.q, arm.dq, dt)
+    _move_on(p, s, arm, dt)

@@ -1,9 +1,12 @@
-"""Transmission: what lies between encoders and joints: play and coupled tendons."""
+"""Transmission: drives between efforts asked and given, play and tendons behind the encoders."""
 
 from typing import Any
 
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner
+
+LONGEST_DELAY = 30
+"""Largest delay of efforts [ticks]."""
 
 
 @inner
@@ -27,3 +30,31 @@ def follow_encoders(p: Any, s: Any, q: Array, coupling: Array, tip: Array) -> No
                 pull += coupling[i, j] * (q[j] - s.carried[j])
         s.carried[i] = min(max(s.carried[i], pull - p.play[i]), pull + p.play[i])
         tip[i] = s.carried[i]
+
+
+@inner
+def drive(p: Any, s: Any, arm: Any) -> None:
+    """Make of the effort asked for the one that the motors give.
+
+    Args:
+        p: Record with ``delay_ticks`` and, of each joint, ``drive_gain``, ``effort_step``, ``bias``
+            and ``speed_limit``.
+        s: Record with ``late``, the efforts asked for lately, and ``driven``; written.
+        arm: Its ``effort`` is written.
+    """
+    if p.delay_ticks > 0:  # in the first ticks the first effort, which holds the arm
+        count = s.late.shape[0]
+        late = s.driven - min(p.delay_ticks, s.driven)
+        for i in range(arm.q.shape[0]):
+            s.late[s.driven % count, i] = arm.effort[i]
+            arm.effort[i] = s.late[late % count, i]
+        s.driven += 1
+    for i in range(arm.q.shape[0]):
+        asked, limit, step = arm.effort[i], arm.limit[i], p.effort_step[i]
+        if step > 0.0:
+            asked = round(asked / step) * step
+        arm.effort[i] = min(max(p.drive_gain[i] * asked + p.bias[i], -limit), limit)
+        # The motor gives no drive beyond its rated speed, fading out over the next tenth.
+        over = abs(arm.dq[i]) / p.speed_limit[i] - 1.0
+        if over > 0.0 and arm.effort[i] * arm.dq[i] > 0.0:
+            arm.effort[i] *= max(0.0, 1.0 - 10.0 * over)
