@@ -152,10 +152,10 @@ class ImportOptions:
         x, *others = self.signed_axes
         if self.handedness == "right":
             return axis_map("--axes", (x, *others))
-        mirror = np.diag([-1.0, 1.0, 1.0])
+        mirror = np.array([[-1.0], [1.0], [1.0]])  # of the first row
         try:
             return np.asarray(
-                mirror @ axis_map("--axes", (x.translate(str.maketrans("+-", "-+")), *others))
+                mirror * axis_map("--axes", (x.translate(str.maketrans("+-", "-+")), *others))
             )
         except ParameterError:
             needed = "three axes at right angles that mirror, for --handedness left"
