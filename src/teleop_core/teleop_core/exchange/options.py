@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.geometry import Array
+
+if TYPE_CHECKING:
+    from teleop_core.geometry import Array
 
 Columns = tuple[str, ...]
 """Names of columns; or their numbers, counted from 1; ``4-12`` stands for nine of them."""
@@ -141,13 +142,15 @@ class ImportOptions:
             raise ParameterError("--axes", self.axes, "three of " + ", ".join(AXES))
         self.axis_map()
 
-    def axis_map(self) -> Array:
+    def axis_map(self) -> "Array":
         """Matrix (3, 3) from the file's axes to the master's; a mirror of left-handed axes.
 
         Raises:
             ParameterError: An axis is used twice, or the map is a mirror and must not, or must be.
         """
-        from teleop_core.mapping.parameters import axis_map  # compiled: not for `--help`
+        import numpy as np  # and what is compiled: not for `--help`
+
+        from teleop_core.mapping.parameters import axis_map
 
         x, *others = self.signed_axes
         if self.handedness == "right":
