@@ -104,7 +104,7 @@ def test_other_chains_and_choices_are_taken(calibrate, robot):
         (("--fit", "d3", "d4"), "d4 acts as d3"),
         (("--errors", "milled"), "cnc"),
         (("--choose", "best"), "optimal, random"),
-        (("--data", "none.csv"), "none.csv: No such file"),
+        (("--data", "none.csv"), "none.csv: cannot be read: No such file"),
         (("--data", "published", "--poses", 3), "--poses"),
         (("--data", "published", "--robot", "scara"), "measured the rcrt1"),
         (("--noise", "ruler", "--frame", "unknown"), "frame"),

@@ -276,7 +276,7 @@ def test_a_recording_without_messages_is_refused(tmp_path):
         (
             "rosbag2_bagfile_information: {relative_file_paths: [bag_0.mcap], "
             "compression_mode: MESSAGE}",
-            "MESSAGE",
+            "by 'message'",
         ),
     ],
 )

@@ -11,6 +11,7 @@ from teleop_core.controllers.computed_torque import COMPUTED_TORQUE, computed_to
 from teleop_core.controllers.motion import known_friction
 from teleop_core.errors import ParameterError, PartError
 from teleop_core.experiments.joint_steps import answer_to_steps
+from teleop_core.operation import OperationParameters
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.signals import TICK_NS
@@ -27,6 +28,10 @@ ARM = load_robot("rcrt1")
 COUNT = ARM.drives.encoder_step
 STEADY = {"hardware.without": ("wandering",)}
 UNFILTERED = ReferenceFilterParameters(is_on=False)
+
+
+TOLD = OperationParameters(reported=("tracking",))
+"""Of an arm whose law may be any: that it follows badly is told and no more."""
 
 
 def slave(law, plant="hardware", faults=None, own=None, robot="rcrt1", **values):
@@ -237,7 +242,7 @@ def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated
             "looking", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains, control, uses_model=True
         )
     )
-    arm = slave("looking", gravity_compensation="all")
+    arm = slave("looking", gravity_compensation="all", operation=TOLD)
     arm.step()
     found = next(one for one in reversed(seen) if len(one) == 48)
     gravity = np.empty(6)
@@ -276,7 +281,7 @@ def test_law_that_does_not_ask_for_the_model_gets_gravity_alone(own_parts):
     register_controller(
         Controller("short", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains, control)
     )
-    slave("short").step()
+    slave("short", operation=TOLD).step()
     assert set(lengths) == {0}
 
 

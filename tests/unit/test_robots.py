@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 import yaml
 
-from teleop_core.errors import ParameterError, PartError, ShapeError, UnknownNameError
+from teleop_core.errors import (
+    ParameterError,
+    PartError,
+    RecordingError,
+    ShapeError,
+    UnknownNameError,
+)
 from teleop_core.robots import (
     ROBOTS,
     IkStatus,
@@ -234,7 +240,7 @@ def test_the_path_of_a_table_is_a_robot(tmp_path):
     robot = load_robot_set(str(path), ())
     assert robot.name == "my_arm"
     assert robot.n == 3
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(RecordingError, match=r"other.yml: cannot be read: No such file"):
         load_robot(str(tmp_path / "other.yml"))
 
 

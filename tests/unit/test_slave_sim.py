@@ -274,12 +274,13 @@ def test_integral_stays_bounded_while_an_overload_holds_the_arm_back():
 
 def test_an_effort_that_was_a_fault_is_none_any_more_after_a_reset():
     others = OperationParameters(reported=("tracking", "tip", "overspeed"))
-    bench = Bench(coulomb=(20.0, *DRIVES.coulomb[1:]), operation=others)
+    bench = Bench(operation=others)
+    bench.slave.parameters["coulomb"][0] = 20.0  # as of an arm that is caught
     goal = ARM.home + np.array([0.2, 0, 0, 0, 0, 0])
     bench.trace(goal, 5000)
     assert bench.slave.operation["fault"] == Fault.EFFORT
     assert bench.slave.state["full_ticks"].max() == 0
-    bench.slave.retune(SlaveSimParameters(operation=others))
+    bench.slave.parameters["coulomb"][0] = DRIVES.coulomb[0]
     for command in ("reset", "enable"):
         answer, text = bench.slave.request(command)
         assert answer is Answer.DONE, text

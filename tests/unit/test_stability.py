@@ -130,3 +130,10 @@ def test_dry_friction_too_stiff_for_the_integrator_is_refused_and_taken_with_mor
     with pytest.raises(ParameterError, match="raise integration_steps"):
         slave(coulomb=dry, integration_steps=1)
     slave(coulomb=dry, integration_steps=20)
+
+
+def test_a_law_that_does_not_come_back_is_taken_where_tracking_is_told_only():
+    weak = {"controller__pid__bandwidth": (0.1,) * 6}
+    slave(**weak, operation__reported=("tracking",))
+    with pytest.raises(ParameterError, match="comes back"):
+        slave(**weak)
