@@ -14,7 +14,7 @@ from teleop_core.plain_yaml import UnreadableError, check_regular
 
 
 @contextmanager
-def damage_told(path: Path, said: str = "cannot be read: {}") -> Iterator[None]:
+def damage_told(path: Path | str, said: str = "cannot be read: {}") -> Iterator[None]:
     """Tell what goes wrong while a file is read.
 
     Args:
@@ -25,6 +25,7 @@ def damage_told(path: Path, said: str = "cannot be read: {}") -> Iterator[None]:
         RecordingError: The file is missing, or its content is not what its reader takes.
         TeleopError: As it was raised within.
     """
+    path = Path(path)
     try:
         check_regular(path)
         yield
