@@ -1,5 +1,6 @@
 """Fixtures that several folders of tests share."""
 
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -20,6 +21,11 @@ if not IS_COMPILED:
     settings.register_profile("pure", settings.get_profile("teleop"), max_examples=10)
     settings.load_profile("pure")
     np.seterr(all="ignore")
+
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    # A shell without job control starts what runs in the background (`pytest &`) deaf to Ctrl-C,
+    # and all its children with it: tests that end a process so would wait for ever.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 pytest_plugins = ["forgotten_parts", "middleware_faults"]
 

@@ -33,7 +33,12 @@ class ConsoleProcess:
         return self._log.read_text(errors="replace")
 
     def end(self) -> int:
-        """Exit code after Ctrl-C."""
+        """Exit code after Ctrl-C; one that does not end is killed, and has failed."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
-        return self.process.wait(60)
+        try:
+            return self.process.wait(60)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise
