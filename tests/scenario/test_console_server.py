@@ -214,7 +214,8 @@ def test_page_is_led_out_of_the_machine_by_nobody(tab):
     with ConsoleServer(0) as server:
         tab.visit(server.url)
         until(lambda: is_driven(server), "the page is there")
-        assert tab.value("document.querySelectorAll('.tabler-icon-share').length") == 0
+        icons = "document.querySelectorAll('.tabler-icon-share').length"
+        until(lambda: tab.value(icons) == 0, "no button to share the page")
         handlers = server.viser._websock_server._incoming_handlers
         assert not {_messages.ShareUrlRequest, _messages.ShareUrlDisconnect} & set(handlers)
         with pytest.raises(SessionError):

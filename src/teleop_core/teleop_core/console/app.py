@@ -91,9 +91,15 @@ class Console:
         while not is_over() and not self.panel.settings.refresh():
             time.sleep(_ASK_AGAIN)
 
-    def _try_to_draw(self) -> None:
-        """Draw; what fails is said once, and costs this drawing and not the session."""
+    def try_to_draw(self, *before: Callable[[], None]) -> None:
+        """Draw; what fails is said once, and costs this drawing and not the session.
+
+        Args:
+            before: What else is drawn, first.
+        """
         try:
+            for draw in before:
+                draw()
             self.draw()
         except Exception as error:
             if (kind := repr(error)) not in self._failed:
@@ -107,7 +113,7 @@ class Console:
         threading.Thread(target=self._ask, args=(is_over,), daemon=True).start()
         due = time.monotonic()
         while not is_over():
-            self._try_to_draw()
+            self.try_to_draw()
             due = max(due + 1.0 / RATE, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
         self._server.answers.stop, self._server.answers.situation = None, Situation()
@@ -159,6 +165,5 @@ def replay(server: ConsoleServer, path: Path) -> None:
         now = time.monotonic()
         link.advance(now - before)
         before = now
-        controls.draw()
-        console.draw()
+        console.try_to_draw(controls.draw)
         time.sleep(max(0.0, now + 1.0 / RATE - time.monotonic()))
