@@ -28,7 +28,7 @@ TOLERANCE_MM = 0.2
 FIXTURE = {"gain": 1.0, "fixture_size_x": 0.03, "fixture_size_y": 0.03, "fixture_size_z": 0.03}
 FIXTURE_ON = (3.0, 5.0)
 LARGEST_PAGE = 10_000_000
-CARD = """[...document.querySelectorAll('figure')].filter((f) =>
+CARD = """[...document.querySelectorAll('figure.card')].filter((f) =>
     f.querySelector('h3').textContent === 'Replay')[{number}]"""
 
 

@@ -47,7 +47,7 @@ PLOTS = """
   });
   const nameOf = (figure) => ['h2', 'h3'].map((tag, i) =>
     (i ? figure : figure.closest('section')).querySelector(tag).textContent).join('/');
-  return Object.fromEntries([...document.querySelectorAll('figure')].map((figure) =>
+  return Object.fromEntries([...document.querySelectorAll('figure.card')].map((figure) =>
     [nameOf(figure), plotOf(figure.querySelector('.js-plotly-plot'))]));
 })()
 """
@@ -56,7 +56,7 @@ WIDE_AS_THEIR_PLACES = """
   .every(({ _fullLayout, clientWidth }) => Math.abs(_fullLayout.width - clientWidth) < 2)
 """
 PLANE_COLUMNS = """
-[...document.querySelectorAll('figure')]
+[...document.querySelectorAll('figure.card')]
   .find((figure) => figure.textContent.includes('Path per plane'))
   .querySelector('.js-plotly-plot')._fullLayout.grid?.columns
 """
@@ -420,6 +420,12 @@ def test_without_scripts_there_are_tables_sketches_and_a_word(chromium, short, t
         assert len(sketches) >= 8
         assert min(sketches) > 50
         assert tab.value("document.querySelector('.times').clientHeight") == 0
+
+
+def test_table_is_folded_where_scripts_run(opened, short):
+    tab = opened(short[0])
+    assert tab.value("document.querySelectorAll('details.table[open]').length") == 0
+    assert "position, RMS" not in tab.value("document.body.innerText")
 
 
 def test_page_in_a_browser_that_cannot_unpack_says_so(chromium, short, tmp_path):

@@ -57,8 +57,8 @@ def report_page(studies: Sequence[Study]) -> str:
     data = json.dumps(found, allow_nan=False)
     scores = [study.score for study in studies]
     opening = overview(scores, plotted, [study.bands for study in studies])
-    table = (
-        f'<details class="card table"><summary>All figures</summary>{_note(scores)}'
+    table = (  # page.js folds it; without scripts it stays open
+        f'<details class="card table" open><summary>All figures</summary>{_note(scores)}'
         f"{html_table(scores)}</details>"
     )
     return PAGE.format(

@@ -12,6 +12,7 @@ function tell(text) {
 }
 
 async function drawPage() {
+  for (const table of document.querySelectorAll("details.table")) table.open = false; // open where no script runs
   const page = JSON.parse(document.getElementById("page-data").textContent);
   const recordings = page.recordings.map((facts, i) => new Recording(facts, document.getElementById(`times-${i}`)));
   for (const figure of page.figures) recordings[figure.recording].begin(figure.layout);
