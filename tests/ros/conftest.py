@@ -37,6 +37,8 @@ with warnings.catch_warnings():
 
 TIMEOUT = 90.0
 JOINTS = load_robot("rcrt1").joint_names
+NODES = tuple(STAGES)
+"""Nodes of a session as they are before any test registers a stage of its own."""
 
 
 def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
@@ -308,7 +310,7 @@ def compose(peer, tmp_path):
         command += ["-r", f"__ns:=/{namespace}"] if namespace else []
         env = environment() | {"ROS_DOMAIN_ID": peer.domain}
         started.append(subprocess.Popen(command, env=env))
-        for name in STAGES:
+        for name in NODES:
             peer.wait_state(f"{namespace}/{name}" if namespace else name, "active")
         return started[-1]
 
