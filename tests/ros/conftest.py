@@ -37,8 +37,6 @@ with warnings.catch_warnings():
 
 TIMEOUT = 90.0
 JOINTS = load_robot("rcrt1").joint_names
-NODES = tuple(STAGES)
-"""Nodes of a session as they are before any test registers a stage of its own."""
 
 
 def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
@@ -292,6 +290,15 @@ def peer(tmp_path: Path) -> Iterator[Peer]:
             made.close()
 
 
+@pytest.fixture(autouse=True)
+def no_stage_stays_behind():
+    """Take away stages that a test registered in this process, as a drill does."""
+    before = set(STAGES)
+    yield
+    for name in set(STAGES) - before:
+        STAGES.remove(name)
+
+
 @pytest.fixture
 def compose(peer, tmp_path):
     """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
@@ -310,7 +317,7 @@ def compose(peer, tmp_path):
         command += ["-r", f"__ns:=/{namespace}"] if namespace else []
         env = environment() | {"ROS_DOMAIN_ID": peer.domain}
         started.append(subprocess.Popen(command, env=env))
-        for name in NODES:
+        for name in STAGES:
             peer.wait_state(f"{namespace}/{name}" if namespace else name, "active")
         return started[-1]
 
