@@ -57,15 +57,23 @@ class Chances:
         return max(elapsed - waited, ran, 0.0)
 
     def _read(self, threads: Iterable[int] | None) -> dict[int, _Account]:
-        found = {}
+        names = self._threads() if threads is None else threads
+        return {thread: one for thread in names if (one := self._account(thread)) is not None}
+
+    def _threads(self) -> list[int]:
+        """All threads of the process; none once it has ended."""
         try:
-            names = [int(p.name) for p in self._folder.iterdir()] if threads is None else threads
-            for thread in names:
-                folder = self._folder / str(thread)
-                ran, waited, _ = map(int, (folder / "schedstat").read_text().split())
-                # The name, in parentheses, may hold anything.
-                state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
-                found[thread] = _Account(1e-9 * ran, 1e-9 * waited, state == "R")
-        except (OSError, ValueError):  # a thread has ended, or the system keeps no accounts
-            pass
-        return found
+            return [int(path.name) for path in self._folder.iterdir()]
+        except OSError:
+            return []
+
+    def _account(self, thread: int) -> _Account | None:
+        """Account of one thread; None if it has ended, or the system keeps none."""
+        folder = self._folder / str(thread)
+        try:
+            ran, waited, _ = map(int, (folder / "schedstat").read_text().split())
+            # The name, in parentheses, may hold anything.
+            state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+        except (OSError, ValueError):
+            return None
+        return _Account(1e-9 * ran, 1e-9 * waited, state == "R")

@@ -114,7 +114,7 @@ class LiveLink:
         self._thread = threading.Thread(target=self._spin, name="console link", daemon=True)
         self._thread.start()
         self._lock = threading.Lock()
-        self._button = StopButton(self._node)
+        self._button, self._pressing = StopButton(self._node), threading.Lock()
         self._clients: dict[str, Any] = {}
         self._client, self._events = ParameterClient(self._node), ParameterEvents(self._node)
         self._known: dict[tuple[str, str], ParameterInfo] = {}
@@ -266,17 +266,17 @@ class LiveLink:
 
         A stop is said again at every :meth:`view` until all arms have said that it is in force.
         """
-        self._is_pressed = is_pressed
-        self._button.say(is_pressed=is_pressed)
+        with self._pressing:
+            self._is_pressed = is_pressed
+            self._button.say(is_pressed=is_pressed)
 
     def _insist(self, view: View) -> None:
-        """Say a stop again that some arm has not confirmed."""
-        if self._is_pressed:
-            self._is_pressed = not all(
-                arm.operation.get("is_stopped") for arm in view.arms.values()
-            )
-        if self._is_pressed:
-            self._button.say(is_pressed=True)
+        """Say a stop again that some arm has not confirmed; never after its release."""
+        with self._pressing:
+            confirmed = all(arm.operation.get("is_stopped") for arm in view.arms.values())
+            self._is_pressed = self._is_pressed and not confirmed
+            if self._is_pressed:
+                self._button.say(is_pressed=True)
 
     def parameters(self) -> Parameters:
         """All parameters of all nodes, asked for anew."""
