@@ -60,17 +60,8 @@ def slave_records(n: int) -> tuple[Any, Any]:
     numbers = [(name, "f8") for name in scalars] + [(name, "i8") for name in counts]
     moved = ("command", "filtered", "setpoint", "target", *WAY_FIELDS, "step", "move_from",
              "move_to", "drive", "asked")  # fmt: skip
-    plant = (
-        "measured",
-        "speed",
-        "bent",
-        "grip",
-        "astray",
-        "slipped",
-        "carried",
-        "link",
-        "link_speed",
-    )
+    plant = ("measured", "speed", "bent", "grip", "astray", "slipped", "carried", "link",
+             "link_speed")  # fmt: skip
     state: list[Field] = [(name, "f8", (n,)) for name in (*moved, *plant)]
     state += [(name, "i8", (n,)) for name in ("noise", "full_ticks")] + [("tool_step", "f8")]
     state += [("late", "f8", (LONGEST_DELAY + 1, n))]
