@@ -1,6 +1,7 @@
 """Drill: what it measures, what it does to a hand, and when it is not satisfied."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -293,6 +294,19 @@ def test_setpoints_beyond_a_limit_or_faster_than_a_drive_are_found_whatever_happ
     joints = round_and_round()
     joints[1000:, 4] = ROBOT.upper[4] + 1e-6
     assert {"step_ratio", "beyond_limit"} <= set(wrong("loss", seen(joints)))
+
+
+@pytest.mark.parametrize("kept", [0, 600])
+@pytest.mark.parametrize("stream", ["true_cp", "measured_js"])
+def test_an_arm_that_tells_no_more_where_it_is_is_found_though_its_setpoints_stand_still(
+    stream, kept
+):
+    whole = seen(stopping(after=0.05), told=BEGIN + 50 * MS)
+    heard = getattr(whole, stream)
+    quiet = replace(whole, **{stream: heard.only(np.arange(len(heard)) < kept)})
+    exercise = by_name("master_silent")
+    assert "silent_s" in {m.name for m in judge(exercise, quiet, NUMBERS) if m.failure}
+    assert "silent_s" not in {m.name for m in judge(exercise, whole, NUMBERS) if m.failure}
 
 
 def test_a_fault_that_nobody_warns_of_is_found():

@@ -199,6 +199,18 @@ def apart(first: Trace, second: Trace) -> float:
     return float(np.max(np.linalg.norm(ways[0] - ways[1], axis=1)))
 
 
+def silence(places: Trace, setpoints: Trace) -> float:
+    """For how long setpoints were still sent after the last of another trace [s].
+
+    0 where there are no setpoints; infinite where they alone were heard.
+    """
+    if not len(setpoints):
+        return 0.0
+    if not len(places):
+        return float("inf")
+    return max(0.0, 1e-9 * float(setpoints.sent_ns[-1] - places.sent_ns[-1]))
+
+
 def way_ratio(places: Trace, speed_limit: float, dt: float) -> float:
     """Largest step of the tip, values (N, 3) [m], over what a speed [m/s] allows; 0 without two."""
     ticks = np.diff(places.number)
