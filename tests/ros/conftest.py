@@ -290,15 +290,6 @@ def peer(tmp_path: Path) -> Iterator[Peer]:
             made.close()
 
 
-@pytest.fixture(autouse=True)
-def no_stage_stays_behind():
-    """Take away stages that a test registered in this process, as a drill does."""
-    before = set(STAGES)
-    yield
-    for name in set(STAGES) - before:
-        STAGES.remove(name)
-
-
 @pytest.fixture
 def compose(peer, tmp_path):
     """Starter of a composed session with parameters; all its nodes are active, its arm at home."""

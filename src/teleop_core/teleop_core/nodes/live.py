@@ -34,8 +34,10 @@ SILENCE = 30.0
 Whether its process stands still, and whether its loop does, is found within seconds by others:
 :mod:`teleop_core.nodes.children` and :mod:`teleop_core.nodes.watch`.
 """
-_NEW = 5.0
-"""A session that finds another in its domain within this time is the younger one, and ends [s]."""
+_LOOK = 0.5
+"""Whoever sends setpoints this soon after processes were started is not one of them [s]."""
+_ALONE = 1.0
+"""Who has been alone in its domain for this long, all at work, owns it; later ones end [s]."""
 _NEWS_PERIOD = 5.0  # from line to line about a node that is long in starting [s]
 Crew = dict[str, tuple[str, ...]]
 """Processes that are started together, each with its nodes."""
@@ -152,6 +154,8 @@ class _Session:
         while waiting:
             self._observer.listen(0.1)
             self._check_alive()
+            if not self._ready and progress.since_begin() < _LOOK:
+                self._insist_on_one_owner(0)
             for name in [name for name in waiting if self._observer.is_active(name)]:
                 if self._children[home[name]].doing != "at work":  # another session's node
                     continue
@@ -165,15 +169,18 @@ class _Session:
                 raise SessionError(reason + child.last_words())
         self._ready = time.monotonic()
 
-    def _insist_on_one_owner(self) -> None:
+    def _insist_on_one_owner(self, own: int) -> None:
         """Refuse a domain in which arms of the same names run, on whatever machine.
 
+        Args:
+            own: Senders of an arm's setpoints that are ours.
+
         Raises:
-            SessionError: They do.
+            SessionError: There are more.
         """
         for arm in self._graph.namespaces:
             topic = SLAVE_SETPOINT_JS.of_arm(arm).name
-            if self._observer.senders(topic) > 1:
+            if self._observer.senders(topic) > own:
                 raise SessionError(
                     f"another session sends {topic} on ROS domain {self._env['ROS_DOMAIN_ID']}: "
                     "end it, set ROS_DOMAIN_ID to another domain, or unset it to get a free one"
@@ -218,8 +225,8 @@ class _Session:
         """Make sure that nobody stops it, all processes run and all nodes report."""
         self._interrupt.check()
         self._obey()
-        if time.monotonic() - self._ready < _NEW:
-            self._insist_on_one_owner()
+        if time.monotonic() - self._ready < _ALONE:
+            self._insist_on_one_owner(1)
         for crew in self.crews:
             for name in [name for name in crew if name in self._children]:
                 child = self._children[name]
@@ -276,7 +283,11 @@ class _Progress:
     def __init__(self, children: dict[str, Child]) -> None:
         self._children = children
         self._seen: dict[str, str] = {}
-        self._last = self._told = time.monotonic()
+        self._begin = self._last = self._told = time.monotonic()
+
+    def since_begin(self) -> float:
+        """Time since they were started [s]."""
+        return time.monotonic() - self._begin
 
     def news(self) -> list[str]:
         """Lines about what takes long, now and then."""
