@@ -191,6 +191,9 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         """Work for one tick [ns, monotonic] of a session that goes through all its nodes."""
         raise NotImplementedError
 
+    def tell(self) -> None:
+        """Report what a tick has changed, after its session has sent all messages of the tick."""
+
     def start(self) -> None:
         """Get ready for the first turn; what came while inactive is forgotten already."""
 

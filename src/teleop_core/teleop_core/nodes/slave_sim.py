@@ -1,7 +1,7 @@
 """Node ``slave_sim``: the simulated slave, exactly one step per elapsed millisecond."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from teleop_core.bags.messages import Refusal
 from teleop_core.nodes.crtk_slave import CrtkSlave
@@ -49,12 +49,12 @@ class SlaveSimNode(TickingNode):
         self._offset_ns, self._turns, self._floods = self.epoch_ns, 0, 0
         self._seen, self._missed = self.counts, self.counts.missed
 
-    def work(self, ticks: Iterable[int]) -> None:
+    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
         """Take the newest command and the steps of some ticks [ns, monotonic]."""
         due = tuple(ticks)
         before_ns = int(self.row["slave_setpoint_js_ns"])
         self._look(due)
-        super().work(due)
+        super().work(due, report)
         stamp_ns = int(self.row["slave_setpoint_js_ns"])
         if stamp_ns != before_ns:
             self.delay.put(time.time_ns() - stamp_ns)

@@ -90,14 +90,20 @@ class TeleopSession:
     def _tick(self, tick_ns: int) -> None:
         """One tick [ns, monotonic]; the gate keeps all nodes open until all is published."""
         self._ticks += 1
+        waiting: list[tuple[Output, int, int]] = []
         with self._gate:
             for node in self._stages:
                 if node.is_at_work:
                     node.tick(tick_ns)
-            # What travels furthest goes first: the slave's command before the master's sample.
-            while self._pending:
-                output, stamp_ns, sent_ns = self._pending.pop()
+                    # What travels furthest goes first: the slave's setpoint, the master's sample
+                    # last.
+                    waiting[:0] = self._pending
+                    self._pending.clear()
+            for output, stamp_ns, sent_ns in waiting:
                 output.publish(stamp_ns, sent_ns)
+            for node in self._stages:
+                if node.is_at_work:
+                    node.tell()
 
     def _link(self) -> None:
         """Lead every stage's output to its readers in here, as far as both are at work."""

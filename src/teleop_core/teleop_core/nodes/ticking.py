@@ -1,7 +1,7 @@
 """Ticking node: one step of its stage per millisecond, on a clock of its own."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from teleop_core.nodes.base import CoreNode
 
@@ -15,21 +15,31 @@ class TickingNode(CoreNode):
 
     def turn(self) -> None:
         """Make all steps that are due."""
-        self.work(self.schedule.due())
+        self.work(self.schedule.due(), self.send_report)
 
     def tick(self, tick_ns: int) -> None:
-        """Make the step of one tick [ns, monotonic]."""
+        """Make the step of one tick [ns, monotonic]; its session has the state reported later."""
         self.work((tick_ns,))
 
-    def work(self, ticks: Iterable[int]) -> None:
-        """Take what has come, then make the steps of some ticks [ns, monotonic]."""
+    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
+        """Take what has come, then make the steps of some ticks [ns, monotonic].
+
+        Args:
+            ticks: Their times [ns, monotonic].
+            report: Told the stamp of each step [ns] when all its topics are sent.
+        """
         self.read_ports()
         for tick_ns in ticks:
             now_ns = tick_ns + self.epoch_ns
             self.row["now_ns"] = now_ns
             self.advance(now_ns)
             self.ports.send(now_ns)
-            self.send_report(now_ns)
+            if report is not None:
+                report(now_ns)
+
+    def tell(self) -> None:
+        """Report the state that the last step led to, if it has changed."""
+        self.send_report(int(self.row["now_ns"]))
 
     def advance(self, now_ns: int) -> None:
         """Make one step that starts at ``now_ns`` [ns]."""
