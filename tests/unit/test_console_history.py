@@ -67,6 +67,14 @@ def test_live_figures_are_those_of_all_samples_at_even_times():
     assert scores.time == pytest.approx(199 * 0.03)
 
 
+@pytest.mark.parametrize(("gap", "counted"), [(0.9, 0.9), (2.0, 0.0)])
+def test_a_second_that_the_page_did_not_see_is_not_counted_as_followed(gap, counted):
+    scores = LiveScores()
+    for time in (0.0, gap):
+        scores.add(time, seen((1, 0, 0), (0, 0, 0)))
+    assert scores.time == pytest.approx(counted)
+
+
 def test_what_does_not_follow_does_not_count():
     scores = LiveScores()
     for i in range(50):

@@ -117,6 +117,12 @@ def test_quantiles_are_exact_to_the_microsecond_however_the_durations_are_cut():
     assert spread.delay().max == ordered[-1] / 1000
 
 
+def test_half_of_three_durations_are_two_of_them():
+    spread = Distribution()
+    spread.add(np.array([1000, 2000, 3000]))
+    assert (spread.quantile_us(0.5), spread.quantile_us(0.1)) == (2, 1)
+
+
 def test_histogram_holds_all_durations():
     spread = Distribution()
     spread.add(np.random.default_rng(4).exponential(2e6, 4000).astype(np.int64))

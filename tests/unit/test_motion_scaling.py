@@ -273,6 +273,18 @@ def test_pause_within_the_timeout_is_bridged():
     assert np.allclose(after - before, (0, -5 * MM, 0), rtol=0, atol=ROUNDING)
 
 
+@pytest.mark.parametrize(("late", "follows"), [(2, True), (3, False)])
+def test_slave_of_a_slow_master_may_be_two_samples_late(late, follows):
+    desk, step_ns = Desk(), 80_000_000
+    desk.step()
+    stamps = [int(desk.row["master_measured_cp_ns"])]
+    for _ in range(6):
+        desk.row["slave_setpoint_cp_ns"] = stamps[max(0, len(stamps) - 1 - late)]
+        desk.step((1 * MM, 0, 0), stamp_step_ns=step_ns, does_follow=False)
+        stamps.append(int(desk.row["master_measured_cp_ns"]))
+    assert desk.state("is_following") == float(follows)
+
+
 def test_reset_starts_again_at_the_setpoint_with_the_box_off_and_the_mode_of_the_parameters():
     desk = Desk()
     desk.step()

@@ -68,6 +68,15 @@ def test_a_topic_goes_to_another_at_once_if_the_publisher_of_its_owner_is_gone()
     assert not sender.conflict
 
 
+def test_a_new_owner_is_in_no_conflict_because_of_those_whom_the_last_one_had():
+    sender = Sender()
+    feed(sender, [1000, 1001])
+    assert feed(sender, [1]) == [Refusal.SECOND_PUBLISHER]
+    sender.release()
+    assert feed(sender, [2, 3], BEGIN + 3 * MS) == [None, None]
+    assert not sender.conflict
+
+
 def test_a_conflict_stays_until_it_is_forgotten():
     sender = Sender()
     feed(sender, [1000, 1, 1001])

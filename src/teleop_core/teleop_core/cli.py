@@ -227,21 +227,12 @@ def _replay(arguments: argparse.Namespace) -> int:
     return 0
 
 
-# From a sample of the device to its force and back, in five processes and composed [s]: as measured
-# with `make bench`, two of the three hops from master to slave.
-_TRANSPORT = {False: 1.4e-3, True: 0.3e-3}
-
-
 def _live(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     configuration = configured(arguments)
-    composed = bool(arguments.composed)
-    from teleop_core.session.notes import notes_of
-
-    for note in notes_of(configuration, transport=_TRANSPORT[composed]):
-        _note(note)
-    ros_module("live").live(configuration, arguments.out, Console(), is_composed=composed)
+    is_composed = bool(arguments.composed)
+    ros_module("live").live(configuration, arguments.out, Console(), is_composed=is_composed)
     print(done(arguments.out, "recorded"))
     return 0
 

@@ -23,6 +23,7 @@ from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.layers import SESSION
 from teleop_core.session.links import link_texts
+from teleop_core.session.notes import notes_of
 from teleop_core.texts import printable
 from teleop_core.topics import SLAVE_SETPOINT_JS
 
@@ -38,6 +39,9 @@ _LOOK = 0.5
 """Whoever sends setpoints this soon after processes were started is not one of them [s]."""
 _ALONE = 1.0
 """Who has been alone in its domain for this long, all at work, owns it; later ones end [s]."""
+_TRANSPORT = {False: 1.4e-3, True: 0.3e-3}
+"""From a sample of the device to its force and back, in five processes and composed [s], as
+`make bench` measures: two of the three hops from master to slave."""
 _NEWS_PERIOD = 5.0  # from line to line about a node that is long in starting [s]
 Crew = dict[str, tuple[str, ...]]
 """Processes that are started together, each with its nodes."""
@@ -87,6 +91,8 @@ def live(
         session = _Session(configuration, console, observer, parameters, env, interrupt)
         session.crews = _crews(configuration.graph, is_composed=is_composed)
         session.tell_where(out)
+        for note in notes_of(configuration, transport=_TRANSPORT[is_composed]):
+            session.say(f"note: {note}")
         with Keys(observer.press) as keys:
             session.run(keys)
 
@@ -114,8 +120,8 @@ class _Session:
     def tell_where(self, out: Path) -> None:
         """Say how others find the nodes, and where they are recorded."""
         domain = self._env["ROS_DOMAIN_ID"]
-        self._say(f"ROS domain {domain}; others join it with ROS_DOMAIN_ID={domain}")
-        self._say(f"recording to {out}")
+        self.say(f"ROS domain {domain}; others join it with ROS_DOMAIN_ID={domain}")
+        self.say(f"recording to {out}")
 
     def run(self, keys: Keys) -> None:
         """Start, watch and stop all nodes; the recorder comes first and goes last."""
@@ -136,14 +142,14 @@ class _Session:
             for crew in self.crews:
                 self._start(crew)
             if self._keys.is_there:
-                self._say("space stops all arms; e lets them go on")
+                self.say("space stops all arms; e lets them go on")
             self._await_operator()
             is_begun = True
             self._watch()
         except KeyboardInterrupt:
             if not is_begun:
                 raise SessionError("stopped before all nodes were ready") from None
-            self._say("stopped")
+            self.say("stopped")
 
     def _start(self, crew: Crew) -> None:
         for name in crew:
@@ -160,9 +166,9 @@ class _Session:
                 if self._children[home[name]].doing != "at work":  # another session's node
                     continue
                 waiting.remove(name)
-                self._say(f"{name} is ready")
+                self.say(f"{name} is ready")
             for line in progress.news():
-                self._say(line)
+                self.say(line)
             if waiting and progress.age() > START_TIMEOUT:
                 child = self._children[home[waiting[0]]]
                 reason = f"{waiting[0]} is not ready and got no further for {START_TIMEOUT:g} s"
@@ -201,7 +207,7 @@ class _Session:
             self._check()
             if int(elapsed) > shown:
                 shown = int(elapsed)
-                self._say(f"{shown:3d}/{self._duration:g} s  {self._line()}")
+                self.say(f"{shown:3d}/{self._duration:g} s  {self._line()}")
 
     def _check_alive(self) -> None:
         self._interrupt.check()
@@ -217,9 +223,9 @@ class _Session:
             try:
                 with Operator(int(self._env["ROS_DOMAIN_ID"])) as operator:
                     for line in operator.go_on():
-                        self._say(line)
+                        self.say(line)
             except SessionError as error:
-                self._say(str(error))
+                self.say(str(error))
 
     def _check(self) -> None:
         """Make sure that nobody stops it, all processes run and all nodes report."""
@@ -265,7 +271,8 @@ class _Session:
             f" (p99 {slave.number('delay_ms.p99'):.1f})",
         ]
 
-    def _say(self, text: str) -> None:
+    def say(self, text: str) -> None:
+        """Say a line to whoever looks on."""
         with suppress(OSError):  # who closed the terminal is not to hold up the end
             self._console.print(printable(text), highlight=False, markup=False, soft_wrap=True)
 
