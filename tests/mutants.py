@@ -71,9 +71,9 @@ _CLOSED = """            try:
             except RecordingError:
                 self.exit_code = self.exit_code or 1  # the log"""
 _LATE = """self._held = [*getattr(self, "_held", []),
-                      *((due[0], one) for one in self._stop.take())]
-        ready = [one for at, one in self._held if due[0] - at >= 20_000_000]
-        self._held = [(at, one) for at, one in self._held if due[0] - at < 20_000_000]
+                      *((now_ns, one) for one in self._stop.take())]
+        ready = [one for at, one in self._held if now_ns - at >= 20_000_000]
+        self._held = [(at, one) for at, one in self._held if now_ns - at < 20_000_000]
         for is_pressed in ready:"""
 MUTANTS = (
     _mutant("stop_ignored", "nobody hears the stop button", _SLAVE,

@@ -51,19 +51,22 @@ class SlaveSimNode(TickingNode):
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
         """Take the newest command and the steps of some ticks [ns, monotonic]."""
-        due = tuple(ticks)
         before_ns = int(self.row["slave_setpoint_js_ns"])
-        self._look(due)
-        super().work(due, report)
+        self._look()
+        super().work(ticks, report)
         stamp_ns = int(self.row["slave_setpoint_js_ns"])
         if stamp_ns != before_ns:
             self.delay.put(time.time_ns() - stamp_ns)
 
-    def _look(self, due: tuple[int, ...]) -> None:
-        """Take the emergency stop, and find the faults that only a node can see."""
+    def advance(self, now_ns: int) -> None:
+        """Take the emergency stop, then make one step, also of many that are to be made up for."""
         for is_pressed in self._stop.take():
             with self.lock:
-                self.stage.press(is_pressed=is_pressed, now_ns=due[0] + self.epoch_ns)
+                self.stage.press(is_pressed=is_pressed, now_ns=now_ns)
+        super().advance(now_ns)
+
+    def _look(self) -> None:
+        """Find the faults that only a node can see."""
         longest, counts = self.parameters.operation.longest_outage, self.counts
         # Composed, the ticks of one late wake-up come one by one: only its counts tell of them all.
         missed = (counts.missed - self._missed) * TICK_NS * 1e-9 if counts is self._seen else 0.0
