@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup crtk_msgs demo test test-slow coverage lint format bench bench-setup endurance fuzz drill-mutants clean
+.PHONY: setup crtk_msgs demo test test-slow coverage lint format bench bench-setup endurance fuzz drill-mutants flaky clean
 
 setup: $(VENV)/.installed
 
@@ -86,6 +86,11 @@ endurance: setup
 # and nothing in a sound copy; about an hour on a busy machine. MUTANTS names some of them.
 drill-mutants: setup
 	$(BIN)/python tests/mutants.py $(MUTANTS)
+
+# Live tests twenty times beside busy processes, and how often each failed; about three hours.
+# FLAKY names tests, how often and how much else there is to do: FLAKY="--count 5 tests/ros/test_ends.py".
+flaky: setup
+	$(BIN)/python tests/flaky.py $(FLAKY)
 
 clean:
 	rm -rf $(OUT) ros_ws/build ros_ws/install ros_ws/log
