@@ -53,7 +53,7 @@ def main() -> int:
                 failed.update(bad)
                 took = time.monotonic() - begin
                 print(f"{number + 1}/{given.count}: {len(bad)} of {len(found)} failed, "
-                      f"{took:.0f} s{''.join(f'; {name}' for name in bad)}", flush=True)  # fmt: skip
+                      f"{took:.0f} s {'; '.join(bad)}", flush=True)  # fmt: skip
     except KeyboardInterrupt:
         print("ended early")
     finally:

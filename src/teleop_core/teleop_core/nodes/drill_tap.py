@@ -168,19 +168,23 @@ class Tap:
                     data, about = taken
                     number = about["publication_sequence_number"]
                     sent_ns = about["source_timestamp"]
-                    heard.append((sent_ns, number, data))
-                    self._count(subscription.topic.name, sent_ns, data)
+                    if self._count(subscription.topic.name, sent_ns, data):
+                        heard.append((sent_ns, number, data))
 
-    def _count(self, name: str, sent_ns: int, data: bytes) -> None:
-        """Take note of a message of a stream; what the drill itself has forged is none."""
-        if name not in self._counted or len(data) < _STAMP_AT + _STAMP.size:
-            return
+    def _count(self, name: str, sent_ns: int, data: bytes) -> bool:
+        """Count a message of a stream; False for one that the drill itself has forged."""
+        if name not in self._counted:
+            return True
+        if len(data) < _STAMP_AT + _STAMP.size:
+            return False
         seconds, nanoseconds = _STAMP.unpack_from(data, _STAMP_AT)
         stamp_ns = seconds * SECOND_NS + nanoseconds
-        if stamp_ns == NO_COMMAND_NS or abs(stamp_ns - sent_ns) < _DAY_NS:
-            sent, stamps = self._counted[name]
-            sent.append(sent_ns)
-            stamps.append(stamp_ns)
+        if stamp_ns != NO_COMMAND_NS and abs(stamp_ns - sent_ns) >= _DAY_NS:
+            return False
+        sent, stamps = self._counted[name]
+        sent.append(sent_ns)
+        stamps.append(stamp_ns)
+        return True
 
 
 class _Hand:
