@@ -89,6 +89,16 @@ def test_every_session_of_a_documented_command_can_be_begun():
     assert len(begun) > 5
 
 
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "CHANGELOG.md"])
+def test_no_sentence_has_more_than_thirty_five_words(name):
+    text = re.sub(r"```.*?```|<!--.*?-->", "", text_of(name), flags=re.DOTALL)
+    text = re.sub(r"^( {4}|\||#).*$", "\n", text, flags=re.MULTILINE)  # code, tables, headings
+    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)  # what a link shows
+    for paragraph in re.split(r"\n\s*\n|\n(?=- )", text):
+        for sentence in re.split(r"(?<=[.!?:;])\s+| · ", " ".join(paragraph.split())):
+            assert len(sentence.split()) <= 35, sentence
+
+
 def test_commands_are_found_in_the_readme():
     assert len(commands(text_of("README.md"))) > 8
 
