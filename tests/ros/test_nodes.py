@@ -215,6 +215,7 @@ def test_every_node_ends_with_0(peer, tmp_path, number):
         peer.start(name, wait="", **parameters)
     for node in peer.nodes:
         peer.wait_state(node.name, "active")
+    peer.wait_value("recorder", "received.slave/measured_js", lambda n: n > 0)  # they have met
     for node in peer.nodes:
         node.process.send_signal(number)
     assert {n.name: n.wait(60) for n in peer.nodes} == dict.fromkeys(STAGES, 0)
