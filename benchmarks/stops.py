@@ -63,12 +63,14 @@ class Tap:
     def press(self) -> int:
         """Press the button; returns when that was sent [ns]."""
         self.button.publish(Bool(data=True))
-        while True:
+        deadline = time.monotonic() + _PATIENCE
+        while time.monotonic() < deadline:
             with self._heard.handle:
                 taken = self._heard.handle.take_message(Bool, False)
             if taken is not None and taken[0].data:
                 return int(taken[1]["source_timestamp"])
             time.sleep(1e-4)
+        raise SystemExit("the button does not hear itself: is ROS_AUTOMATIC_DISCOVERY_RANGE off?")
 
     def wait(self, moves: bool) -> None:
         """Wait until the last setpoints go on, or are all the same."""

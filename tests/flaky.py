@@ -31,6 +31,8 @@ def run(arguments: list[str], report: Path) -> dict[str, str]:
         name = f"{case.get('classname', '').replace('.', '/')}.py::{case.get('name')}"
         bad = [part.tag for part in case if part.tag in {"failure", "error", "skipped"}]
         found[name] = bad[0] if bad else "passed"
+    if not found:
+        raise SystemExit(f"no test was chosen by: {' '.join(command)}")
     return found
 
 
