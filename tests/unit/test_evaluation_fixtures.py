@@ -128,8 +128,12 @@ def test_each_arm_has_its_own_map_of_axes(recipe, path):
 
 
 @pytest.mark.parametrize(
-    "axes", ["-z", ["+x", "+y"], ["+x", "+x", "+y"], ["+x", "+y", "-z"], ["a", "b", "c"]]
-)
+    "axes",
+    [
+        "-z", ["+x", "+y"], ["+x", "+x", "+y"], ["+x", "+y", "-z"], ["a", "b", "c"],
+        [["-z"], "-x", "+y"], [{}, "-x", "+y"], [None, 1, 0.5],
+    ],
+)  # fmt: skip
 def test_map_of_axes_that_is_none_is_the_published_one(recipe, path, axes):
     said = {"motion_scaling": {"ros__parameters": {"axes": axes}}}
     recipe.metadata["configuration"] = yaml.safe_dump(said)

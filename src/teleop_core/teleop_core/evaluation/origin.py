@@ -1,16 +1,16 @@
 """Origin: what a recording says of the session it was made in: its graph, and how axes map."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from teleop_core import plain_yaml
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import ParameterError, TeleopError
+from teleop_core.errors import TeleopError
 from teleop_core.geometry import Array
 from teleop_core.graph import Graph, build_graph
 from teleop_core.mapping.motion_scaling import MOTION_SCALING
-from teleop_core.mapping.parameters import AXES, MotionScalingParameters, axis_map, tool_maps
+from teleop_core.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
 from teleop_core.master.haptic_master import HAPTIC_MASTER
 from teleop_core.parameters import build
 from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer
@@ -104,17 +104,20 @@ def _graph(layer: Layer) -> Graph:
         return build_graph()
 
 
+def _said(layer: Layer, stage: str, arm: str) -> dict[str, object]:
+    """What is said of a stage of all arms, and above it of that of one arm."""
+    return layer.get(stage, {}) | layer.get(f"{arm}/{stage}", {})
+
+
 def _interpolation(layer: Layer, arm: str) -> str | None:
-    """What is said of the slave of the arm, or of all arms."""
-    name = SLAVE_SIM.name
-    said = (layer.get(name, {}) | layer.get(f"{arm}/{name}", {})).get("interpolation")
+    """Way of the slave between commands, if it is told."""
+    said = _said(layer, SLAVE_SIM.name, arm).get("interpolation")
     return said if isinstance(said, str) else None
 
 
 def _slave(layer: Layer, arm: str) -> tuple[str | None, str | None]:
-    """Plant and control law of the slave of the arm, or of all arms."""
-    name = SLAVE_SIM.name
-    said = layer.get(name, {}) | layer.get(f"{arm}/{name}", {})
+    """Plant and control law of the slave."""
+    said = _said(layer, SLAVE_SIM.name, arm)
     if not said:
         return None, None
     law = said.get("controller.kind", "pid")
@@ -122,38 +125,34 @@ def _slave(layer: Layer, arm: str) -> tuple[str | None, str | None]:
 
 
 def _geometry(layer: Layer, arm: str) -> tuple[str, ...]:
-    """Settings of the robot of the arm, or of all arms."""
-    name = SLAVE_SIM.name
-    said = (layer.get(name, {}) | layer.get(f"{arm}/{name}", {})).get("geometry")
+    """Settings of the robot."""
+    said = _said(layer, SLAVE_SIM.name, arm).get("geometry")
     return tuple(map(str, said)) if isinstance(said, list | tuple) else ()
 
 
-def _tool(layer: Layer, arm: str) -> tuple[Array, Array] | None:
-    """Maps of the tool's orientation, as far as they are told, of the arm or of all arms."""
+def _mapping(layer: Layer, arm: str, names: Iterable[str]) -> MotionScalingParameters:
+    """Some parameters of the mapping, as they are told; the published ones if these are wrong."""
     name = MOTION_SCALING.name
-    said = layer.get(name, {}) | layer.get(f"{arm}/{name}", {})
+    said = _said(layer, name, arm)
     try:
-        values = {key: said[key] for key in _TOOL if key in said}
-        parameters = build(MotionScalingParameters, values, f"{name}.")
+        values = {key: said[key] for key in names if key in said}
+        return build(MotionScalingParameters, values, f"{name}.")
     except TeleopError:
-        parameters = MotionScalingParameters()
+        return MotionScalingParameters()
+
+
+def _tool(layer: Layer, arm: str) -> tuple[Array, Array] | None:
+    """Maps of the tool's orientation, if it turns as far as the master."""
+    parameters = _mapping(layer, arm, _TOOL)
     return tool_maps(parameters) if parameters.rotation_gain == 1.0 else None
 
 
-def _operator(layer: Layer, arm: str) -> Mapping[str, object]:
-    """What is said of the operator of the arm, or of all arms."""
-    name, prefix = HAPTIC_MASTER.name, "operator."
-    said = layer.get(name, {}) | layer.get(f"{arm}/{name}", {})
-    return {k.removeprefix(prefix): v for k, v in said.items() if k.startswith(prefix)}
-
-
 def _axes(layer: Layer, arm: str) -> Array:
-    """Map of the arm, of all arms, or the published one."""
-    name, published = MOTION_SCALING.name, axis_map("axes", MotionScalingParameters.axes)
-    said = (layer.get(name, {}) | layer.get(f"{arm}/{name}", {})).get("axes")
-    if not isinstance(said, list | tuple) or len(said) != 3 or not set(said) <= set(AXES):
-        return published
-    try:
-        return axis_map("axes", tuple(said))
-    except ParameterError:
-        return published
+    """Map of the axes."""
+    return axis_map("axes", _mapping(layer, arm, ("axes",)).axes)
+
+
+def _operator(layer: Layer, arm: str) -> Mapping[str, object]:
+    """What is said of the operator."""
+    prefix, said = "operator.", _said(layer, HAPTIC_MASTER.name, arm)
+    return {k.removeprefix(prefix): v for k, v in said.items() if k.startswith(prefix)}
