@@ -29,6 +29,8 @@ setup(
     package_data={
         "teleop_core": [
             "py.typed",
+            "*.pyi",
+            "exchange/*.pyi",
             "console/page.js",
             "evaluation/report/*",
             "fitting/*.csv",
@@ -38,6 +40,7 @@ setup(
     python_requires=">=3.11",
     install_requires=[
         "argcomplete",
+        "lazy_loader",
         "numpy",
         "numba>=0.68,<0.69",
         "mcap",
@@ -60,6 +63,7 @@ setup(
             "pytest-rerunfailures",
             "pytest-xdist",
             "hypothesis",
+            "import-linter",
             "pin",
             "mujoco",
             "roboticstoolbox-python",

@@ -10,12 +10,12 @@ from teleop_core.api import configuration
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.series import Series
 from teleop_core.geometry import pose_from_transform
+from teleop_core.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.mapping.motion_scaling import MotionScaling
 from teleop_core.mapping.parameters import MotionScalingParameters
 from teleop_core.mapping.plausibility import PlausibilityParameters
 from teleop_core.operators.shapes import minimum_jerk
 from teleop_core.robots import load_robot
-from teleop_core.robots.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.session.runner import replayed_blocks
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.signals import STATE, TICK_NS

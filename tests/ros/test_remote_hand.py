@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from teleop_core.operators.remote import rest_pose
+from teleop_core.operators.rest import rest_pose
 from teleop_core.topics import (
     HAND_BUTTONS,
     HAND_SERVO_CP,

@@ -10,8 +10,8 @@ from std_srvs.srv import Trigger
 
 from teleop_core import topics
 from teleop_core.bags.messages import write_values
+from teleop_core.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.robots import load_robot
-from teleop_core.robots.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters

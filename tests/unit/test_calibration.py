@@ -27,7 +27,7 @@ from teleop_core.calibration.report import correction_file
 from teleop_core.calibration.simulate import ruled, tracked, true_errors
 from teleop_core.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.robots import dh_kernels, load_robot, robot_from_table
-from teleop_core.robots.link_errors import true_chain
+from teleop_core.robots.chains import true_chain
 
 CHAINS = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")
 RCRT1 = load_robot("rcrt1")

@@ -14,7 +14,8 @@ from teleop_core.devices.pilot import Pilot, PilotParameters, beyond
 from teleop_core.devices.spacemouse import Reports, is_space_mouse
 from teleop_core.errors import ParameterError, SessionError
 from teleop_core.operators import OPERATORS
-from teleop_core.operators.remote import AHEAD, RemoteHand, rest_pose
+from teleop_core.operators.remote import AHEAD, RemoteHand
+from teleop_core.operators.rest import rest_pose
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 

@@ -7,13 +7,8 @@ import pytest
 
 from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.robots import dh_kernels, load_robot, robot_from_table
-from teleop_core.robots.link_errors import (
-    LinkErrors,
-    chain_of,
-    error_names,
-    next_axis_motion,
-    true_chain,
-)
+from teleop_core.robots.chains import chain_of, true_chain
+from teleop_core.robots.link_errors import LinkErrors, error_names, next_axis_motion
 
 CHAINS = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")
 # Every joint of the standard convention, with and without lengths, offset and slide.

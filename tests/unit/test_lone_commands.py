@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from teleop_core.geometry import pose_from_transform
+from teleop_core.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.robots import load_robot
-from teleop_core.robots.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 

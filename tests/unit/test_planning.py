@@ -10,13 +10,13 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 from people import PEOPLE, moves, recorded
 from teleop_core.kernels import IS_COMPILED
+from teleop_core.mapping.inverse_kinematics import InverseKinematicsParameters
 from teleop_core.mapping.parameters import MotionScalingParameters
 from teleop_core.planning.aim import Aim
 from teleop_core.planning.asked import STRETCHES, AskedPath, asked_path
 from teleop_core.planning.placement import Placement
 from teleop_core.planning.turns import turns
 from teleop_core.planning.walk import Walker
-from teleop_core.robots.inverse_kinematics import InverseKinematicsParameters
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.room import room, roomy_postures
 

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 from teleop_core.bags.writer import BagWriter
 from teleop_core.master.device import DeviceParameters
-from teleop_core.master.haptic_master import REST_TILT
 from teleop_core.operators import OPERATORS, Setting
 from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.operators.rest import REST_TILT
 from teleop_core.operators.shapes import PHASES
 from teleop_core.parameters import build
 from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP

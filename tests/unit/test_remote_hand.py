@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from teleop_core.errors import ShapeError, UnknownNameError
 from teleop_core.mapping.plausibility import PlausibilityParameters
 from teleop_core.master.haptic_master import HapticMaster
-from teleop_core.operators.remote import AHEAD, RemoteHand, RemoteParameters, rest_pose
+from teleop_core.operators.remote import AHEAD, RemoteHand, RemoteParameters
+from teleop_core.operators.rest import rest_pose
 from teleop_core.parameters import specs
 from teleop_core.session.configuration import configure
 

@@ -15,7 +15,7 @@ from teleop_core.robots.rcrt1_dynamics import (
     link_row,
     velocity_effort,
 )
-from teleop_core.slave.rigid_body import invert_positive, write_model
+from teleop_core.robots.rigid_body import invert_positive, write_model
 
 ROW = link_row()
 FORWARD = pointer(DYNAMICS.acceleration, ACCELERATION)

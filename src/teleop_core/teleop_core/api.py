@@ -353,7 +353,7 @@ def _of_frame(frame: "pandas.DataFrame") -> tuple[Array, Array]:
     Raises:
         ParameterError: It has no time, no place, or columns of another name.
     """
-    from teleop_core.operators.recorded import COLUMNS
+    from teleop_core.exchange.recorded_hand import COLUMNS
 
     named = frame if "t" in frame else frame.reset_index(names="t")
     needed = f"columns of {', '.join(COLUMNS)}; t may be the index, and x, y, z are needed"

@@ -309,7 +309,7 @@ STAGES: Registry[Stage] = Registry(
     {
         "haptic_master": "teleop_core.master.haptic_master:HAPTIC_MASTER",
         "motion_scaling": "teleop_core.mapping.motion_scaling:MOTION_SCALING",
-        "inverse_kinematics": "teleop_core.robots.inverse_kinematics:INVERSE_KINEMATICS",
+        "inverse_kinematics": "teleop_core.mapping.inverse_kinematics:INVERSE_KINEMATICS",
         "slave_sim": "teleop_core.slave.slave_sim:SLAVE_SIM",
         "recorder": "teleop_core.bags.recording:RECORDER",
     },

@@ -14,13 +14,8 @@ import numpy as np
 
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array, rotation, transform
-from teleop_core.robots.link_errors import (
-    Chain,
-    LinkErrors,
-    chain_of,
-    error_names,
-    next_axis_motion,
-)
+from teleop_core.robots.chains import chain_of
+from teleop_core.robots.link_errors import Chain, LinkErrors, error_names, next_axis_motion
 from teleop_core.robots.robot import Robot
 
 FRAME = ("frame_x", "frame_y", "frame_z", "frame_rx", "frame_ry", "frame_rz")

@@ -4,7 +4,7 @@ import numpy as np
 
 from teleop_core.console.link import Parameters
 from teleop_core.geometry import Array
-from teleop_core.master.haptic_master import REST_POSITION
+from teleop_core.operators.rest import REST_POSITION
 
 _POINTS = {"tour": "operator.tour.points", "points": "operator.points"}
 """Operators that go to points, and where these stand."""

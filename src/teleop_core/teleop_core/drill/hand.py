@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from teleop_core.geometry import Array
-from teleop_core.master.haptic_master import REST_POSITION, REST_TILT
+from teleop_core.operators.rest import rest_pose
 
 PERIOD = 2e-3
 """Time from sample to sample [s], as of a device at 500 Hz."""
@@ -47,8 +47,7 @@ def circle(time: float) -> Array:
     """Pose (7,) of the stylus after a time [s]; it starts at rest in the inkwell."""
     eased = 0.5 * time * time / _EASE if time < _EASE else time - 0.5 * _EASE
     angle = 2.0 * math.pi * eased / ROUND
-    turn = 0.5 * REST_TILT
-    pose = np.array([*REST_POSITION, math.cos(turn), math.sin(turn), 0.0, 0.0])
+    pose = rest_pose()
     pose[0] += RADIUS * math.sin(angle)
     pose[2] += RADIUS * (1.0 - math.cos(angle))
     return pose

@@ -3,17 +3,20 @@
 from collections.abc import Sequence
 from html import escape
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 from teleop_core.evaluation.published import published_for
 from teleop_core.evaluation.rows import Row
-from teleop_core.evaluation.score import Score, facts
 from teleop_core.evaluation.summary import Line, side_by_side
+
+if TYPE_CHECKING:
+    from teleop_core.evaluation.score import Score
 
 _CLASSES = {True: "met", False: "missed", None: "plain"}
 _MARKS = {True: " ✓", False: " ✗", None: ""}
 
 
-def html_table(scores: Sequence[Score]) -> str:
+def html_table(scores: "Sequence[Score]") -> str:
     """Table of the page: a column per score, and one beside those with published figures."""
     found = side_by_side(scores)
     columns = list(zip(*(line.rows for line in found), strict=True))
@@ -41,10 +44,10 @@ def _line(line: Line, are_compared: Sequence[bool]) -> str:
     return f'<tr><td>{escape(line.label)}</td><td class="unit">{escape(line.unit)}</td>{cells}</tr>'
 
 
-def compact_table(score: Score) -> str:
+def compact_table(score: "Score") -> str:
     """Table for a notebook, which brings no style of its own."""
     session = score.session
-    head = f"<b>{escape(session.place)}</b> · {escape(' · '.join(facts(session)))}"
+    head = f"<b>{escape(session.place)}</b> · {escape(' · '.join(session.facts))}"
     lines = [
         f'<tr><th colspan="4" style="text-align:left">{head}<br>{escape(score.verdict.text)}</th>'
         "</tr>"

@@ -18,7 +18,7 @@ from teleop_core.evaluation.packing import bits_within, deflated, pack
 from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_core.evaluation.preview import preview
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE
-from teleop_core.evaluation.score import Score, facts
+from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.scoring import Study
 from teleop_core.evaluation.summary import is_compared, side_by_side
 from teleop_core.evaluation.traces import spacing_s
@@ -149,7 +149,7 @@ def _note(scores: Sequence[Score]) -> str:
 def _section(number: int, study: Study, plots: list[Figure], places: list[str]) -> str:
     session = study.score.session
     cards = [_card(plot, place, study.bands) for plot, place in zip(plots, places, strict=True)]
-    told = list(facts(session))
+    told = list(session.facts)
     if kept_s := _kept_s(study.score):
         told.append(f"plots hold the smallest and largest value of each {kept_s * 1e3:.3g} ms")
     head = f'<h2 id="recording-{number}">{escape(session.place)}</h2>'

@@ -1,6 +1,6 @@
 """Score: everything that is measured on one arm of a recording, and its keys in JSON."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NoReturn, TypeVar, cast
 
@@ -76,6 +76,22 @@ class Session:
     to_s: float | None = None
     plant: str | None = None
     controller: str | None = None
+
+    @property
+    def facts(self) -> tuple[str, ...]:
+        """Scenario, robot, arm, seed, duration and gain, as far as they are known."""
+        found = (
+            self.scenario and f"scenario {self.scenario}",
+            self.robot and f"robot {self.robot}",
+            self.plant and f"{self.plant} plant",
+            self.controller and f"controller {self.controller}",
+            self.arm and f"arm {self.arm}",
+            None if self.seed is None else f"seed {self.seed}",
+            f"{self.duration_s:.1f} s",
+            None if self.gain is None else f"gain {self.gain:g}",
+            self.is_part and f"scored from {self.from_s:g} to {self.to_s:g} s",
+        )
+        return tuple(fact for fact in found if fact)
 
     @property
     def is_part(self) -> bool:
@@ -185,7 +201,7 @@ class Score:
     def __repr__(self) -> str:
         error = self.position_error_mm
         return (
-            f"Score of {self.session.place}: {', '.join(facts(self.session))}\n"
+            f"Score of {self.session.place}: {', '.join(self.session.facts)}\n"
             f"{self.verdict}\n"
             f"position error {number(error.rms)} mm RMS, {number(error.max)} mm at most"
         )
@@ -282,19 +298,3 @@ def frame_of(scores: Iterable[Score]) -> "pandas.DataFrame":
     import pandas
 
     return pandas.DataFrame([score.to_dict() for score in scores])
-
-
-def facts(session: Session) -> Iterator[str]:
-    """Scenario, robot, arm, seed, duration and gain, as far as they are known."""
-    found = (
-        session.scenario and f"scenario {session.scenario}",
-        session.robot and f"robot {session.robot}",
-        session.plant and f"{session.plant} plant",
-        session.controller and f"controller {session.controller}",
-        session.arm and f"arm {session.arm}",
-        None if session.seed is None else f"seed {session.seed}",
-        f"{session.duration_s:.1f} s",
-        None if session.gain is None else f"gain {session.gain:g}",
-        session.is_part and f"scored from {session.from_s:g} to {session.to_s:g} s",
-    )
-    return (fact for fact in found if fact)

@@ -90,7 +90,7 @@ class States:
         return self.rows[:, _SIZE]
 
 
-NO_HISTORY = StateHistory(np.empty(0, np.int64), np.empty((0, len(STATE_FIELDS))))
+NO_HISTORY: StateHistory = StateHistory(np.empty(0, np.int64), np.empty((0, len(STATE_FIELDS))))
 """That of a recording without teleop/state."""
 
 

@@ -1,10 +1,12 @@
 """Summary: the rows of all metrics, of one score or of several side by side."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from teleop_core.evaluation.rows import MISSING, Row
-from teleop_core.evaluation.score import Score
+
+if TYPE_CHECKING:
+    from teleop_core.evaluation.score import Score
 
 _NOTHING = {MISSING, "0/0/0", "0, 0", "0/0"}
 """Values that say nothing."""
@@ -19,7 +21,7 @@ class Line(NamedTuple):
     rows: tuple[Row, ...]
 
 
-def summary(score: Score) -> list[Row]:
+def summary(score: "Score") -> list[Row]:
     """Rows of a score; those of one group stand together, where its first row stands."""
     groups: dict[str, list[Row]] = {}
     for result in score.results:
@@ -28,7 +30,7 @@ def summary(score: Score) -> list[Row]:
     return [row for rows in groups.values() for row in rows]
 
 
-def side_by_side(scores: Sequence[Score]) -> list[Line]:
+def side_by_side(scores: "Sequence[Score]") -> list[Line]:
     """Lines of a table of several scores; a row that a score lacks is a dash.
 
     Lines that say nothing of any of them are left out: dashes, and delays of nothing, as in virtual

@@ -4,6 +4,7 @@ import io
 import math
 from collections.abc import Sequence
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE
 from rich.console import Console
@@ -11,7 +12,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from teleop_core.evaluation.rows import MISSING
-from teleop_core.experiments.outcome import Outcome, Row
+
+if TYPE_CHECKING:
+    from teleop_core.experiments.outcome import Outcome, Row
 
 MARKS = {True: "✓", False: "✗", None: ""}
 _COLORS = {True: "green", False: "red", None: "default"}
@@ -19,7 +22,7 @@ _WIDTH = 110
 _DIGITS = 6  # after the point, the most that any source prints
 
 
-def numbers(row: Row) -> tuple[str, str, str, str]:
+def numbers(row: "Row") -> tuple[str, str, str, str]:
     """Texts of published, predicted, ours and difference.
 
     What is predicted has a decimal more than what was printed, so that rounding shows.
@@ -60,26 +63,26 @@ def _signed(difference: float, published: float) -> str:
     return f"{difference:+.{digits}g}"
 
 
-def spread(row: Row) -> str:
+def spread(row: "Row") -> str:
     """From the smallest to the largest of several seeds."""
     if row.lowest is None or row.highest is None:
         return ""
     return f"{row.lowest:.3g} … {row.highest:.3g}"
 
 
-def within(row: Row) -> str:
+def within(row: "Row") -> str:
     """What counts as agreement."""
     return row.within.text(row.unit) if row.within is not None else ""
 
 
-def summary(outcomes: Sequence[Outcome]) -> str:
+def summary(outcomes: "Sequence[Outcome]") -> str:
     """One line: how many figures agree."""
     judged, agreeing = (sum(getattr(o, n) for o in outcomes) for n in ("judged", "agreeing"))
     rows = sum(len(outcome.rows) for outcome in outcomes)
     return f"{agreeing} of {judged} published figures agree; {rows - judged} rows are not judged"
 
 
-def outcome_table(outcome: Outcome) -> Table:
+def outcome_table(outcome: "Outcome") -> Table:
     """Table of one outcome."""
     has_ours = any(row.ours is not None for row in outcome.rows)
     has_spread = any(spread(row) for row in outcome.rows)
@@ -110,7 +113,7 @@ def outcome_table(outcome: Outcome) -> Table:
     return table
 
 
-def show(outcome: Outcome, console: Console) -> None:
+def show(outcome: "Outcome", console: Console) -> None:
     """Print the table of an outcome, and what must be known to read it."""
     console.print(outcome_table(outcome))
     told = f"{MARKS[True]} agrees, {MARKS[False]} does not; {outcome.source}"
@@ -125,7 +128,7 @@ def terminal() -> Console:
     return console if console.is_terminal else Console(width=_WIDTH, legacy_windows=False)
 
 
-def text(outcome: Outcome) -> str:
+def text(outcome: "Outcome") -> str:
     """The table as plain text."""
     console = Console(file=io.StringIO(), width=_WIDTH, color_system=None, legacy_windows=False)
     show(outcome, console)

@@ -1,14 +1,18 @@
 """Report: a fit as tables for the terminal, and as parameters of a session."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import yaml
 
-from teleop_core.fitting.fit import FitResult
 from teleop_core.plants.hardware import faults_of
 from teleop_core.robots import load_robot
 
+if TYPE_CHECKING:
+    from teleop_core.fitting.fit import FitResult
 
-def text(found: FitResult) -> str:
+
+def text(found: "FitResult") -> str:
     """Numbers with their intervals, and where the joints rest, measured beside simulated."""
     width = max(len(number.name) for number in found.numbers)
     lines = [f"{found.robot} from {found.table}, 95 % intervals", ""]
@@ -38,7 +42,7 @@ def text(found: FitResult) -> str:
     return "\n".join(lines)
 
 
-def parameter_file(found: FitResult) -> str:
+def parameter_file(found: "FitResult") -> str:
     """ROS 2 parameter file: the plant ``hardware`` with fitted numbers over the robot's."""
     values = {number.name: float(f"{number.value:.4g}") for number in found.numbers}
     own = faults_of(load_robot(found.robot))

@@ -32,6 +32,7 @@ from teleop_core.operators import OPERATORS, Setting
 from teleop_core.operators.follower import MOST, WANTED
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.remote import RemoteHand
+from teleop_core.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.operators.shapes import PHASES
 from teleop_core.parameters import parameter
 from teleop_core.signals import DT, STATE, assign
@@ -48,10 +49,6 @@ from teleop_core.topics import (
     TELEOP_STATE,
 )
 
-# The stylus rests in the inkwell at this tilt about x (Vongbunyong 2008, table 6.1; its sign is
-# the one that meets the slave's home), at this place in the master's base.
-REST_TILT = math.radians(-23.4)
-REST_POSITION = (0.0, -0.065511, -0.088114)
 BLOCK = 1000
 """Ticks for which the wanted motion and the noise are drawn at once, at most."""
 _DOUBT_NS = 1_000_000_000

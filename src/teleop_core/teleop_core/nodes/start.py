@@ -5,34 +5,19 @@
 """
 
 import sys
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from teleop_core.errors import TeleopError
-from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.making import make_node
 from teleop_core.nodes.naming import taken_names
 from teleop_core.nodes.process import run
 from teleop_core.own_parts import load_own_parts
-from teleop_core.stage import STAGES, Stage
+from teleop_core.stage import STAGES
 
 SESSION = "teleop_session"
 """Executable of a whole session in one process."""
 ANY = "stage"
 """Executable of any stage."""
-
-
-def node_class(stage: Stage) -> Any:
-    """Class of the node of a stage: its own, or by what makes it work a general one."""
-    kind = "answering:AnsweringNode" if stage.trigger is not None else "ticking:TickingNode"
-    module, _, name = (stage.node or f"teleop_core.nodes.{kind}").partition(":")
-    return getattr(import_module(module), name)
-
-
-def make_node(stage: Stage, **options: Any) -> CoreNode:
-    """Node of a stage; ``options`` as of :class:`rclpy.lifecycle.LifecycleNode`."""
-    node: CoreNode = node_class(stage)(stage, **options)
-    return node
 
 
 def main() -> int:

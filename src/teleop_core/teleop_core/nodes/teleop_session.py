@@ -16,9 +16,9 @@ from teleop_core.graph import RECORDER_NAME, Graph, Member
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.loop import Loop
+from teleop_core.nodes.making import make_node
 from teleop_core.nodes.rate import Schedule
 from teleop_core.nodes.recorder import RecorderNode
-from teleop_core.nodes.start import make_node
 from teleop_core.nodes.streams import Output
 from teleop_core.session.links import link_texts
 from teleop_core.stage import STAGES

@@ -144,8 +144,8 @@ OPERATORS: Registry[Operator] = Registry(
         "remote": "teleop_core.operators.remote:REMOTE",
         "gamepad": "teleop_core.devices.gamepad:GAMEPAD",
         "spacemouse": "teleop_core.devices.spacemouse:SPACEMOUSE",
-        "bag": "teleop_core.operators.recorded:BAG",
-        "file": "teleop_core.operators.recorded:FILE",
+        "bag": "teleop_core.exchange.recorded_hand:BAG",
+        "file": "teleop_core.exchange.recorded_hand:FILE",
     },
     _checked,
 )  # fmt: skip

@@ -17,12 +17,11 @@ from teleop_core.geometry import (
     Array,
     invert_quaternion,
     multiply_quaternions,
-    quaternion_from_rotation,
-    rotation,
     turn_within,
 )
 from teleop_core.operators import Motion, Operator, Setting
 from teleop_core.operators.follower import MOST, Follower
+from teleop_core.operators.rest import rest_pose
 from teleop_core.parameters import parameter
 
 __all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operator"]
@@ -309,16 +308,6 @@ def _row(name: str, pose: object) -> Array:
     if row.shape != (7,):
         raise ShapeError(name, (7,), row.shape)
     return row
-
-
-def rest_pose() -> Array:
-    """Pose (7,) in which the stylus of the haptic master rests, in the master's base."""
-    from teleop_core.master.haptic_master import REST_POSITION, REST_TILT
-
-    pose = np.empty(7)
-    pose[:3] = REST_POSITION
-    quaternion_from_rotation(rotation("x", REST_TILT), pose[3:])
-    return pose
 
 
 def hand_of(setting: Setting) -> RemoteHand:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import plotly.graph_objects as plots
@@ -12,11 +12,13 @@ from plotly.subplots import make_subplots
 from teleop_core.evaluation.bands import LIMIT_COLORS
 from teleop_core.geometry import Array, rotation_vectors
 from teleop_core.planning.asked import AskedPath
-from teleop_core.planning.reach import Followed, Reach
 from teleop_core.planning.table import LABELS, text
 from teleop_core.planning.walk import Walked
 from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.topics import Limit
+
+if TYPE_CHECKING:
+    from teleop_core.planning.reach import Followed, Reach
 
 COLORS = {Limit.NONE: "#1c7c54", **LIMIT_COLORS}
 """Of samples that are followed, and of those that are not by their causes."""
@@ -52,7 +54,7 @@ beyond; bands are the times in which the slave does not follow.</p>
 """
 
 
-def write_reach_page(reaches: Sequence[Reach], file: Path) -> None:
+def write_reach_page(reaches: "Sequence[Reach]", file: Path) -> None:
     """Write one self-contained page.
 
     Args:
@@ -80,7 +82,7 @@ def write_reach_page(reaches: Sequence[Reach], file: Path) -> None:
     file.write_text("\n".join([*parts, _TAIL]), encoding="utf-8")
 
 
-def reach_figure(reach: Reach, followed: Followed, name: str) -> plots.Figure:
+def reach_figure(reach: "Reach", followed: "Followed", name: str) -> plots.Figure:
     """Figure of one placement: in space, then position and turn against time."""
     titles = (
         f"{name}, in space: {followed.in_place.share:.1%} within reach",
@@ -103,7 +105,7 @@ def reach_figure(reach: Reach, followed: Followed, name: str) -> plots.Figure:
     return figure
 
 
-def _workspace(reach: Reach) -> list[Any]:
+def _workspace(reach: "Reach") -> list[Any]:
     points, _ = sample_workspace(reach.robot, _WORKSPACE, np.random.default_rng(1))
     x, y, z = points.T
     marker = {"size": 1.5, "color": "#adb5bd", "opacity": 0.4}
@@ -114,7 +116,7 @@ def _workspace(reach: Reach) -> list[Any]:
     ]
 
 
-def _in_space(followed: Followed) -> list[Any]:
+def _in_space(followed: "Followed") -> list[Any]:
     """Path as it is asked for, coloured by what keeps the slave from following."""
     walked, traces = followed.in_place, []
     kept = _spread(len(walked.asked), _POINTS)

@@ -3,9 +3,12 @@
 import math
 import shlex
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from teleop_core.planning.placement import Placement
-from teleop_core.planning.reach import Followed, Reach
+
+if TYPE_CHECKING:
+    from teleop_core.planning.reach import Followed, Reach
 
 LABELS = {
     "joint": "a joint is at its limit",
@@ -17,7 +20,7 @@ LABELS = {
 _WIDTH = 38
 
 
-def text(reach: Reach) -> str:
+def text(reach: "Reach") -> str:
     """Lines for the terminal: a table, and what to do next."""
     path, rate = reach.path, (len(reach.path) - 1) / reach.path.time[-1]
     head = f"{path.name}: {path.time[-1]:.4g} s of motion at {rate:.4g} Hz; {reach.robot.name}"
@@ -33,7 +36,7 @@ def text(reach: Reach) -> str:
     return "\n".join([head, *lines, *_advice(reach)])
 
 
-def _rows(columns: list[Followed]) -> Iterator[tuple[str, list[str]]]:
+def _rows(columns: "list[Followed]") -> Iterator[tuple[str, list[str]]]:
     """Label and cells of each line."""
     yield "followed in a session", [_percent(c.share) for c in columns]
     for cause, label in LABELS.items():
@@ -57,7 +60,7 @@ def _start(placement: Placement) -> str:
     return " ".join(f"{value:.4g}" for value in placement.start)
 
 
-def _advice(reach: Reach) -> list[str]:
+def _advice(reach: "Reach") -> list[str]:
     """What to do next."""
     if reach.is_given:
         return [f"The parameters as given reach {_percent(reach.goal)}: nothing to change."]

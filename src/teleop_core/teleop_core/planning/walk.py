@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from teleop_core.geometry import Array, pose_from_transform
 from teleop_core.kernels import bound, kernel_from_source, raise_pending, records
+from teleop_core.mapping.inverse_kinematics import (
+    InverseKinematics,
+    InverseKinematicsParameters,
+)
 from teleop_core.mapping.motion_scaling import MotionScaling
 from teleop_core.mapping.parameters import MotionScalingParameters
 from teleop_core.planning.asked import AskedPath
 from teleop_core.planning.placement import Placement
-from teleop_core.robots.inverse_kinematics import (
-    InverseKinematics,
-    InverseKinematicsParameters,
-)
 from teleop_core.signals import DT, assign, copy
 from teleop_core.topics import SLAVE_REACH, Limit
 

@@ -14,11 +14,11 @@ from teleop_core.geometry import Array
 from teleop_core.kernels import pointer
 from teleop_core.parameters import parameter
 from teleop_core.plants import Physics, Plant
+from teleop_core.robots.chains import true_chain
 from teleop_core.robots.drives import ACCELERATION
 from teleop_core.robots.hardware import Hardware
-from teleop_core.robots.link_errors import true_chain
+from teleop_core.robots.rigid_body import write_model
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.rigid_body import write_model
 
 FASTEST_GEAR = 1500.0
 """Frequency [rad/s] of a gear on its spring up to which steps of half a tick follow it."""

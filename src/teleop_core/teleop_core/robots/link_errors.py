@@ -2,8 +2,8 @@
 
 Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has
 theta + its error of theta and so on; joint offsets are errors of theta on turning and of d on
-sliding joints. :func:`true_chain` gives the geometry row of the arm as built, on which
-:func:`teleop_core.robots.dh_kernels.fk` says where its tip really is::
+sliding joints. :func:`~teleop_core.robots.chains.true_chain` gives the geometry row of the
+arm as built, on which :func:`teleop_core.robots.dh_kernels.fk` says where its tip really is::
 
     errors = LinkErrors.of(robot, {"d3": 5.5e-3})
     dh_kernels.fk(q, true_chain(robot, errors), T_base_tip)
@@ -20,18 +20,16 @@ Source:
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array, rotation, transform
 from teleop_core.portable import inverse_motion, product
-from teleop_core.robots import dh_kernels
 from teleop_core.robots.drives import read_only
 
 if TYPE_CHECKING:
@@ -185,103 +183,3 @@ def next_axis_motion(F: Array) -> Array:
 def error_names(n: int) -> tuple[str, ...]:
     """Names of all errors of ``n`` links: a1 ... an, alpha1 ..., d1 ..., theta1 ... thetan."""
     return tuple(f"{symbol}{i + 1}" for symbol in SYMBOLS for i in range(n))
-
-
-def chain_of(robot: "Robot") -> Chain | None:
-    """The robot as a chain; None for one that is none, such as a parallel robot."""
-    if robot.kernels.fk is dh_kernels.fk:
-        row = robot.geometry_row
-    else:
-        table = _built_in_table(robot)
-        if table is None:
-            return None
-        from teleop_core.robots.dh import robot_from_table
-
-        row = robot_from_table(table).geometry_row
-    n = robot.n
-    fixed = np.tile(np.eye(4), (n + 1, 1, 1))
-    fixed[:, :3] = row[n + 7 :].reshape(n + 1, 3, 4)
-    return Chain(kinds=row[:n].copy(), fixed=fixed, row=row)
-
-
-def true_chain(robot: "Robot", errors: LinkErrors) -> Array | None:
-    """Geometry row of the arm as built, for the kernels of :mod:`teleop_core.robots.dh_kernels`.
-
-    Args:
-        robot: The arm as drawn.
-        errors: What its links are off, n of them.
-
-    Returns:
-        The row, a new array, on which ``dh_kernels.fk`` takes the robot's own joint vectors; None
-        for robots that are no chain.
-
-    Raises:
-        ParameterError: Errors of another number of links.
-    """
-    if errors.n != robot.n:
-        raise ParameterError("errors", f"for {errors.n} links", f"for {robot.n}, as {robot.name}")
-    chain = chain_of(robot)
-    return None if chain is None else chain.built(errors)
-
-
-def _built_in_table(robot: "Robot") -> dict[str, Any] | None:
-    """Denavit-Hartenberg table of a chain of ours that has kernels of its own."""
-    make = _TABLES.get(robot.name)
-    if make is None:
-        return None
-    module = import_module(f"teleop_core.robots.{robot.name}")
-    if robot.kernels.fk is not module.fk:
-        return None  # somebody else's robot of the same name
-    convention, rows = make(dict(robot.geometry))
-    moving = [row for row in rows if not {"q", "-q"}.isdisjoint(row.values())]
-    for i, row in enumerate(moving):
-        limits = {"lower": float(robot.lower[i]), "upper": float(robot.upper[i])}
-        row |= {"name": robot.joint_names[i], **limits}
-    return {"name": robot.name, "convention": convention, "rows": rows}
-
-
-_Table = tuple[str, list[dict[str, Any]]]
-_RIGHT = 0.5 * math.pi
-
-
-def _rcrt1(g: Mapping[str, float]) -> _Table:
-    turn: dict[str, Any] = {"theta": "q"}
-    return "standard", [
-        turn | {"alpha": -_RIGHT}, turn | {"alpha": _RIGHT, "d": g["d2"]}, {"d": "q"},
-        turn | {"alpha": -_RIGHT}, turn | {"alpha": _RIGHT}, turn | {"d": g["L6"]},
-    ]  # fmt: skip
-
-
-def _puma560(g: Mapping[str, float]) -> _Table:
-    turn: dict[str, Any] = {"theta": "q"}
-    return "modified", [
-        turn | {}, turn | {"alpha": -_RIGHT}, turn | {"a": g["a2"], "d": g["d3"]},
-        turn | {"alpha": -_RIGHT, "a": g["a3"], "d": g["d4"]}, turn | {"alpha": _RIGHT},
-        turn | {"alpha": -_RIGHT},
-    ]  # fmt: skip
-
-
-def _scara(g: Mapping[str, float]) -> _Table:
-    return "modified", [
-        {"theta": "q"}, {"theta": "q", "a": g["a1"]}, {"a": g["a2"], "d": "-q"}, {"theta": "q"},
-    ]  # fmt: skip
-
-
-def _planar_3r(g: Mapping[str, float]) -> _Table:
-    return "modified", [
-        {"theta": "q"}, {"theta": "q", "a": g["l1"]}, {"theta": "q", "a": g["l2"]}, {"a": g["l3"]},
-    ]  # fmt: skip
-
-
-def _five_axis(g: Mapping[str, float]) -> _Table:
-    turn: dict[str, Any] = {"theta": "q"}
-    return "modified", [
-        turn | {"d": g["d1"]}, turn | {"alpha": -_RIGHT}, turn | {"a": g["a2"]},
-        turn | {"a": g["a3"]}, turn | {"alpha": -_RIGHT}, {"d": g["d5"]},
-    ]  # fmt: skip
-
-
-_TABLES: dict[str, Callable[[Mapping[str, float]], _Table]] = {
-    "rcrt1": _rcrt1, "puma560": _puma560, "scara": _scara, "planar_3r": _planar_3r,
-    "five_axis": _five_axis,
-}  # fmt: skip

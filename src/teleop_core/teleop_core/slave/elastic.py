@@ -10,8 +10,8 @@ import numpy as np
 
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
+from teleop_core.robots.rigid_body import invert_positive, write_model
 from teleop_core.slave.friction import bend, friction
-from teleop_core.slave.rigid_body import invert_positive, write_model
 
 _DAMPING = 0.02  # assumed: of a gear on its spring, share of critical with the motor alone
 

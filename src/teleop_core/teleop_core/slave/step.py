@@ -19,6 +19,7 @@ from teleop_core.operation.watch import (
     watch_tip,
 )
 from teleop_core.plants import PER_JOINT
+from teleop_core.robots.rigid_body import write_model
 from teleop_core.signals import Field, copy
 from teleop_core.slave.commands import (
     AT_LIMITS,
@@ -36,7 +37,6 @@ from teleop_core.slave.elastic import integrate_elastic
 from teleop_core.slave.friction import wander
 from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way
 from teleop_core.slave.joints import integrate
-from teleop_core.slave.rigid_body import write_model
 from teleop_core.slave.transmission import LONGEST_DELAY, drive, follow_encoders
 from teleop_core.slave.velocity import advance_velocity
 from teleop_core.topics import NO_COMMAND_NS

@@ -16,9 +16,12 @@ import numpy as np
 
 from teleop_core.damage import damage_told
 from teleop_core.errors import ParameterError, RecordingError
+from teleop_core.exchange.master_bag import as_master_bag
 from teleop_core.exchange.options import ImportOptions
+from teleop_core.exchange.orientation import continuous, products
 from teleop_core.geometry import Array
 from teleop_core.operators import Motion, Operator, Setting
+from teleop_core.operators.rest import REST_TILT
 from teleop_core.operators.shapes import minimum_jerk
 from teleop_core.parameters import parameter
 from teleop_core.portable import arctangent, length
@@ -139,9 +142,6 @@ def samples_of(path: Path, options: ImportOptions | None) -> Samples:
 
 @lru_cache(maxsize=2)
 def _read(path: Path, options: ImportOptions | None, changed_ns: int) -> Samples:
-    from teleop_core.exchange.master_bag import as_master_bag
-    from teleop_core.exchange.orientation import continuous, products
-
     bag = as_master_bag(path, options)
     bag.require((MASTER_MEASURED_CP,))
     series = bag.read(MASTER_MEASURED_CP)
@@ -160,8 +160,6 @@ def _read(path: Path, options: ImportOptions | None, changed_ns: int) -> Samples
 
 def _motion(path: Path, options: ImportOptions | None, setting: Setting) -> Motion:
     """Motion that approaches the centre and follows the samples there."""
-    from teleop_core.master.haptic_master import REST_TILT
-
     samples = samples_of(path, options)
     _tell_stops(path, samples, setting)
     approach, center = _approach(setting), np.array(setting.common.center)
@@ -211,8 +209,6 @@ def held(samples: Samples, times: Array) -> Array:
 
 def _in_axes_of(rest: Array, turns: Array) -> Array:
     """Rotation vectors (N, 3) in the axes of an attitude, of turns (N, 4) in the base's."""
-    from teleop_core.exchange.orientation import products
-
     own = products(products(rest * (1.0, -1.0, -1.0, -1.0), turns), rest)
     sine = length(own[:, 1:])
     angle = 2.0 * arctangent(sine, own[:, 0])

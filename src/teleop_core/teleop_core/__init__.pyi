@@ -1,0 +1,55 @@
+from . import topics as topics
+from .api import configuration as configuration, replay as replay, run as run
+from .controllers import Controller as Controller, register_controller as register_controller
+from .errors import (
+    ClosureError as ClosureError,
+    EvaluationError as EvaluationError,
+    KernelError as KernelError,
+    ParameterError as ParameterError,
+    PartError as PartError,
+    RecordingError as RecordingError,
+    SessionError as SessionError,
+    ShapeError as ShapeError,
+    TeleopError as TeleopError,
+    UnknownNameError as UnknownNameError,
+)
+from .evaluation import (
+    Key as Key,
+    Metric as Metric,
+    Score as Score,
+    frame_of as frame_of,
+    register_metric as register_metric,
+)
+from .exchange import (
+    ExportReport as ExportReport,
+    ImportOptions as ImportOptions,
+    ImportReport as ImportReport,
+    export_recording as export_recording,
+    import_recording as import_recording,
+)
+from .fitting import FitError as FitError, FitResult as FitResult, fit_plant as fit_plant
+from .fixtures import Fixture as Fixture, register_fixture as register_fixture
+from .graph import Graph as Graph, build_graph as build_graph
+from .kernels import kernel as kernel
+from .operators import (
+    Operator as Operator,
+    following as following,
+    register_operator as register_operator,
+)
+from .operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
+from .parameters import NoParameters as NoParameters, parameter as parameter
+from .planning.reach import Reach as Reach, reach as reach
+from .plants import Physics as Physics, Plant as Plant, register_plant as register_plant
+from .recording import Recording as Recording, Stream as Stream, open_recording as open_recording
+from .robots import (
+    Robot as Robot,
+    list_robots as list_robots,
+    load_robot as load_robot,
+    register_robot as register_robot,
+    robot_from_table as robot_from_table,
+)
+from .robots.parameters import RobotParameters as RobotParameters
+from .stage import Stage as Stage, register_stage as register_stage
+from .topics import Kind as Kind, Topic as Topic
+
+__version__: str

@@ -1,0 +1,20 @@
+"""Making: the node of a stage, of a class of its own or of a general one."""
+
+from importlib import import_module
+from typing import Any
+
+from teleop_core.nodes.base import CoreNode
+from teleop_core.stage import Stage
+
+
+def node_class(stage: Stage) -> Any:
+    """Class of the node of a stage: its own, or by what makes it work a general one."""
+    kind = "answering:AnsweringNode" if stage.trigger is not None else "ticking:TickingNode"
+    module, _, name = (stage.node or f"teleop_core.nodes.{kind}").partition(":")
+    return getattr(import_module(module), name)
+
+
+def make_node(stage: Stage, **options: Any) -> CoreNode:
+    """Node of a stage; ``options`` as of :class:`rclpy.lifecycle.LifecycleNode`."""
+    node: CoreNode = node_class(stage)(stage, **options)
+    return node
