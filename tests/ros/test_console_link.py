@@ -40,10 +40,16 @@ def state(link):
 def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(live):
     _, link, out = live
     first = dict(link.view().arms[""].stamp_ns)
-    wait_until(lambda: link.view().arms[""].stamp_ns[topics.SLAVE_MEASURED_JS.name]
-               > first[topics.SLAVE_MEASURED_JS.name], "newer samples")  # fmt: skip
-    view = link.view()
-    assert view.is_fresh
+    name = topics.SLAVE_MEASURED_JS.name
+
+    def fresh():
+        """View of an arm at rest, of which joints and tip are of one place."""
+        view = link.view()
+        arm = view.arms[""]
+        is_newer = arm.stamp_ns[name] > first[name]
+        return view if view.is_fresh and is_newer and "homed" in arm.operation_text else None
+
+    view = wait_until(fresh, "newer samples of an arm at rest")
     assert view.recording == out
     assert view.arms[""].get(topics.SLAVE_MEASURED_JS).shape == (18,)
     q = view.arms[""].get(topics.SLAVE_MEASURED_JS)[:6]

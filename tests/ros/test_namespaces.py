@@ -58,7 +58,7 @@ def recorded(peer, process, tmp_path, *slaves):
     for slave in slaves:
         peer.wait_value(slave, "ticks", lambda ticks: ticks > 2000)
     process.send_signal(signal.SIGINT)
-    assert process.wait(60) == 0
+    assert process.wait(90) == 0
     return Bag(tmp_path / "bag")
 
 
@@ -70,8 +70,13 @@ def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
     process = start(groups, "-r", "__ns:=/left", "-r", "__node:=arm")
     peer.wait_state("left/slave_sim", "active")
     assert parameter(peer, "/left/slave_sim", "command_timeout").double_value == 0.25
-    names = dict(peer.node.get_node_names_and_namespaces())
-    assert {name for name, where in names.items() if where == "/left"} == {
+
+    def inside():
+        names = peer.node.get_node_names_and_namespaces()
+        return {name for name, where in names if where == "/left"}
+
+    peer.wait(lambda: len(inside()) >= 5, "all nodes to be found")
+    assert inside() == {
         "haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "recorder",
     }  # fmt: skip
     bag = recorded(peer, process, tmp_path, "left/slave_sim")

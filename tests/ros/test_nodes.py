@@ -27,12 +27,17 @@ MS = 1_000_000
 def test_haptic_master_sends_one_sample_per_millisecond_on_all_its_topics(peer):
     listeners = {topic: peer.listen(topic) for topic in STAGES.find("haptic_master").writes}
     peer.start("haptic_master")
-    for topic, listener in listeners.items():
-        peer.wait(lambda own=listener: own.take() > 200, topic.name)
-    stamps = [set(listener.stamps) for listener in listeners.values()]
-    common = set.intersection(*stamps)
-    assert len(common) > 150
-    steps = np.diff(sorted(common))
+
+    def common():
+        """Stamps that came on all topics, each of which is found at another moment."""
+        for listener in listeners.values():
+            listener.take()
+        return set.intersection(*(set(listener.stamps) for listener in listeners.values()))
+
+    peer.wait(lambda: len(common()) > 150, "samples of all topics")
+    for listener in listeners.values():
+        assert (np.diff(listener.stamps) > 0).all()
+    steps = np.diff(sorted(common()))
     assert (steps % MS == 0).all()
 
 

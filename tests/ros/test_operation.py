@@ -159,7 +159,16 @@ def button(peer):
 
 
 def go_on(peer):
-    peer.wait(lambda: command(peer, "reset")[0] and command(peer, "enable")[0], "enabled again")
+    """Reset and enable the arm until it says that it is: what it said before is of another stop."""
+
+    def is_enabled():
+        if state(peer) is State.ENABLED:
+            return True
+        for name in ("reset", "enable"):  # what is refused is asked for again
+            command(peer, name)
+        return False
+
+    peer.wait(is_enabled, "enabled again")
 
 
 def say(button, *, pressed, released):

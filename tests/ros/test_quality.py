@@ -53,10 +53,11 @@ def test_an_override_changes_what_a_publisher_offers(peer):
     name = f"/{JS.name}"
     override = {f"qos_overrides.{name}.publisher.reliability": "best_effort"}
     peer.start("slave_sim", **override)
-    peer.wait(lambda: peer.node.get_publishers_info_by_topic(name), "the publisher")
-    (found,) = peer.node.get_publishers_info_by_topic(name)
+    published = peer.node.get_publishers_info_by_topic
+    (found,) = peer.wait(lambda: published(name), "the publisher")
     assert found.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT
-    (other,) = peer.node.get_publishers_info_by_topic(f"/{topics.SLAVE_MEASURED_CP.name}")
+    other_name = f"/{topics.SLAVE_MEASURED_CP.name}"
+    (other,) = peer.wait(lambda: published(other_name), "the other publisher")
     assert other.qos_profile.reliability is ReliabilityPolicy.RELIABLE
 
 

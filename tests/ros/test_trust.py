@@ -56,15 +56,16 @@ def test_a_second_master_is_refused_and_the_first_one_goes_on(peer):
         first.publish(form.encode_one(stamp, pose))
 
     def refused():
+        """Report that tells of it; a later one is of a time without messages."""
         nonlocal stamp
         stamp += 2
         first.publish(form.encode_one(stamp, pose))
         second.publish(form.encode_one(stamp + 1, pose))
-        values = peer.status("motion_scaling").values
-        return int(values.get("refused.master/measured_cp.second_publisher", "0")) > 100
+        status = peer.status("motion_scaling")
+        count = status.number("refused.master/measured_cp.second_publisher")
+        return status if count > 100 and "a second publisher" in status.message else None
 
-    peer.wait(refused, "refusals of the second one")
-    status = peer.status("motion_scaling")
+    status = peer.wait(refused, "refusals of the second one")
     assert "2 publishers on master/measured_cp" in status.message
     assert "is from a second publisher" in status.message
     assert status.number("received.master/measured_cp") > 200
@@ -90,13 +91,17 @@ def test_a_recorder_does_not_take_a_second_publisher_for_losses(peer, tmp_path):
     data = layout(topic, ()).encode_one(1, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
     for _ in range(1000):
         first.publish(data)
+    sent = 1000
 
     def recorded():
+        nonlocal sent
         for _ in range(20):
             first.publish(data)
             second.publish(data)
+        sent += 40
         status = peer.status("recorder")
-        return status and status.number(f"received.{topic.name}") > 4000
+        return status if status.number(f"received.{topic.name}") > 4000 else None
 
-    peer.wait(recorded, "messages of both")
-    assert peer.status("recorder").number(f"lost.{topic.name}") < 1000
+    status = peer.wait(recorded, "messages of both")
+    # What a busy machine loses is lost, but nothing is both lost and received, or never was sent.
+    assert status.number(f"lost.{topic.name}") <= sent - status.number(f"received.{topic.name}")
