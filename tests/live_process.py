@@ -1,17 +1,21 @@
 """The command ``teleop live`` as a process, with all that it starts."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psutil
 
 from teleop_core.bags.reader import Bag
+from teleop_core.nodes.chances import Chances
 
 TIMEOUT = 90.0
 QUICK = ("operator.approach_time=1.0", "haptic_master.patience=0.0")
@@ -20,19 +24,22 @@ QUICK = ("operator.approach_time=1.0", "haptic_master.patience=0.0")
 class LiveProcess:
     """A session started from the command line, recorded in ``folder``/bag.
 
-    Its temporary files go to ``folder``/tmp. It ignores some signals from the start, as a process
-    does that a shell starts in the background.
+    It lasts for ten minutes, unless it is told another time or ended before: what it comes to in a
+    time is not known on a busy machine. Its temporary files go to ``folder``/tmp. It ignores some
+    signals from the start, as a process does that a shell starts in the background.
     """
 
     def __init__(
-        self, folder: Path, *arguments: str, duration: float = 60.0,
+        self, folder: Path, *arguments: str, duration: float = 600.0,
         env: Mapping[str, str] | None = None, ignores: tuple[int, ...] = (),
+        settings: tuple[str, ...] = QUICK,
     ) -> None:  # fmt: skip
         self.bag, self.temporary, self._log = folder / "bag", folder / "tmp", folder / "live.log"
+        self._duration = duration
         self.temporary.mkdir()
         command = [sys.executable, "-m", "teleop_core.cli", "live", "--out", str(self.bag)]
         command += ["--duration", f"{duration}", "--scenario", "coarse_box", *arguments]
-        command += [word for setting in QUICK for word in ("--set", setting)]
+        command += [word for setting in settings for word in ("--set", setting)]
         with self._log.open("wb") as log:
             self.process = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
@@ -45,7 +52,7 @@ class LiveProcess:
         """What it has written so far."""
         return self._log.read_text(errors="replace")
 
-    def wait_text(self, text: str, timeout: float = 120.0) -> None:
+    def wait_text(self, text: str, timeout: float = 300.0) -> None:
         """Wait until it has written a text."""
 
         def written() -> bool:
@@ -53,6 +60,16 @@ class LiveProcess:
             return text in self.text
 
         wait_until(written, f"{text!r} of teleop live", timeout)
+
+    def wait_running(self) -> None:
+        """Wait for a line of progress: of the first second, unless the machine is busy."""
+        line = re.compile(rf"\d/{self._duration:g} s  ")
+
+        def told() -> bool:
+            assert self.process.poll() is None, self.text
+            return line.search(self.text) is not None
+
+        wait_until(told, "progress of teleop live", 300.0)
 
     def nodes(self, name: str = "") -> list[psutil.Process]:
         """Processes of its nodes, or those of one."""
@@ -65,7 +82,7 @@ class LiveProcess:
         self.process.send_signal(number)
         return nodes
 
-    def wait(self, timeout: float = 60.0) -> int:
+    def wait(self, timeout: float = TIMEOUT) -> int:
         """Exit code."""
         return self.process.wait(timeout)
 
@@ -88,6 +105,45 @@ def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT
         assert time.monotonic() < deadline, f"not within {timeout} s: {what}"
         time.sleep(0.01)
     return result
+
+
+class WorkingTime:
+    """Time for which a process could have worked, from making on, to be used with ``with``.
+
+    On a busy machine a healthy process waits for a processor: what it must do within a time is
+    held against the time for which it had one, or could have had one.
+    """
+
+    def __init__(self, pid: int) -> None:
+        self._chances, self._is_over = Chances(pid), threading.Event()
+        self._times, self._worked = [time.time()], [0.0]
+        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread.start()
+
+    def _look(self) -> None:
+        while not self._is_over.wait(0.02):
+            worked = self._worked[-1] + self._chances.look()
+            self._times.append(time.time())
+            self._worked.append(worked)
+
+    def __enter__(self) -> "WorkingTime":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._is_over.set()
+        self._thread.join()
+
+    def between(self, begin: float, end: float) -> float:
+        """Its part of the time between two times of the clock [s]."""
+        first, last = np.interp((begin, end), self._times, self._worked)
+        return float(last - first)
+
+
+def has_recorded(status: Any, counts: Mapping[str, int]) -> bool:
+    """Whether a recorder's report tells of more samples than these of each topic."""
+    return status is not None and all(
+        status.number(f"received.{name}") > count for name, count in counts.items()
+    )
 
 
 def are_gone(processes: list[Any]) -> bool:

@@ -1,5 +1,7 @@
 """Real nodes as processes, and a peer that talks to them over real topics."""
 
+import io
+import re
 import signal
 import subprocess
 import sys
@@ -7,6 +9,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +23,20 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from rich.console import Console
 
+from live_process import has_recorded
 from middleware_faults import MiddlewareLossError, check_end
 from teleop_core.bags.messages import discover, layout
+from teleop_core.bags.reader import Bag
 from teleop_core.nodes.children import environment, free_domain
+from teleop_core.nodes.interrupt import Interrupt
+from teleop_core.nodes.live import live
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot
+from teleop_core.session.configuration import Configuration
 from teleop_core.stage import STAGES
 from teleop_core.topics import Topic
 
@@ -36,6 +45,8 @@ with warnings.catch_warnings():
     import rosidl_generator_py  # noqa: F401
 
 TIMEOUT = 90.0
+SESSION_TIMEOUT = 300.0
+"""Of a whole session, whose kernels may have to be compiled first [s]."""
 JOINTS = load_robot("rcrt1").joint_names
 
 
@@ -211,6 +222,10 @@ class Peer:
 
         return wait_until(accepted, f"{name} {key}")[0]
 
+    def has_recorded(self, counts: Mapping[str, int], recorder: str = "recorder") -> bool:
+        """Whether a recorder reports more samples than these of each topic."""
+        return has_recorded(self.status(recorder), counts)
+
     def insist_on_all(self, recorder: str) -> None:
         """Make sure that the last report of a recorder knows of no sample that was lost.
 
@@ -290,6 +305,17 @@ def peer(tmp_path: Path) -> Iterator[Peer]:
             made.close()
 
 
+@pytest.fixture(scope="module")
+def common_peer() -> Iterator[Peer]:
+    """A peer that the tests of a file share."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = Peer(Path(folder))
+        try:
+            yield made
+        finally:
+            made.close()
+
+
 @pytest.fixture
 def compose(peer, tmp_path):
     """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
@@ -320,3 +346,48 @@ def compose(peer, tmp_path):
             process.wait(TIMEOUT)
         finally:
             process.kill()
+
+
+def run_until(
+    peer: Peer, until: Callable[[], Any], out: Path, configuration: Configuration,
+    *, is_composed: bool = False,
+) -> tuple[Bag, str]:  # fmt: skip
+    """Run a live session until something is so; its recording, and what was shown of it.
+
+    On a busy machine nobody knows what a session comes to in a time: it lasts until it has come to
+    what its test is about. The peer's domain must be that of the environment.
+    """
+    show, interrupt = Console(file=io.StringIO(), width=200), Interrupt()
+    with ThreadPoolExecutor() as pool:
+        session = pool.submit(
+            live, configuration, out, show, is_composed=is_composed, interrupt=interrupt
+        )
+
+        def reached() -> Any:
+            if session.done():
+                session.result()
+                raise AssertionError(f"it ended before: {show.file.getvalue()}")
+            # Before its first line of progress it is not ready to be ended well.
+            return until() and re.search(r"\d/\d+ s  ", show.file.getvalue())
+
+        try:
+            wait_until(reached, "what the session is to come to", SESSION_TIMEOUT)
+        finally:
+            interrupt.ask()
+    session.result()
+    return Bag(out), show.file.getvalue()
+
+
+@pytest.fixture
+def session_until(
+    peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., tuple[Bag, str]]:
+    """Runner of a live session in the peer's domain, as :func:`run_until` says."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", peer.domain)
+
+    def run(
+        configuration: Configuration, until: Callable[[], Any], **options: bool
+    ) -> tuple[Bag, str]:
+        return run_until(peer, until, tmp_path / "bag", configuration, **options)
+
+    return run

@@ -1,19 +1,13 @@
 """Arms as nodes: namespaces keep parameters and topics apart; two arms make one recording."""
 
-import io
-import threading
-
 import numpy as np
 import pytest
 from rcl_interfaces.srv import GetParameters
-from rich.console import Console
 
 from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
-from teleop_core.nodes.interrupt import Interrupt
-from teleop_core.nodes.live import live
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 
@@ -71,37 +65,25 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer, tmp_path)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("is_composed", [False, True], ids=["processes", "composed"])
-def test_two_arms_are_recorded_together_and_scored_one_by_one(
-    peer, monkeypatch, tmp_path, is_composed
-):
+def test_two_arms_are_recorded_together_and_scored_one_by_one(peer, session_until, is_composed):
     robots = {"": "rcrt1", "left": "puma560"}
     # Ten processes need more than two processors: an arm that hears too seldom of its hand holds.
     moving = topics.SLAVE_MEASURED_JS if is_composed else topics.MASTER_MEASURED_CP
     listeners = {arm: peer.listen(moving.of_arm(arm)) for arm in robots}
-    monkeypatch.setenv("ROS_DOMAIN_ID", peer.domain)
-    show, interrupt = Console(file=io.StringIO(), width=200), Interrupt()
     settings = ["teleop.arms=[right, left]", "left/robot=puma560", "operator.approach_time=1.0"]
-    configuration = configure("coarse_box", settings=[*settings, "teleop.duration=120.0"])
-    session = threading.Thread(
-        target=live, args=(configuration, tmp_path / "bag", show),
-        kwargs={"is_composed": is_composed, "interrupt": interrupt},
-    )  # fmt: skip
-    session.start()
+    configuration = configure("coarse_box", settings=[*settings, "teleop.duration=600.0"])
+    enough = {topic.of_arm(arm).name: 100 for arm in robots for topic in topics.STREAMS}
 
-    def has_moved(arm):
-        assert session.is_alive(), show.file.getvalue()
-        values = listeners[arm].values
-        return listeners[arm].take() > 300 and np.abs(values[-1] - values[0])[:3].max() > 1e-3
+    def has_moved(listener):
+        values = listener.values
+        return listener.take() > 300 and np.abs(values[-1] - values[0])[:3].max() > 1e-3
 
-    try:
-        for arm in robots:
-            peer.wait(lambda arm=arm: has_moved(arm), f"motion of {arm or 'right'}")
-        peer.wait(lambda: "1/120 s" in show.file.getvalue(), "the first second")
-    finally:
-        interrupt.ask()
-        session.join()
-    assert all(f"{arm}slave_sim is ready" in show.file.getvalue() for arm in ("", "left/"))
-    bag = Bag(tmp_path / "bag")
+    def is_under_way():
+        moved = [has_moved(listener) for listener in listeners.values()]
+        return all(moved) and peer.has_recorded(enough)
+
+    bag, text = session_until(configuration, is_under_way, is_composed=is_composed)
+    assert all(f"{arm}slave_sim is ready" in text for arm in ("", "left/"))
     for arm, robot in robots.items():
         assert all(bag.topics[t.of_arm(arm).name].count > 100 for t in topics.STREAMS), arm
         measured = bag.read(topics.SLAVE_MEASURED_JS.of_arm(arm))

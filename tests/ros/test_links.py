@@ -1,20 +1,21 @@
 """Links between nodes: delayed ones, summed ones, and stages of a user put in between."""
 
+import signal
 import textwrap
 import time
+from functools import reduce
 
 import numpy as np
 import pytest
 
+from live_process import LiveProcess, wait_until
 from teleop_core import topics
-from teleop_core.bags.reader import Bag
 from teleop_core.robots import load_robot
 from teleop_core.topics import Kind, Topic
 
 pytestmark = pytest.mark.ros
 
 MS = 1_000_000
-RUN = ("live", "--scenario", "free_motion", "--set", "operator.approach_time=1.0")
 HELPER = Topic("helper/servo_cf", Kind.WRENCH, topics.MASTER_SERVO_CF.stamp, "master_base")
 FORCES = ["master/servo_cf=master/servo_cf", "master/servo_cf=helper/servo_cf"]
 STAGES = """
@@ -100,35 +101,93 @@ ENTRIES = """
     helper = my_stages:HELPER
     failing = my_stages:FAILING
 """
-both_ways = pytest.mark.parametrize("way", [(), ("--composed",)], ids=["processes", "composed"])
+RAISED, TWICE = (Topic(name, Kind.POSE) for name in ("slave/raised_cp", "slave/plain_cp"))
 
 
-@pytest.fixture
-def package(tmp_path, monkeypatch):
-    """A user's installed package with four stages."""
-    folder = tmp_path / "site"
+def both_ways(topic, is_enough, *settings):
+    """A session of these settings, in processes and composed, until it has enough of a topic."""
+    ways = [(topic, is_enough, settings, way) for way in ((), ("--composed",))]
+    return pytest.mark.parametrize("recorded", ways, ids=["processes", "composed"], indirect=True)
+
+
+def is_led(setpoints):
+    """Whether commands have been in force for more than a second and a half."""
+    return sum(stamp > topics.NO_COMMAND_NS for stamp in setpoints.stamps) > 1500
+
+
+def is_free(reach):
+    """Which answers (N,) of the inverse kinematics nothing keeps from what was asked for."""
+    return np.array(reach)[:, topics.SLAVE_REACH.columns.index("limit")] == topics.Limit.NONE
+
+
+late_and_helped = both_ways(
+    topics.SLAVE_SETPOINT_JS, is_led,
+    "teleop.delays=[slave/servo_jp=0.05]", "teleop.stages=[helper]",
+)  # fmt: skip
+in_between = both_ways(
+    topics.SLAVE_REACH, lambda reach: reach.values and is_free(reach.values).sum() > 1000,
+    "teleop.stages=[compiled_raise, plain_raise]", "plain_raise.height=0.003",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """Folder of a user's installed package with four stages."""
+    folder = tmp_path_factory.mktemp("links") / "site"
     about = folder / "my_stages-1.0.dist-info"
     about.mkdir(parents=True)
     (folder / "my_stages.py").write_text(textwrap.dedent(STAGES))
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-stages\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text(textwrap.dedent(ENTRIES))
-    monkeypatch.setenv("PYTHONPATH", str(folder))
+    return folder
 
 
-def common(first, second):
-    """Values of two series at the stamps that both have."""
-    _, i, j = np.intersect1d(first.stamp_ns, second.stamp_ns, return_indices=True)
-    assert len(i) > 500
-    return first.values[i], second.values[j]
+@pytest.fixture
+def package(site, monkeypatch):
+    """The package, found by what the test starts."""
+    monkeypatch.setenv("PYTHONPATH", str(site))
+
+
+@pytest.fixture(scope="module")
+def recorded(request, site, common_peer, tmp_path_factory):
+    """Recording of a session of the user; tests of the same session share it."""
+    topic, is_enough, settings, way = request.param
+    listener = common_peer.listen(topic)
+    session = LiveProcess(
+        tmp_path_factory.mktemp("session"), "--scenario", "free_motion", *way,
+        env={"ROS_DOMAIN_ID": common_peer.domain, "PYTHONPATH": str(site)},
+        settings=(*settings, "operator.approach_time=1.0"),
+    )  # fmt: skip
+
+    def has_enough():
+        assert session.process.poll() is None, session.text
+        return listener.take() and is_enough(listener)
+
+    try:
+        session.wait_running()
+        wait_until(has_enough, f"enough of {topic.name}", 300.0)
+        session.signal(signal.SIGINT)
+        assert session.wait() == 0, session.text
+        return session.recorded()
+    finally:
+        session.close()
+
+
+def common(*series):
+    """Values of some series at the stamps that all have."""
+    stamps = reduce(np.intersect1d, (one.stamp_ns for one in series))
+    assert len(stamps) > 500
+    found = [np.unique(one.stamp_ns, return_index=True) for one in series]
+    places = [index[np.searchsorted(own, stamps)] for own, index in found]
+    return [one.values[place] for one, place in zip(series, places, strict=True)]
 
 
 @pytest.mark.slow
-@both_ways
-def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(teleop, tmp_path, way):
-    delay = ("--set", "teleop.delays=[slave/servo_jp=0.05]")
-    teleop(*RUN, *delay, "--duration", 3, "--out", tmp_path / "bag", *way)
-    bag = Bag(tmp_path / "bag")
-    answers, setpoints = bag.read(topics.SLAVE_SERVO_JP), bag.read(topics.SLAVE_SETPOINT_JS)
+@late_and_helped
+def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(recorded):
+    answers, setpoints = (
+        recorded.read(topic) for topic in (topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS)
+    )
     in_force = setpoints.stamp_ns > answers.stamp_ns[0]
     latency_ms = (setpoints.log_ns - setpoints.stamp_ns)[in_force] / MS
     assert len(latency_ms) > 1000
@@ -138,38 +197,33 @@ def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(teleop, tmp_p
 
 
 @pytest.mark.slow
-@both_ways
-def test_stages_of_a_user_run_between_ours_compiled_and_plain(teleop, package, tmp_path, way):
-    stages = ("--set", "teleop.stages=[compiled_raise, plain_raise]")
-    height = ("--set", "plain_raise.height=0.003")
-    teleop(*RUN, *stages, *height, "--duration", 3, "--out", tmp_path / "bag", *way)
-    bag = Bag(tmp_path / "bag")
-    topic = Topic("slave/raised_cp", Kind.POSE)
-    asked, raised, twice = (
-        bag.read(t) for t in (topics.SLAVE_SERVO_CP, topic, Topic("slave/plain_cp", Kind.POSE))
-    )
+@late_and_helped
+def test_a_second_source_of_force_acts_beside_the_first(recorded):
+    helper = recorded.read(HELPER)
+    assert len(helper) > 500
+    # Without a fixture nothing else pushes.
+    assert not recorded.read(topics.MASTER_SERVO_CF).values.any()
+    felt = recorded.read(topics.MASTER_MEASURED_CF)
+    force = felt.values[felt.stamp_ns > helper.stamp_ns[0]]
+    assert np.median(force[:, 0]) == 0.25
+    assert not force[:, 1:].any()
+
+
+@pytest.mark.slow
+@in_between
+def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded):
+    asked, raised, twice = (recorded.read(t) for t in (topics.SLAVE_SERVO_CP, RAISED, TWICE))
     for first, second, height in ((asked, raised, 0.002), (raised, twice, 0.003)):
         before, after = common(first, second)
         before[:, 2] += height
         assert np.array_equal(before, after)
-    goals, joints = common(twice, bag.read(topics.SLAVE_SERVO_JP))
-    reached = np.array([load_robot("rcrt1").fk(q)[:3, 3] for q in joints[-100:]])
+    answers, reach = recorded.read(topics.SLAVE_SERVO_JP), recorded.read(topics.SLAVE_REACH)
+    goals, joints, limits = common(twice, answers, reach)
+    reached = np.array([load_robot("rcrt1").fk(q)[:3, 3] for q in joints])
+    off = np.abs(reached - goals[:, :3]).max(axis=1)[is_free(limits)]
+    assert len(off) > 500
     # Noise of the device is faster than the joints, which are there again some ticks later.
-    assert np.median(np.abs(reached - goals[-100:, :3]).max(axis=1)) < 1e-4
-
-
-@pytest.mark.slow
-@both_ways
-def test_a_second_source_of_force_acts_beside_the_first(teleop, package, tmp_path, way):
-    helper = ("--set", "teleop.stages=[helper]")
-    teleop(*RUN, *helper, "--duration", 3, "--out", tmp_path / "bag", *way)
-    bag = Bag(tmp_path / "bag")
-    assert bag.topics["helper/servo_cf"].count > 500
-    # Without a fixture nothing else pushes.
-    assert not bag.read(topics.MASTER_SERVO_CF).values.any()
-    force = bag.read(topics.MASTER_MEASURED_CF).values
-    assert np.median(force[:, 0]) == 0.25
-    assert not force[:, 1:].any()
+    assert np.median(off) < 1e-4
 
 
 def push(peer, first, second):

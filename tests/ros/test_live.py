@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import signal
 import threading
 import time
@@ -13,6 +14,7 @@ import pytest
 from rich.console import Console
 from rosbags.highlevel import AnyReader
 
+from live_process import wait_until
 from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import ParameterError, RecordingError, SessionError
@@ -23,6 +25,8 @@ from teleop_core.stage import STAGES
 from teleop_core.topics import STREAMS
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
+SESSION_TIMEOUT = 300.0
+"""Until a session runs, whose kernels may have to be compiled first [s]."""
 
 
 def quick(duration):
@@ -35,6 +39,11 @@ def console():
     return Console(file=io.StringIO(), width=200)
 
 
+def is_running(show):
+    """Whether a line of progress was shown: of the first second, unless the machine was busy."""
+    return re.search(r"\d/600 s  ", show.file.getvalue())
+
+
 def children(name=""):
     """Processes of nodes that this test has started."""
     found = []
@@ -45,21 +54,19 @@ def children(name=""):
     return found
 
 
-def test_a_live_session_is_recorded_on_every_topic(tmp_path):
-    show = console()
-    live(quick(3.0), tmp_path / "bag", show)
-    text = show.file.getvalue()
+def test_a_live_session_is_recorded_on_every_topic(peer, session_until, tmp_path):
+    enough = {topic.name: 1000 for topic in STREAMS}
+    bag, text = session_until(quick(600.0), lambda: peer.has_recorded(enough))
     assert all(f"{name} is ready" in text for name in STAGES)
     assert "slave" in text
     assert children() == []
-    bag = Bag(tmp_path / "bag")
     assert bag.metadata["scenario"] == "coarse_box"
     for topic in STREAMS:
         assert bag.topics[topic.name].count > 1000, topic.name
     measured = bag.read(topics.SLAVE_MEASURED_JS)
     assert (np.diff(measured.stamp_ns) > 0).all()
-    seconds = (measured.stamp_ns[-1] - measured.stamp_ns[0]) * 1e-9
-    assert seconds > 2.9
+    # One sample for each step, and none for the time that a busy machine dropped.
+    assert (np.diff(measured.stamp_ns) % 1_000_000 == 0).all()
     statuses = {report.name: report for report in bag.reports(topics.DIAGNOSTICS)}
     assert set(statuses) == set(STAGES)
     slave = statuses["slave_sim"].values
@@ -82,14 +89,13 @@ def test_a_node_that_dies_is_named_and_the_recording_is_closed(tmp_path):
     show = console()
 
     def kill_when_running():
-        while "1/30" not in show.file.getvalue():
-            time.sleep(0.05)
+        wait_until(lambda: is_running(show), "the first second", SESSION_TIMEOUT)
         children("inverse_kinematics")[0].kill()
 
     killer = threading.Thread(target=kill_when_running, daemon=True)
     killer.start()
     with pytest.raises(SessionError, match="inverse_kinematics ended with signal SIGKILL"):
-        live(quick(30.0), tmp_path / "bag", show)
+        live(quick(600.0), tmp_path / "bag", show)
     killer.join()
     assert children() == []
     assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
@@ -106,12 +112,11 @@ def test_ctrl_c_ends_a_session_with_a_closed_recording(tmp_path):
     show = console()
 
     def press_when_running():
-        while "1/30" not in show.file.getvalue():
-            time.sleep(0.05)
+        wait_until(lambda: is_running(show), "the first second", SESSION_TIMEOUT)
         os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=press_when_running, daemon=True).start()
-    live(quick(30.0), tmp_path / "bag", show)
+    live(quick(600.0), tmp_path / "bag", show)
     assert "stopped" in show.file.getvalue()
     assert children() == []
     assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
@@ -130,9 +135,10 @@ def test_play_publishes_a_recording_as_it_was(peer, recording, monkeypatch):
     assert time.monotonic() - began >= 12 / 4
     series = bag.read(topics.MASTER_MEASURED_CP)
     assert sent == 2 * len(series)
-    # Best effort may lose some on a busy machine; what came is the same.
-    assert pose.take() > 0.9 * len(series)
-    assert state.take() > 0.9 * len(series)
+    # Best effort loses some on a busy machine, as their numbers tell; what came is the same.
+    for listener in (pose, state):
+        assert listener.take() > 0
+        assert listener.take() + listener.lost > 0.9 * len(series)
     where = np.searchsorted(series.stamp_ns, pose.stamps)
     np.testing.assert_array_equal(series.stamp_ns[where], pose.stamps)
     np.testing.assert_array_equal(series.values[where], np.array(pose.values))

@@ -1,45 +1,58 @@
 """Every robot through the ROS nodes: all in live sessions, closed loops in separate processes."""
 
-import io
 import subprocess
 import sys
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from teleop_core import topics
 from teleop_core.bags.messages import layout
-from teleop_core.bags.reader import Bag
 from teleop_core.geometry import pose_from_transform, rotation, transform
 from teleop_core.nodes.children import environment
-from teleop_core.nodes.live import live
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
-SHORT = ("teleop.duration=2.0", "operator.approach_time=0.5", "operator.size=[0.02, 0.02, 0.02]")
+SHORT = ("teleop.duration=600.0", "operator.approach_time=0.5", "operator.size=[0.02, 0.02, 0.02]")
 SLAVES = [name for name in list_robots() if load_robot(name).drives is not None]
 GRID = 55e-6  # m, reading step of the Phantom Omni
 MS = 1_000_000
 
 
-def short_session(setting, folder):
-    """Recording of a live session, and joints (n,) that moved less than in virtual time.
+@pytest.fixture
+def short_session(peer, session_until):
+    """Recording of two seconds of a live session, and joints (n,) that moved less than in virtual
+    time.
 
-    Half as far is enough: a live hand waits until the slave follows.
+    Half as far is enough: a live hand waits until the slave follows. Seconds are those of the
+    slave's own steps, of which a busy machine makes fewer.
     """
-    configuration = configure("free_motion", settings=[*SHORT, setting])
-    live(configuration, folder / "bag", Console(file=io.StringIO()), is_composed=True)
-    bag, session = Bag(folder / "bag"), VirtualTime(configuration)
-    measured, wanted = bag.read(topics.SLAVE_MEASURED_JS), session.run(2000)["slave_measured_js"]
-    assert measured.names == session.joint_names[""]
-    travel, wanted_travel = (
-        np.ptp(rows[:, : len(measured.names)], axis=0) for rows in (measured.values, wanted)
-    )
-    assert wanted_travel.max() > 1e-3
-    return bag, travel < 0.5 * wanted_travel
+
+    def run(setting):
+        configuration = configure("free_motion", settings=[*SHORT, setting])
+        begin = None
+
+        def has_led():
+            nonlocal begin
+            master, slave = peer.status("haptic_master"), peer.status("slave_sim")
+            if begin is None and master and slave and master.number("has_begun"):
+                begin = slave.number("ticks")
+            return begin is not None and slave.number("ticks") > begin + 2000
+
+        bag, _ = session_until(configuration, has_led, is_composed=True)
+        session = VirtualTime(configuration)
+        measured = bag.read(topics.SLAVE_MEASURED_JS)
+        wanted = session.run(2000)["slave_measured_js"]
+        assert measured.names == session.joint_names[""]
+        travel, wanted_travel = (
+            np.ptp(rows[:, : len(measured.names)], axis=0) for rows in (measured.values, wanted)
+        )
+        assert wanted_travel.max() > 1e-3
+        return bag, travel < 0.5 * wanted_travel
+
+    return run
 
 
 def off_grid(bag):
@@ -49,14 +62,14 @@ def off_grid(bag):
 
 
 @pytest.mark.parametrize("name", SLAVES)
-def test_every_slave_follows_the_hand_through_a_live_session(name, tmp_path):
-    bag, is_short = short_session(f"robot={name}", tmp_path)
+def test_every_slave_follows_the_hand_through_a_live_session(short_session, name):
+    bag, is_short = short_session(f"robot={name}")
     assert not is_short.any()
     assert off_grid(bag) < 1e-6
 
 
-def test_the_mma_leads_a_live_session_with_its_own_encoders(tmp_path):
-    bag, is_short = short_session("device.handle=mma", tmp_path)
+def test_the_mma_leads_a_live_session_with_its_own_encoders(short_session):
+    bag, is_short = short_session("device.handle=mma")
     assert not is_short.any()
     assert off_grid(bag) > 0.1
 
