@@ -297,6 +297,14 @@ def test_a_person_moves_the_slave_while_they_hold_the_stylus_and_not_else(tmp_pa
     assert max(stylus[1], slave[1]) < 0.2
 
 
+def test_who_sees_the_slave_later_takes_longer_to_the_goal(tmp_path):
+    delays, times = zip(
+        *re.findall(r"seen +(\d+) ms late: ([\d.]+) s", run("step_by_step", tmp_path)), strict=True
+    )
+    assert delays == ("0", "200", "400")
+    assert 1.0 < float(times[0]) < float(times[1]) < float(times[2])
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_example_needs_the_public_api_alone(name):
     tree = ast.parse((EXAMPLES / f"{name}.py").read_text(encoding="utf-8"))

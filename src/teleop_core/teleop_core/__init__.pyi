@@ -27,6 +27,7 @@ from .exchange import (
     export_recording as export_recording,
     import_recording as import_recording,
 )
+from .experiments import Experiment as Experiment, register_experiment as register_experiment
 from .fitting import FitError as FitError, FitResult as FitResult, fit_plant as fit_plant
 from .fixtures import Fixture as Fixture, register_fixture as register_fixture
 from .graph import Graph as Graph, build_graph as build_graph
@@ -49,7 +50,9 @@ from .robots import (
     robot_from_table as robot_from_table,
 )
 from .robots.parameters import RobotParameters as RobotParameters
-from .stage import Stage as Stage, register_stage as register_stage
+from .session.configuration import Configuration as Configuration
+from .session.virtual import VirtualTime as VirtualTime
+from .stage import Runner as Runner, Stage as Stage, register_stage as register_stage
 from .topics import Kind as Kind, Topic as Topic
 
 __version__: str

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teleop_core.errors import PartError
 from teleop_core.graph import BUILT_IN
@@ -10,7 +11,7 @@ from teleop_core.kernels import records
 from teleop_core.operators import insist_on_virtual
 from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration
-from teleop_core.signals import TICK_NS
+from teleop_core.signals import TICK_NS, assign
 from teleop_core.stage import Runner, joints_of
 from teleop_core.topics import Topic
 
@@ -19,7 +20,10 @@ BLOCK = 1000
 
 
 class VirtualTime:
-    """A session in virtual time.
+    """A session in virtual time, to be run, or to be stepped by a program of yours.
+
+    Between two ticks the program may read the row of the last one, lead the hand
+    (:class:`~teleop_core.operators.remote.RemoteHand`), and command or retune the stages.
 
     Args:
         configuration: What runs.
@@ -52,7 +56,9 @@ class VirtualTime:
         self._dtype = block_dtype(self.graph, joints)
         self._ahead = min([BLOCK, *(stage.ahead for stage in self.stages.values())])
         self._rings: Rings = {}
+        self._begin = {name: stage.signals.copy() for name, stage in self.stages.items()}
         self._tick = self._composed()
+        self._empty = {place: ring.copy() for place, ring in self._rings.items()}
         self.now_ns = 0
 
     def _composed(self) -> Tick:
@@ -88,22 +94,43 @@ class VirtualTime:
         members = [m for m in self.graph.members if m.name in self._played]
         return tuple(topic for member in members for topic in member.writes)
 
-    def rows(self, count: int) -> Any:
+    def rows(self, count: int) -> NDArray[np.void]:
         """Rows (count,) of everything that happens in a tick, all zero."""
-        return records(self._dtype, count)
+        rows: NDArray[np.void] = records(self._dtype, count)
+        return rows
 
-    def run(self, ticks: int) -> Any:
+    def run(self, ticks: int) -> NDArray[np.void]:
         """Next ``ticks`` ticks of the session.
 
         Returns:
             Rows (ticks,): ``now_ns``, the fields and stamps of all topics, and the stages' notes.
+            A field is called as its topic, ``slave_measured_cp`` of ``slave/measured_cp``, with
+            the topic's columns in SI units; ``slave_measured_cp_ns`` is its stamp.
 
         Raises:
             TeleopError: A part cannot go on, or writes NaN.
         """
         return self._run(ticks, None)
 
-    def replay(self, samples: Any) -> Any:
+    def step(self) -> np.void:
+        """Next tick: its row, as of :meth:`run`, to the same bits."""
+        row: np.void = self._run(1, None)[0]
+        return row
+
+    def reset(self) -> None:
+        """Back to before the first tick, so that the session repeats itself to the bit.
+
+        Parameters that were changed since stay changed; a stage of your own begins anew as far as
+        its ``reset`` does.
+        """
+        for name, stage in self.stages.items():
+            assign(stage.signals, self._begin[name])
+            stage.reset()
+        for place, ring in self._rings.items():
+            ring[:] = self._empty[place]
+        self.now_ns = 0
+
+    def replay(self, samples: NDArray[np.void]) -> NDArray[np.void]:
         """Ticks with recorded samples in place of the simulated masters.
 
         Args:
@@ -116,7 +143,7 @@ class VirtualTime:
         self.now_ns = int(samples["now_ns"][0]) - self._tick_ns
         return self._run(len(samples), samples)
 
-    def _run(self, ticks: int, samples: Any) -> Any:
+    def _run(self, ticks: int, samples: NDArray[np.void] | None) -> NDArray[np.void]:
         block = self.rows(ticks)
         if self._is_stale():
             self._tick = self._composed()
