@@ -9,6 +9,7 @@ from pathlib import Path
 from browser import until
 
 STARTS = 180.0  # s; kernels may have to be compiled
+ENDS = 120.0  # s; a session gives its nodes 35 to end in order, then its recorder as many
 
 
 class ConsoleProcess:
@@ -37,7 +38,7 @@ class ConsoleProcess:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         try:
-            return self.process.wait(60)
+            return self.process.wait(ENDS)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

@@ -10,6 +10,7 @@ from contextlib import ExitStack, suppress
 import msgspec
 from websockets.frames import Frame, Opcode
 
+from browser import until
 from page_client import CAMERA, PageClient, ask
 
 NAN, INF = math.nan, math.inf
@@ -161,11 +162,13 @@ def sends_one_message_that_is_too_large(watcher, driver):
 
 
 def floods_with_drags(watcher, driver):
-    for _ in range(20_000):
-        watcher.drag()
-        if watcher.is_cut:
-            return
-    raise AssertionError("a flood was let in")
+    def is_cut():
+        for _ in range(500):
+            watcher.drag()
+        return watcher.is_cut
+
+    # On a busy machine a page says thousands before the server comes to read the first of them.
+    until(is_cut, "the flood is cut off", 60.0)
 
 
 def floods_with_pings(watcher, driver):
