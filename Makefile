@@ -15,7 +15,8 @@ setup: $(VENV)/.installed
 $(VENV)/.installed: constraints.txt src/teleop_core/setup.py
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	    -c constraints.txt -e 'src/teleop_core[ros,console,test]'
+	    -c constraints.txt --config-settings editable_mode=compat \
+	    -e 'src/teleop_core[ros,console,test]'
 	touch $@
 
 # CRTK's messages, which PyPI does not have; without a compiler they are left out, with a word.
