@@ -69,7 +69,7 @@ class Tab(Headless):
         self.call("Page.reload")
         self.until("!window.isOld && document.querySelector('canvas')")
 
-    def shows(self, text, seconds=20):
+    def shows(self, text, seconds=60):
         """Wait until a text can be read on the page."""
         self.until(f"document.body.innerText.includes({json.dumps(text)})", seconds)
 
@@ -90,7 +90,7 @@ class Tab(Headless):
             const find = () => [...document.querySelectorAll(
                 'button, [role], label, a, input, span, p')].filter(
                     (e) => said(e) === {json.dumps(text)} && e.getClientRects().length).at(-1);
-            const end = performance.now() + 30000;
+            const end = performance.now() + 60000;
             for (let last = '', rests = 0; performance.now() < end;) {{
                 await new Promise(requestAnimationFrame);
                 const element = find();
@@ -196,7 +196,7 @@ class Tab(Headless):
             self.answers[told["response"]["url"]] = told["response"]["status"]
 
 
-def until(condition, what, seconds=20.0):
+def until(condition, what, seconds=60.0):
     """Result of a condition as soon as it is true; for what happens outside of the browser."""
     end = time.monotonic() + seconds
     while not (result := condition()):

@@ -55,7 +55,7 @@ def ready(tab):
     tab.until("/ENABLED|PAUSED/.test(document.body.innerText)")
     if tab.value("document.body.innerText.includes('PAUSED')"):
         tab.click("Start")
-    tab.shows("ENABLED, homed", 60)
+    tab.shows("ENABLED, homed", 120)
 
 
 def arrow(tab, axis, way=PULLED):
@@ -163,7 +163,7 @@ def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page, console, 
         other.until(f"{DRIVER} !== '{driver}'")
         ready(other)
         pull(other, 0, -PULLED)
-    page.shows("clutched", 30)
+    page.shows("clutched")
     page.click("Take control")
     page.until(f"{DRIVER} === '{driver}'")  # only who drives may save
     saved(page, console, "closed")
