@@ -161,10 +161,9 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer):
     pose = np.array([0.01, -0.06, -0.08, 0.8, 0.0, 0.6, 0.0])
     stamp = 0
 
-    def sent(is_foreign):
+    def send(is_foreign):
         nonlocal stamp
         stamp += MS
-        before = answers.take()
         peer.send(topics.SLAVE_SETPOINT_CP, 1, where)
         if is_foreign:
             message = write_values(
@@ -173,14 +172,20 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer):
             publisher.publish(message)
         else:
             peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
-        return answers.take() > before
 
-    peer.wait(lambda: sent(False), "answer to ours")
-    peer.wait(lambda: sent(False) and len(answers.stamps) > 3, "engaged")
-    ours = answers.values[-1]
-    peer.wait(lambda: sent(True), "answer to the foreign one")
-    peer.wait(lambda: answers.take() and answers.stamps[-1] > stamp - MS, "all answers")
-    np.testing.assert_allclose(answers.values[-1], ours, atol=1e-12)
+    def answer(is_foreign):
+        """Answer to one of the samples that are sent from now on, but the first few."""
+        first = stamp + 4 * MS
+
+        def has_come():
+            send(is_foreign)
+            return answers.take() and answers.stamps[-1] >= first
+
+        peer.wait(has_come, f"answer, foreign: {is_foreign}")
+        return answers.values[-1]
+
+    ours = answer(is_foreign=False)
+    np.testing.assert_allclose(answer(is_foreign=True), ours, atol=1e-12)
 
 
 def chain(peer, master=STEADY):
