@@ -10,6 +10,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -294,26 +295,28 @@ class Peer:
         return self.call(SetParameters, f"/{name}/set_parameters", request).results  # type: ignore[no-any-return]
 
 
-@pytest.fixture
-def peer(tmp_path: Path) -> Iterator[Peer]:
-    """A peer on a ROS domain that nobody else uses; the nodes it started end with the test."""
+@contextmanager
+def _made_peer() -> Iterator[Peer]:
     with tempfile.TemporaryDirectory() as folder:
         made = Peer(Path(folder))
         try:
             yield made
         finally:
             made.close()
+
+
+@pytest.fixture
+def peer() -> Iterator[Peer]:
+    """A peer on a ROS domain that nobody else uses; the nodes it started end with the test."""
+    with _made_peer() as made:
+        yield made
 
 
 @pytest.fixture(scope="module")
 def common_peer() -> Iterator[Peer]:
     """A peer that the tests of a file share."""
-    with tempfile.TemporaryDirectory() as folder:
-        made = Peer(Path(folder))
-        try:
-            yield made
-        finally:
-            made.close()
+    with _made_peer() as made:
+        yield made
 
 
 @pytest.fixture
