@@ -8,16 +8,22 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup crtk_msgs demo test test-slow coverage lint format bench bench-setup endurance fuzz drill-mutants flaky clean
+.PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format bench bench-setup endurance fuzz drill-mutants flaky clean
 
 setup: $(VENV)/.installed
 
+# Python compiles a module when it is first imported: most of them never are.
 $(VENV)/.installed: constraints.txt src/teleop_core/setup.py
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check \
 	    -c constraints.txt --config-settings editable_mode=compat \
 	    -e 'src/teleop_core[ros,console,test]'
+	$(BIN)/teleop compile
 	touch $@
+
+# A wheel for every processor, and one with compiled kernels for x86-64 and the venv's Python.
+wheel: setup
+	$(BIN)/python src/teleop_core/build_wheels.py $(OUT)/wheels
 
 # CRTK's messages, which PyPI does not have; without a compiler they are left out, with a word.
 crtk_msgs: setup
@@ -44,18 +50,32 @@ format: setup
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# Live nodes need the processors for themselves, and come last, when the kernels are compiled. In a
-# worker a crash of the middleware inside a test costs that test, not the run; it is run again, which
-# files that stay together would not allow. Elsewhere the tests of a file stay together: what they
-# compile, one process does.
+# Live tests come last, when the kernels are compiled; most of them wait, so that two run at a time,
+# but those alone that need both processors. In a worker a crash of the middleware inside a test
+# costs that test, not the run; it is run again, which files that stay together would not allow:
+# stolen work allows it, and keeps nearly all tests of a file, and the session they share, in one
+# process. Elsewhere the tests of a file stay together: what they compile, one process does. All
+# parts run, whatever fails: one run tells all that is wrong.
+CORE := $(BIN)/pytest -n 2 --dist loadfile
+LIVE := $(BIN)/pytest -n 2 --dist worksteal tests/ros
+ALONE := $(BIN)/pytest -n 1 tests/ros
 test: lint crtk_msgs
-	$(BIN)/pytest -n 2 --dist loadfile -m "not ros and not slow"
-	$(BIN)/pytest -n 1 -m "ros and not slow"
+	@code=0; set -x; \
+	$(CORE) -m "not ros and not slow" || code=1; \
+	$(LIVE) -m "ros and not slow" || code=1; \
+	exit $$code
 
 # Those that take longer than five seconds each; CI runs both.
 test-slow: setup crtk_msgs
-	$(BIN)/pytest -n 2 --dist loadfile -m "slow and not ros"
-	$(BIN)/pytest -n 1 -m "slow and ros"
+	@code=0; set -x; \
+	$(CORE) -m "slow and not ros and not soak" || code=1; \
+	$(LIVE) -m "ros and slow and not alone and not soak" || code=1; \
+	$(ALONE) -m "ros and alone and not soak" || code=1; \
+	exit $$code
+
+# Long tests whose law a shorter one tests in CI with another case; a quarter of an hour.
+soak: setup crtk_msgs
+	$(ALONE) -m soak
 
 # Broken files, texts and messages, other ones each time; an hour. The tests have a short form of it.
 FUZZ_CASES ?= 1000000

@@ -202,12 +202,12 @@ def compare(seconds: float) -> None:
         ("bare sleep loop, lateness", lambda: lateness(min(seconds, 10.0))),
         ("bare relay chain, typed, reliable", lambda: chain(seconds, "typed")),
         ("bare relay chain, raw, best effort", lambda: chain(seconds, "raw")),
-        ("five nodes in five processes", lambda: live(seconds)),
+        ("six nodes in six processes", lambda: live(seconds)),
         ("the same, real_time.priority=50", lambda: live(seconds, *_FIFO)),
-        ("five nodes composed", lambda: live(seconds, "--composed")),
+        ("six nodes composed", lambda: live(seconds, "--composed")),
         ("the same, real_time.priority=50", lambda: live(seconds, "--composed", *_FIFO)),
-        ("five processes, a busy process beside", lambda: live(seconds)),
-        ("five nodes composed, a busy process beside", lambda: live(seconds, "--composed")),
+        ("six processes, a busy process beside", lambda: live(seconds)),
+        ("six nodes composed, a busy process beside", lambda: live(seconds, "--composed")),
     ):
         beside = subprocess.Popen([sys.executable, "-c", spin]) if "busy" in name else None
         found = run()

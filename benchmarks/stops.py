@@ -1,6 +1,6 @@
 """Emergency stops of running sessions: time from the message to the first setpoint that is still.
 
-    python benchmarks/stops.py --count 100                   # composed and in five processes
+    python benchmarks/stops.py --count 100                   # composed and in processes
     python benchmarks/stops.py --count 100 --load 4          # beside four busy processes
 
 A button as anybody would write it (std_msgs/Bool, no priority) is pressed at random times while

@@ -26,15 +26,17 @@ def main(duration: float = 46.0) -> None:
     print(f"{'law':22} {'RMS':>7} {'max':>7}  effort jumps by (RMS of a tick)")
     for law, what in LAWS.items():
         recording = tc.run("coarse_box", duration=duration, plant="hardware", controller=law)
-        follows = recording["slave/setpoint_cp"].stamp_ns > 0
+        # A measured pose is told a tick after the setpoint that it was sampled with.
         wanted, seen = (
-            recording[topic][["x", "y", "z"]][follows]
-            for topic in ("slave/setpoint_cp", "slave/measured_cp")
+            recording["slave/setpoint_cp"].part(slice(-1)),
+            recording["slave/measured_cp"],
         )
-        error = 1e6 * np.linalg.norm(seen - wanted, axis=1)
+        follows = wanted.stamp_ns > 1
+        places = ["x", "y", "z"]
+        error = 1e6 * np.linalg.norm(seen[places][1:] - wanted[places], axis=1)[follows]
         joints = recording["slave/measured_js"]
         names = [name for name in joints.columns if name.endswith(".effort")]
-        jumps = np.diff(joints[names][follows] / drives.effort_limit, axis=0)
+        jumps = np.diff(joints[names][:-1][follows] / drives.effort_limit, axis=0)
         rms, jump = np.sqrt(np.mean(error**2)), 100.0 * np.sqrt(np.mean(jumps**2))
         print(f"{law:22} {rms:4.0f} µm {error.max():4.0f} µm  {jump:4.1f} % of the limit   {what}")
 

@@ -1,6 +1,6 @@
 """A CRTK client with rclpy alone: waits for an arm, moves its tip by 10 mm, and comes back.
 
-Start an arm first, ``teleop live --composed --out bags/crtk`` or ``ros2 run teleop_core slave_sim``
+Start an arm first, ``teleop live --composed --out bags/crtk`` or ``ros2 run teleop_core slave``
 on the same ROS domain, and make CRTK's messages if ROS does not bring them: ``make crtk_msgs``.
 """
 

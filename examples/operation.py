@@ -11,7 +11,7 @@ def main() -> None:
     events = ("stop@3.0", "reset@4.0", "enable@4.1", "pause@6.0", "resume@6.5")
     recording = tc.run(
         "free_motion", duration=8.0,
-        settings={"operation.events": events, "slave_sim.starts_at_home": True},
+        settings={"operation.events": events, "slave.starts_at_home": True},
     )  # fmt: skip
     setpoint = recording["slave/setpoint_cp"]
     times = 1e-9 * setpoint.log_ns

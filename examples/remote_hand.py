@@ -28,7 +28,7 @@ class Dragging:
 
 def main() -> None:
     """Print how far stylus and slave went while held, let go, and held again."""
-    settings = {"haptic_master.device.friction": 0.0, "slave_sim.starts_at_home": True}
+    settings = {"haptic_master.device.friction": 0.0, "slave.starts_at_home": True}
     recording = tc.run(
         operator=tc.remote_operator("dragging", Dragging()), duration=6.5, settings=settings
     )

@@ -2,7 +2,7 @@
 
 Start the rest of the graph first, in other terminals or in the background::
 
-    motion_scaling & inverse_kinematics & slave_sim &
+    motion_scaling & inverse_kinematics & slave & slave_sim &
 
 The device needs no part of this package, only the topics: it sends its pose and its buttons, and
 gets the force that it should apply. It rests until teleop/state says that the slave, which moves to
@@ -71,7 +71,7 @@ def main() -> int:
     while device.ticks * 0.002 < SECONDS:
         rclpy.spin_once(device, timeout_sec=0.1)
         if device.ticks == 0 and device.get_clock().now().nanoseconds - begin > 60e9:
-            print("nobody follows: start motion_scaling, inverse_kinematics and slave_sim first")
+            print("nobody follows: start the rest of the graph first, as this file says")
             return 1
     width = max(device.seen) - min(device.seen)
     print(f"slave: {1e3 * width:.1f} mm wide; {device.forces} forces for {device.ticks} samples")

@@ -4,12 +4,12 @@ import json
 import os
 import shutil
 import socket
-import time
 
 import numpy as np
 import pytest
 
 from headless import Headless
+from patience import wait_until
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
@@ -198,11 +198,7 @@ class Tab(Headless):
 
 def until(condition, what, seconds=60.0):
     """Result of a condition as soon as it is true; for what happens outside of the browser."""
-    end = time.monotonic() + seconds
-    while not (result := condition()):
-        assert time.monotonic() < end, f"not within {seconds} s: {what}"
-        time.sleep(0.01)
-    return result
+    return wait_until(condition, what, seconds)
 
 
 def handshake(port, path="/", **headers):

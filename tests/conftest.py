@@ -3,7 +3,7 @@
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,29 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 pytest_plugins = ["forgotten_parts", "middleware_faults"]
+
+LIVE = Path(__file__).parent / "ros"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Insist that live tests are where they are looked for, and that a soak test counts as slow."""
+    for item in items:
+        if item.get_closest_marker("ros") and LIVE not in item.path.parents:
+            raise pytest.UsageError(f"{item.nodeid}: tests of live nodes belong into tests/ros")
+        if item.get_closest_marker("soak"):
+            item.add_marker(pytest.mark.slow)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Let a skipped test that gives no reason fail; reasons are told at the end of the run."""
+    report = yield
+    if report.skipped and isinstance(report.longrepr, tuple):
+        reason = report.longrepr[2].removeprefix("Skipped").removeprefix(": ")
+        if not reason.strip() or reason == "unconditional skip":
+            report.outcome, report.longrepr = "failed", f"{item.nodeid} is skipped without a reason"
+    return report
+
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 ROOT = Path(__file__).parents[1]
+LIVE = "ros and not soak and not alone"
 
 
 def run(arguments: list[str], report: Path) -> dict[str, str]:
@@ -42,7 +43,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=20, help="how often")
     parser.add_argument("--busy", type=int, default=os.cpu_count(), help="busy processes beside it")
     given, rest = parser.parse_known_args()
-    chosen = rest or ["-n", "1", "-m", "ros and not slow"]
+    chosen = rest or ["-n", "2", "--dist", "worksteal", "-m", LIVE, "tests/ros"]
     busy = [subprocess.Popen([sys.executable, "-c", "while 1: pass"]) for _ in range(given.busy)]
     ran, failed = Counter[str](), Counter[str]()
     try:

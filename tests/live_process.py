@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import psutil
 
+import patience
 from teleop_core.bags.reader import Bag
 from teleop_core.nodes.chances import Chances
 
@@ -84,7 +85,8 @@ class LiveProcess:
 
     def wait(self, timeout: float = TIMEOUT) -> int:
         """Exit code."""
-        return self.process.wait(timeout)
+        wait_until(lambda: self.process.poll() is not None, "end of teleop live", timeout)
+        return self.process.returncode
 
     def recorded(self) -> Bag:
         """Recording, which must have been closed."""
@@ -100,11 +102,7 @@ class LiveProcess:
 
 def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
     """Result of ``condition`` as soon as it is true."""
-    deadline = time.monotonic() + timeout
-    while not (result := condition()):
-        assert time.monotonic() < deadline, f"not within {timeout} s: {what}"
-        time.sleep(0.01)
-    return result
+    return patience.wait_until(condition, what, timeout)
 
 
 class WorkingTime:

@@ -55,8 +55,8 @@ def _mutant(
     return Mutant(name, text, ((file, before, after),), rows, composed)
 
 
-_SLAVE, _COMMANDS, _WATCH = "nodes/slave_sim.py", "slave/commands.py", "operation/watch.py"
-_RECORDER, _STAGE, _STEP = "nodes/recorder.py", "slave/slave_sim.py", "slave/step.py"
+_SLAVE, _COMMANDS, _WATCH = "nodes/slave.py", "slave/commands.py", "operation/watch.py"
+_RECORDER, _STAGE, _STEP = "nodes/recorder.py", "slave/slave.py", "slave/step.py"
 _RELEASED = """            self.request(Event.STOP)
         elif self.state["state"] == State.FAULT:
             self.request(Event.RESET)
@@ -122,10 +122,13 @@ MUTANTS = (
     _mutant("tip_off", "no tip is too far from its setpoint", _WATCH,
             "if not square <= p.tip_error * p.tip_error:", "if not square <= 1e9:", "stuck_tip"),
     _mutant("effort_off", "no drive is at its limit for too long", _WATCH,
-            "> p.effort_ticks:", "> 10**9:", "stuck_effort"),
+            "> p.effort_ns:", "> 10**18:", "stuck_effort"),
     _mutant("stall_unnoticed", "a loop that stood still goes on", _SLAVE,
-            "if 0.0 < longest < missed:", "if 0.0 < longest < missed - 1e9:", "freeze_slave_sim",
+            "if 0.0 < longest < missed:", "if 0.0 < longest < missed - 1e9:", "freeze_slave",
             composed=("freeze_session",)),
+    _mutant("silent_arm", "an arm that says nothing is at rest", _WATCH,
+            "if silence_ns > p.silence_ns:", "if silence_ns > 10**18:", "freeze_slave_sim",
+            composed=()),
     _mutant("clock_unnoticed", "a stepped clock is none", _SLAVE,
             "> _CLOCK_STEP_NS:", "> 10**30:", "clock_ahead", "clock_back"),
     _mutant("second_publishers", "messages of all publishers are taken", "nodes/sender.py",
@@ -139,7 +142,7 @@ MUTANTS = (
             "teleport", "infinite"),
     _mutant("buttons_forgotten", "silent buttons are released ones", "mapping/plausibility.py",
             "return bool(s.is_lost)", "return False", "buttons_silent"),
-    _mutant("measured_lies", "the arm measures half of what it moves", _STEP,
+    _mutant("measured_lies", "the arm measures half of what it moves", "slave/simulation.py",
             "row.slave_measured_js[i] = s.measured[i]",
             "row.slave_measured_js[i] = 0.5 * s.measured[i]", "loss"),
     _mutant("recorder_late", "the recorder holds messages for 2 s", _RECORDER,

@@ -8,6 +8,7 @@ NODES = (
     "haptic_master",
     "motion_scaling",
     "inverse_kinematics",
+    "slave",
     "slave_sim",
     "recorder",
     "teleop_session",
@@ -34,6 +35,7 @@ setup(
             "console/page.js",
             "evaluation/report/*",
             "fitting/*.csv",
+            "kernels/compiled/**/*.nb?",
             "nodes/profiles/*.xml",
         ]
     },

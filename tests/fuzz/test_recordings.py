@@ -112,6 +112,7 @@ def chunks(draw) -> tuple[str, bytes]:
     return name, draw(damaged(draw(st.sampled_from(PACKED[name])), most=2))
 
 
+@pytest.mark.slow
 @fuzz("chunks", chunk=chunks(), size=SIZES)
 def test_any_chunk_is_unpacked_to_its_size_or_refused(chunk, size):
     name, data = chunk

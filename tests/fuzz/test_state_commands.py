@@ -1,12 +1,13 @@
 """State commands in any order, beside ticks and faults: flags agree, and nothing moves unasked."""
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 
 from fuzzing import fuzz
 from teleop_core.operation import Fault, OperationParameters, State
 from teleop_core.operation.states import COMMANDS
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 WORDS = st.one_of(
     st.sampled_from(COMMANDS), st.text(max_size=20), st.sampled_from([f for f in Fault if f]),
@@ -16,7 +17,7 @@ WORDS = st.one_of(
 
 
 def arm(standstill):
-    return SlaveSim(SlaveSimParameters(
+    return SimulatedArm(ArmParameters(
         robot="planar_3r", starts_at_home=True,
         operation=OperationParameters(standstill=standstill, longest_outage=0.15),
     ))  # fmt: skip
@@ -32,11 +33,11 @@ def play(slave, words):
     for word in words:
         ticks = word if isinstance(word, int) and not isinstance(word, bool | Fault) else 1
         if isinstance(word, str):
-            slave.request(word)
+            slave.server.request(word)
         elif isinstance(word, Fault):
-            slave.fail(word, 1.0, 0.5)
+            slave.server.fail(word, 1.0, 0.5)
         elif isinstance(word, bool):
-            slave.press(is_pressed=word, now_ns=ns)
+            slave.server.press(is_pressed=word, now_ns=ns)
         for _ in range(ticks):
             ns += 10**6
             before = np.array(row["slave_setpoint_js"])
@@ -44,7 +45,7 @@ def play(slave, words):
             if isinstance(word, float):
                 row["slave_servo_jp"], row["slave_servo_jp_ns"] = slave.robot.home + word, ns
             slave.step()
-            values = slave.operation
+            values = slave.server.operation
             state = State(int(values["state"]))
             assert not values["is_stopped"] or state is State.FAULT
             assert not values["is_busy"] or state is State.ENABLED
@@ -52,6 +53,7 @@ def play(slave, words):
             assert (step <= reach * (1 + 1e-9)).all()
 
 
+@pytest.mark.slow
 @fuzz("state commands", words=st.lists(WORDS, max_size=12), standstill=st.sampled_from(list(ARMS)))
 def test_any_words_leave_flags_that_agree_and_a_setpoint_within_its_limits(words, standstill):
     slave = ARMS[standstill]

@@ -7,7 +7,7 @@ from teleop_core.operation import OperationParameters, State
 from teleop_core.operation.faults import Fault
 from teleop_core.operation.states import COMMANDS
 from teleop_core.plants import PLANTS
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 TICK_NS = 1_000_000
 SEQUENCES = 100_000
@@ -21,7 +21,7 @@ class Chaos:
 
     def __init__(self, robot, seed):
         self.rng = np.random.default_rng(seed)
-        self.slave = SlaveSim(SlaveSimParameters(
+        self.slave = SimulatedArm(ArmParameters(
             robot=robot, starts_at_home=True,
             operation=OperationParameters(
                 longest_outage=0.15, standstill=("hold", "brake")[seed % 2], heartbeat=0.0
@@ -62,7 +62,7 @@ class Chaos:
         rng, n = self.rng, self.slave.robot.n
         kind = rng.integers(9)
         if kind == 0:
-            self.slave.request(str(rng.choice(COMMANDS)))
+            self.slave.server.request(str(rng.choice(COMMANDS)))
         elif kind == 1:
             self.tick(self.goal + rng.normal(size=n) * 10.0 ** rng.uniform(-6, 12))
         elif kind == 2:
@@ -74,20 +74,20 @@ class Chaos:
                 self.tick()
         elif kind == 5:
             fault = Fault(int(rng.integers(1, len(Fault))))
-            self.slave.fail(fault, float(rng.uniform(0, 10)), 1.0)
+            self.slave.server.fail(fault, float(rng.uniform(0, 10)), 1.0)
         elif kind == 6:
-            self.slave.press(is_pressed=bool(rng.integers(2)), now_ns=self.ns)
+            self.slave.server.press(is_pressed=bool(rng.integers(2)), now_ns=self.ns)
         elif kind == 7:
             self.ns += int(rng.integers(0, 2 * 10**8))  # the loop stood still
         else:
-            self.slave.arm.dq[:] += rng.normal(size=n) * self.reach * 100.0  # a blow
+            self.slave.simulated.arm.dq[:] += rng.normal(size=n) * self.reach * 100.0  # a blow
 
     def recover(self):
         """Do what a person does to go on."""
-        self.slave.press(is_pressed=False, now_ns=self.ns)
+        self.slave.server.press(is_pressed=False, now_ns=self.ns)
         for word in ("reset", "enable", "resume", "home"):
             if word != "home" or not self.row["slave_operation"][1]:
-                self.slave.request(word)
+                self.slave.server.request(word)
             self.tick()
 
 

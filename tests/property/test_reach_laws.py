@@ -121,6 +121,7 @@ def test_a_hand_that_turns_back_from_beyond_reach_moves_the_slave_at_once(robot,
     assert np.linalg.norm(place - wanted) < MICROMETRE
 
 
+@pytest.mark.slow
 def test_those_ways_lead_beyond_reach_through_joints_and_the_workspace():
     limits = set()
     for robot in ("rcrt1", "puma560"):
@@ -207,7 +208,7 @@ def setpoints(stamps_ns, **values):
 
     The reference filter, which lags behind any master, is off.
     """
-    values = {"slave_sim.reference_filter.is_on": False} | values
+    values = {"slave.reference_filter.is_on": False} | values
     session = VirtualTime(configuration(settings=values), is_replay=True)
     rows = np.concatenate(list(replayed_blocks(session, master_bag(stamps_ns))[0]))
     last = rows["now_ns"][-1] - stamps_ns[-1]
@@ -224,7 +225,7 @@ def every(period_ns, end_ns=4_000_000_000):
 def test_a_slow_master_costs_one_of_its_periods_and_no_more(rate_hz, interpolation):
     times, fast = setpoints(every(TICK_NS))
     period = 1.0 / rate_hz
-    kind = {"slave_sim.interpolation": interpolation}
+    kind = {"slave.interpolation": interpolation}
     slow_times, slow = setpoints(every(round(period * 1e9)), **kind)
     after = slow_times >= max(times[0], slow_times[0])
     same = np.stack([np.interp(slow_times[after], times, c) for c in fast.T], axis=1)

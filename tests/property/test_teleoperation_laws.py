@@ -318,7 +318,7 @@ def test_restarting_at_rest_moves_nothing_at_all(seed, at, what):
     if what in {"scaling", "both"}:
         session.stages["motion_scaling"].reset()
     if what in {"ik", "both"}:
-        setpoint = session.stages["slave_sim"].signals["slave_setpoint_js"]
+        setpoint = session.stages["slave"].signals["slave_setpoint_js"]
         session.stages["inverse_kinematics"].arguments[2].seed[:] = setpoint
     after = session.run(200)
     assert np.abs(after["slave_servo_cp"] - before["slave_servo_cp"]).max() <= 1e-12

@@ -10,7 +10,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rich.console import Console
 
+import patience
 from live_process import has_recorded
 from middleware_faults import MiddlewareLossError, check_end
 from teleop_core.bags.messages import discover, layout
@@ -36,8 +37,11 @@ from teleop_core.nodes.live import live
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
+from teleop_core.parameters import specs
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import Configuration
+from teleop_core.slave.slave import SlaveParameters
+from teleop_core.slave.slave_sim import SlaveSimParameters
 from teleop_core.stage import STAGES
 from teleop_core.topics import Topic
 
@@ -53,11 +57,7 @@ JOINTS = load_robot("rcrt1").joint_names
 
 def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
     """Result of ``condition`` as soon as it is true."""
-    deadline = time.monotonic() + timeout
-    while not (result := condition()):
-        assert time.monotonic() < deadline, f"not within {timeout} s: {what}"
-        time.sleep(0.002)
-    return result
+    return patience.wait_until(condition, what, timeout, pause=0.002)
 
 
 class Listener:
@@ -131,9 +131,17 @@ class NodeProcess:
         Raises:
             MiddlewareCrashError: That is how it ended.
         """
-        code = self.process.wait(timeout)
+        wait_until(lambda: self.process.poll() is not None, f"end of {self.name}", timeout)
+        code = self.process.returncode
         check_end(self.name, code, self.stderr.read_text(errors="replace"))
         return code
+
+
+def _is_of_arm(key: str) -> bool:
+    """Whether a parameter, with double underscores for dots, is that of a simulated arm alone."""
+    name = key.replace("__", ".")
+    mine, its = ({spec.name for spec in specs(g)} for g in (SlaveParameters, SlaveSimParameters))
+    return name in its - mine
 
 
 class Peer:
@@ -178,13 +186,20 @@ class Peer:
 
     def start(
         self, name: str, wait: str = "active", arm: str = "", env: Mapping[str, str] | None = None,
-        **parameters: Any,
+        has_arm: bool = True, **parameters: Any,
     ) -> NodeProcess:  # fmt: skip
         """Start a node; double underscores in names stand for dots.
 
-        A slave starts at home unless it is told otherwise, so that it follows at once.
+        A slave starts at home unless it is told otherwise, so that it follows at once. With one
+        that is to work, its simulated arm is started, which gets the parameters that are its own.
         """
-        if name == "slave_sim":
+        if name == "slave_sim" and not parameters and (running := self._simulator(arm)):
+            return running
+        if name == "slave":
+            own = {key: parameters.pop(key) for key in set(parameters) if _is_of_arm(key)}
+            if has_arm and parameters.get("autostart", True) and self._simulator(arm) is None:
+                robot = {key: parameters[key] for key in ("robot",) if key in parameters}
+                self.start("slave_sim", wait, arm=arm, env=env, **robot, **own)
             home = load_robot(parameters.get("robot", "rcrt1")).home.tolist()
             parameters = {"start": home} | parameters
         named = {key.replace("__", "."): value for key, value in parameters.items()}
@@ -194,6 +209,12 @@ class Peer:
         if wait:
             self.wait_state(node.name, wait)
         return node
+
+    def _simulator(self, arm: str) -> NodeProcess | None:
+        """Simulated arm of a namespace that runs."""
+        name = f"{arm}/slave_sim" if arm else "slave_sim"
+        found = (n for n in self.nodes if n.name == name and n.process.poll() is None)
+        return next(found, None)
 
     def status(self, name: str) -> Any:
         """Newest report of a node; None before the first."""
@@ -264,7 +285,7 @@ class Peer:
 
     def slave_holds(self) -> bool:
         """Whether the slave says that it holds: for want of commands, or paused since."""
-        message = self.status("slave_sim").message
+        message = self.status("slave").message
         return "holds" in message or "PAUSED" in message
 
     # -- services --------------------------------------------------------------------------------
@@ -319,36 +340,59 @@ def common_peer() -> Iterator[Peer]:
         yield made
 
 
-@pytest.fixture
-def compose(peer, tmp_path):
-    """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
-    started = []
-
-    def start(namespace: str = "", **parameters: dict[str, Any]) -> "subprocess.Popen[bytes]":
-        common = {
-            "recorder": {"out": str(tmp_path / "bag")},
-            "slave_sim": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
-        }
-        file = tmp_path / "session.yaml"
-        groups = {name: {"ros__parameters": p} for name, p in (common | parameters).items()}
-        file.write_text(yaml.safe_dump(groups))
-        command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session"]
-        command += ["--ros-args", "--params-file", str(file)]
-        command += ["-r", f"__ns:=/{namespace}"] if namespace else []
-        env = environment() | {"ROS_DOMAIN_ID": peer.domain}
-        started.append(subprocess.Popen(command, env=env))
+@contextmanager
+def _composed(
+    peer: Peer, folder: Path, namespace: str, parameters: dict[str, dict[str, Any]]
+) -> Iterator["subprocess.Popen[bytes]"]:
+    common = {
+        "recorder": {"out": str(folder / "bag")},
+        "slave": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
+    }
+    file = folder / "session.yaml"
+    groups = {name: {"ros__parameters": p} for name, p in (common | parameters).items()}
+    file.write_text(yaml.safe_dump(groups))
+    command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session"]
+    command += ["--ros-args", "--params-file", str(file)]
+    command += ["-r", f"__ns:=/{namespace}"] if namespace else []
+    env = environment() | {"ROS_DOMAIN_ID": peer.domain}
+    process = subprocess.Popen(command, env=env)
+    try:
         for name in STAGES:
             peer.wait_state(f"{namespace}/{name}" if namespace else name, "active")
-        return started[-1]
-
-    yield start
-    for process in started:
+        yield process
+    finally:
         if process.poll() is None:
             process.terminate()
         try:
             process.wait(TIMEOUT)
         finally:
             process.kill()
+
+
+@pytest.fixture
+def compose(peer, tmp_path):
+    """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
+    with ExitStack() as stack:
+
+        def start(namespace: str = "", **parameters: dict[str, Any]) -> "subprocess.Popen[bytes]":
+            return stack.enter_context(_composed(peer, tmp_path, namespace, parameters))
+
+        yield start
+
+
+@pytest.fixture(scope="module")
+def composed_session(tmp_path_factory):
+    """Composed session that tests of a file share, as a context: peer, process, recording."""
+
+    @contextmanager
+    def run(
+        **parameters: dict[str, Any],
+    ) -> Iterator[tuple[Peer, "subprocess.Popen[bytes]", Path]]:
+        folder = tmp_path_factory.mktemp("session")
+        with _made_peer() as peer, _composed(peer, folder, "", parameters) as process:
+            yield peer, process, folder / "bag"
+
+    return run
 
 
 def run_until(

@@ -20,26 +20,26 @@ LEFT_MASTER = topics.MASTER_MEASURED_CP.of_arm("left")
 
 
 def test_a_node_in_a_namespace_keeps_the_parameters_that_a_file_gives_its_bare_name(peer):
-    peer.start("slave_sim", arm="left", robot="puma560", command_timeout=0.25)
+    peer.start("slave", arm="left", robot="puma560", command_timeout=0.25)
     request = GetParameters.Request(names=["robot", "command_timeout"])
-    robot, timeout = peer.call(GetParameters, "/left/slave_sim/get_parameters", request).values
+    robot, timeout = peer.call(GetParameters, "/left/slave/get_parameters", request).values
     assert robot.string_value == "puma560"
     assert timeout.double_value == 0.25
 
 
 def test_a_node_in_a_namespace_publishes_and_reports_below_it(peer):
     inside, outside = peer.listen(LEFT_JOINTS), peer.listen(topics.SLAVE_MEASURED_JS)
-    peer.start("slave_sim", arm="left", robot="puma560")
+    peer.start("slave", arm="left", robot="puma560")
     peer.wait(lambda: inside.take() > 100, "left/slave/measured_js")
     np.testing.assert_allclose(inside.values[0][:6], load_robot("puma560").home, atol=1e-3)
     assert outside.take() == 0
-    assert set(peer.observer.statuses) == {"left/slave_sim"}
+    assert set(peer.observer.statuses) == {"left/slave", "left/slave_sim"}
 
 
 def test_a_refused_parameter_of_a_node_in_a_namespace_is_named_with_it(peer):
-    node = peer.start("slave_sim", wait="", arm="left", command_timeout=50.0)
+    node = peer.start("slave", wait="", arm="left", command_timeout=50.0)
     assert node.wait() == 2
-    assert "left/slave_sim.command_timeout is 50.0" in node.stderr.read_text()
+    assert "left/slave.command_timeout is 50.0" in node.stderr.read_text()
 
 
 def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer, tmp_path):
@@ -64,6 +64,7 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer, tmp_path)
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @pytest.mark.parametrize("is_composed", [False, True], ids=["processes", "composed"])
 def test_two_arms_are_recorded_together_and_scored_one_by_one(peer, session_until, is_composed):
     robots = {"": "rcrt1", "left": "puma560"}
@@ -83,7 +84,7 @@ def test_two_arms_are_recorded_together_and_scored_one_by_one(peer, session_unti
         return all(moved) and peer.has_recorded(enough)
 
     bag, text = session_until(configuration, is_under_way, is_composed=is_composed)
-    assert all(f"{arm}slave_sim is ready" in text for arm in ("", "left/"))
+    assert all(f"{arm}slave is ready" in text for arm in ("", "left/"))
     for arm, robot in robots.items():
         assert all(bag.topics[t.of_arm(arm).name].count > 100 for t in topics.STREAMS), arm
         measured = bag.read(topics.SLAVE_MEASURED_JS.of_arm(arm))

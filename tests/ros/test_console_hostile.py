@@ -12,7 +12,7 @@ from console_process import STARTS, ConsoleProcess
 from page_client import PageClient
 from teleop_core.operation import State
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow]
+pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
 
 
 SETTLES = 1e-6  # filters come to rest within nanometres; a drag moves millimetres [m]
@@ -43,7 +43,7 @@ def test_arm_of_a_real_session_gets_no_other_command_and_stops_when_the_driver_s
             assert driver.ask("/stop")[0] == 204
             until(lambda: driver.ask("/alive")[1]["is_stopped"], "the page looks stopped")
             after = saved(driver, console, "after")
-        assert "Traceback" not in console.text
+        assert "Traceback" not in console.text, console.text
     finally:
         assert console.end() == 0, console.text
     setpoint = during["slave/setpoint_cp"][["x", "y", "z"]]

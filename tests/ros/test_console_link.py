@@ -94,7 +94,7 @@ def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(l
     gain = known["motion_scaling", "fine_gain"]
     assert (gain.lower, gain.upper) == (0.001, 10.0)
     assert gain.doc
-    assert known["slave_sim", "robot"].is_fixed
+    assert known["slave", "robot"].is_fixed
     assert "box" in known["motion_scaling", "fixture.kind"].choices
     assert link.change("motion_scaling", "fine_gain", 0.3) == ""
     assert link.parameters()["motion_scaling", "fine_gain"].value == 0.3

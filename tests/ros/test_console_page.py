@@ -13,7 +13,7 @@ from teleop_core.console.recorded_arms import configuration_of
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.operation import State
 
-pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow]
+pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow, pytest.mark.alone]
 
 TIP = "/arm/robot/tip"
 GRIP, ARROW = "/arm/master/grip", 0.07  # the stylus' gizmo, and the heads of its arrows [m]

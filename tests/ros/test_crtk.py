@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -90,7 +91,7 @@ class StockClient:
 
 @pytest.fixture
 def client(peer):
-    peer.start("slave_sim", **CALM)
+    peer.start("slave", **CALM)
     client = StockClient(peer)
     client.reaches(("ENABLED", True, False))
     client.wait(lambda: len(client.newest) >= 3, "setpoints")
@@ -120,14 +121,14 @@ def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client):
     client.wait(lambda: abs(client.newest["setpoint_cp"].pose.position.z - z) < 1e-9, "the pose")
     goal.pose.position.z -= 5.0
     client.send("move_cp", goal)
-    client.peer.wait_value("slave_sim", "refused.slave/move_cp", lambda count: count == 1)
+    client.peer.wait_value("slave", "refused.slave/move_cp", lambda count: count == 1)
 
 
 def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client):
     client.send("state_command", crtk.StringStamped(string="pause"))
     client.reaches(("PAUSED", True, False))
     client.send("move_jp", JointState(position=[a - 0.05 for a in MIDDLE]))
-    client.peer.wait_value("slave_sim", "refused.slave/move_jp", lambda count: count == 1)
+    client.peer.wait_value("slave", "refused.slave/move_jp", lambda count: count == 1)
     client.send("state_command", crtk.StringStamped(string="resume"))
     client.reaches(("ENABLED", True, False))
     client.wait(lambda: np.array_equal(client.joints(), MIDDLE), "where it was")
@@ -147,7 +148,7 @@ def test_speeds_end_with_the_messages_and_hold_ends_a_move(client):
         client.spin()
     client.wait(lambda: client.joints()[0] > before[0], "motion")
     status = client.peer.status
-    client.peer.wait(lambda: status("slave_sim").values["motion"] == "nothing", "rest")
+    client.peer.wait(lambda: status("slave").values["motion"] == "nothing", "rest")
     # The slowest joint needs five seconds for this way: hold comes in time on a busy machine too.
     goal = [*MIDDLE[:2], 0.02, *MIDDLE[3:]]
     client.send("move_jp", JointState(position=goal))
@@ -255,9 +256,9 @@ class ForeignArm(Node):
             self.pose.publish(pose)
 
 
-def findings_of(*faults, may_move=False):
-    """What is found of a foreign arm with these faults, by topic."""
-    with foreign_arm(*faults) as arm:
+def findings_of(fault, *, may_move):
+    """What is found of a foreign arm with this fault, by topic."""
+    with foreign_arm(fault) as arm:
         return {found.row.name: found for found in examine(arm, may_move=may_move)}
 
 
@@ -286,9 +287,29 @@ def foreign_arm(*faults):
         context.try_shutdown()
 
 
+LOOKED = ("", "stamp", "nan", "length", "unit", "type", "qos", "no state")
+MOVED = ("honest", "moves paused", "any word", "never busy", "frozen", "scaled", "late", "speeds")
+
+
+def examined(faults, *, may_move):
+    """What is found of foreign arms, by fault: several at once, since each test mostly waits."""
+    with ThreadPoolExecutor(4) as pool:
+        return {fault: pool.submit(findings_of, fault, may_move=may_move) for fault in faults}
+
+
+@pytest.fixture(scope="module")
+def by_looking():
+    return examined(LOOKED, may_move=False)
+
+
+@pytest.fixture(scope="module")
+def by_moving():
+    return examined(MOVED, may_move=True)
+
+
 @pytest.mark.slow
-def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes():
-    found = findings_of("honest", may_move=True)
+def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(by_moving):
+    found = by_moving["honest"].result()
     verdicts = {name: one.verdict for name, one in found.items()}
     sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js",
              "move_jp", "servo_jp")  # fmt: skip
@@ -309,8 +330,8 @@ def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes()
         ("no state", "operating_state", ""),
     ],
 )
-def test_faults_of_a_foreign_arm_are_found_by_looking(fault, topic, note):
-    found = findings_of(fault)[topic]
+def test_faults_of_a_foreign_arm_are_found_by_looking(by_looking, fault, topic, note):
+    found = by_looking[fault].result()[topic]
     assert found.verdict is Verdict.FAILED
     assert note in found.note
 
@@ -324,8 +345,8 @@ def test_faults_of_a_foreign_arm_are_found_by_looking(fault, topic, note):
         ("never busy", "move_jp", "never rose"),
     ],
 )
-def test_faults_of_a_foreign_arm_are_found_by_trying(fault, topic, note):
-    found = findings_of(fault, may_move=True)[topic]
+def test_faults_of_a_foreign_arm_are_found_by_trying(by_moving, fault, topic, note):
+    found = by_moving[fault].result()[topic]
     assert found.verdict is Verdict.FAILED
     assert note in found.note
 
@@ -340,8 +361,8 @@ def test_faults_of_a_foreign_arm_are_found_by_trying(fault, topic, note):
         ("speeds", ("measured_js",), "add up to another way"),
     ],
 )
-def test_an_arm_that_lies_about_where_it_is_is_found_by_moving_it(fault, topics, note):
-    found = findings_of(fault, may_move=True)
+def test_an_arm_that_lies_about_where_it_is_is_found_by_moving_it(by_moving, fault, topics, note):
+    found = by_moving[fault].result()
     for topic in topics:
         assert found[topic].verdict is Verdict.FAILED, (topic, found[topic])
         assert note in found[topic].note, found[topic]
@@ -374,7 +395,7 @@ def test_what_an_interrupted_test_leaves_is_told():
         assert "the arm is ENABLED and may be off by 0.01 rad" in left_behind(arm, may_move=True)
 
 
-def test_nothing_is_commanded_when_only_looking():
-    found = findings_of()
+def test_nothing_is_commanded_when_only_looking(by_looking):
+    found = by_looking[""].result()
     assert found["move_jp"].verdict is Verdict.SKIPPED
     assert found["state_command"].note == "read only"

@@ -9,14 +9,17 @@ import pytest
 from mutants import ROOT
 from teleop_core.drill import SHORT
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow]
+pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
 LIMITS = 1.0 + 1e-9
 
 
-QUICK = ("stop_late", "braking_weak", "second_publishers", "not_recorded")
+QUICK = ("stop_late", "not_recorded")
+SOAK = ("braking_weak", "second_publishers")
 
 
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize(
+    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.soak) for name in SOAK)]
+)
 def test_a_broken_safety_is_found(name):
     """The others, and both forms of each: make drill-mutants."""
     command = [sys.executable, str(ROOT / "tests/mutants.py"), name, "--composed"]

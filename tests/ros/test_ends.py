@@ -79,11 +79,11 @@ def test_a_node_that_was_shut_down_by_service_still_ends_well(peer, tmp_path, nu
 
 
 def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer):
-    node = peer.start("slave_sim")
-    assert not change(peer, "slave_sim", Transition.TRANSITION_ACTIVATE)
-    assert not change(peer, "slave_sim", Transition.TRANSITION_CONFIGURE)
-    before = peer.status("slave_sim").number("ticks")
-    peer.wait_value("slave_sim", "ticks", lambda ticks: ticks > before + 500)
+    node = peer.start("slave")
+    assert not change(peer, "slave", Transition.TRANSITION_ACTIVATE)
+    assert not change(peer, "slave", Transition.TRANSITION_CONFIGURE)
+    before = peer.status("slave").number("ticks")
+    peer.wait_value("slave", "ticks", lambda ticks: ticks > before + 500)
     assert node.end() == 0
 
 
@@ -93,7 +93,7 @@ def composed(compose):
     return compose(haptic_master={"operator": {"approach_time": 1.0}, "patience": 0.0})
 
 
-@pytest.mark.parametrize("name", ["slave_sim", "recorder"])
+@pytest.mark.parametrize("name", ["slave", "recorder"])
 def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(peer, composed, tmp_path, name):
     assert change(peer, name, Transition.TRANSITION_ACTIVE_SHUTDOWN)
     peer.wait_state(name, "finalized")
@@ -103,8 +103,17 @@ def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(peer, compos
     assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
 
 
-@pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
-@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGQUIT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    ("number", "composed_option"),
+    [
+        pytest.param(signal.SIGHUP, (), id="SIGHUP-five", marks=pytest.mark.soak),
+        pytest.param(signal.SIGQUIT, (), id="SIGQUIT-five", marks=pytest.mark.soak),
+        pytest.param(signal.SIGKILL, (), id="SIGKILL-five"),
+        pytest.param(signal.SIGHUP, ("--composed",), id="SIGHUP-composed"),
+        pytest.param(signal.SIGQUIT, ("--composed",), id="SIGQUIT-composed"),
+        pytest.param(signal.SIGKILL, ("--composed",), id="SIGKILL-composed"),
+    ],
+)
 def test_no_node_outlives_the_command_and_the_recording_is_closed(start, number, composed_option):
     session = start(*composed_option)
     session.wait_running()
@@ -122,7 +131,7 @@ def test_no_node_outlives_the_command_and_the_recording_is_closed(start, number,
 
 
 def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_first(start):
-    session = start()
+    session = start("--composed")
     session.wait_running()
     lines = [line for line in session.text.splitlines() if not line.startswith("note: ")]
     (environ,) = {node.environ()["ROS_DOMAIN_ID"] for node in session.nodes()}
@@ -192,6 +201,7 @@ def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(start, tmp_p
     assert counts[topics.SLAVE_MEASURED_JS.name] > 100
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
 def test_sessions_start_and_end_again_and_again(start, tmp_path, composed_option):
     for number in range(3):

@@ -111,8 +111,9 @@ def both_ways(topic, is_enough, *settings):
 
 
 def is_led(setpoints):
-    """Whether commands have been in force for more than a second and a half."""
-    return sum(stamp > topics.NO_COMMAND_NS for stamp in setpoints.stamps) > 1500
+    """Whether commands have been in force for a second and a half, and many different ones."""
+    in_force = [stamp for stamp in setpoints.stamps if stamp > topics.NO_COMMAND_NS]
+    return len(in_force) > 1500 and len(set(in_force)) > 300
 
 
 def is_free(reach):
@@ -156,7 +157,8 @@ def recorded(request, site, common_peer, tmp_path_factory):
     session = LiveProcess(
         tmp_path_factory.mktemp("session"), "--scenario", "free_motion", *way,
         env={"ROS_DOMAIN_ID": common_peer.domain, "PYTHONPATH": str(site)},
-        settings=(*settings, "operator.approach_time=1.0"),
+        # A busy machine is no outage.
+        settings=(*settings, "operator.approach_time=1.0", "operation.longest_outage=0.0"),
     )  # fmt: skip
 
     def has_enough():
@@ -191,9 +193,14 @@ def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(recorded):
     in_force = setpoints.stamp_ns > answers.stamp_ns[0]
     latency_ms = (setpoints.log_ns - setpoints.stamp_ns)[in_force] / MS
     assert len(latency_ms) > 1000
-    # On a busy machine all is later, but never earlier; twice the delay would be 100 ms.
-    assert 50.0 <= latency_ms.min() < 100.0
-    assert np.min(answers.log_ns - answers.stamp_ns) / MS < 50.0
+    # On a busy machine all is later, but never earlier.
+    assert latency_ms.min() >= 50.0
+    # It is this link that is late, and late once: a session that is behind is so on both sides.
+    _, i, j = np.intersect1d(answers.stamp_ns, setpoints.stamp_ns, return_indices=True)
+    way_ms = (setpoints.log_ns[j] - answers.log_ns[i]) / MS
+    assert len(way_ms) > 50
+    assert way_ms.min() < 75.0  # twice the delay would be 100 ms
+    assert np.median(way_ms) > 25.0
 
 
 @pytest.mark.slow

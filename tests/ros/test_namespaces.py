@@ -66,20 +66,21 @@ def recorded(peer, process, tmp_path, *slaves):
 def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
     peer, start, tmp_path
 ):
-    groups = {"haptic_master": PATIENCE, "slave_sim": RCRT1 | {"command_timeout": 0.25}}
+    groups = {"haptic_master": PATIENCE, "slave": RCRT1 | {"command_timeout": 0.25}}
     process = start(groups, "-r", "__ns:=/left", "-r", "__node:=arm")
-    peer.wait_state("left/slave_sim", "active")
-    assert parameter(peer, "/left/slave_sim", "command_timeout").double_value == 0.25
+    peer.wait_state("left/slave", "active")
+    assert parameter(peer, "/left/slave", "command_timeout").double_value == 0.25
 
     def inside():
         names = peer.node.get_node_names_and_namespaces()
         return {name for name, where in names if where == "/left"}
 
-    peer.wait(lambda: len(inside()) >= 5, "all nodes to be found")
+    peer.wait(lambda: len(inside()) >= 6, "all nodes to be found")
     assert inside() == {
-        "haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "recorder",
+        "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim",
+        "recorder",
     }  # fmt: skip
-    bag = recorded(peer, process, tmp_path, "left/slave_sim")
+    bag = recorded(peer, process, tmp_path, "left/slave")
     shared = {topics.DIAGNOSTICS.name, TF.name}
     assert all(name.startswith("left/") for name in {*bag.topics} - shared)
     (score,) = scores(bag)
@@ -93,16 +94,17 @@ def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(peer, start, tmp_p
     groups = {
         "teleop": {"arms": ["left", "right"]},
         "haptic_master": PATIENCE,
-        "slave_sim": RCRT1,
-        "right/slave_sim": puma | PUMA,
+        "slave": RCRT1,
+        "right/slave": puma | PUMA,
+        "right/slave_sim": puma,
         "right/inverse_kinematics": puma,
     }
     process = start(groups, "-r", "__ns:=/lab")
-    peer.wait_state("lab/right/slave_sim", "active")
-    peer.wait_state("lab/slave_sim", "active")
-    assert parameter(peer, "/lab/right/slave_sim", "robot").string_value == "puma560"
-    assert parameter(peer, "/lab/slave_sim", "robot").string_value == "rcrt1"
-    bag = recorded(peer, process, tmp_path, "lab/slave_sim", "lab/right/slave_sim")
+    peer.wait_state("lab/right/slave", "active")
+    peer.wait_state("lab/slave", "active")
+    assert parameter(peer, "/lab/right/slave", "robot").string_value == "puma560"
+    assert parameter(peer, "/lab/slave", "robot").string_value == "rcrt1"
+    bag = recorded(peer, process, tmp_path, "lab/slave", "lab/right/slave")
     assert bag.topics[f"lab/{MEASURED}"].count > 1000
     joints = bag.read(f"lab/right/{topics.SLAVE_MEASURED_JS.name}")
     assert joints.names == load_robot("puma560").joint_names
@@ -114,8 +116,8 @@ def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(peer, start, tmp_p
 
 def test_names_for_all_nodes_of_a_process_are_taken_out_and_others_are_kept():
     given = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "__ns:=/lab", "--remap", "__node:=arm",
-             "-r", "slave_sim:__node:=other", "-r", "a:=b", "--", "-r", "__ns:=/y"]  # fmt: skip
-    kept = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "slave_sim:__node:=other", "-r", "a:=b",
+             "-r", "slave:__node:=other", "-r", "a:=b", "--", "-r", "__ns:=/y"]  # fmt: skip
+    kept = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "slave:__node:=other", "-r", "a:=b",
             "--", "-r", "__ns:=/y"]  # fmt: skip
     assert taken_names(given) == (kept, {"__ns": "/lab", "__node": "arm"})
     assert taken_names(kept) == (kept, {})

@@ -15,21 +15,21 @@ def said(node, text):
 
 
 def test_a_node_says_once_what_it_is_reads_and_writes(peer):
-    node = peer.start("slave_sim", arm="left")
+    node = peer.start("slave", arm="left")
     (line,) = said(node, "at work")
-    assert "left.slave_sim" in line
+    assert "left.slave" in line
     assert "robot rcrt1, 1000 steps a second; reads /left/slave/servo_jp" in line
     assert "writes /left/slave/setpoint_js, " in line
 
 
 @pytest.mark.slow
 def test_a_node_says_who_commands_it_when_that_changes(peer):
-    node = peer.start("slave_sim")
+    node = peer.start("slave")
     assert said(node, "comes from") == []
     peer.send(topics.SLAVE_SERVO_JP, 1, HOME)
     peer.wait(lambda: said(node, "/slave/servo_jp comes from /peer"), "who commands")
-    ticks = peer.status("slave_sim").number("ticks")
-    peer.wait_value("slave_sim", "ticks", lambda now: now > ticks + 3000)
+    ticks = peer.status("slave").number("ticks")
+    peer.wait_value("slave", "ticks", lambda now: now > ticks + 3000)
     assert len(said(node, "comes from")) == 1
     peer.node.destroy_publisher(peer.publisher(topics.SLAVE_SERVO_JP))
     peer.wait(lambda: said(node, "/slave/servo_jp comes from nobody any more"), "nobody")

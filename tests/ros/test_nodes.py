@@ -122,10 +122,21 @@ def _quaternion(transform):
     return pose[3:]
 
 
-def test_slave_sim_follows_and_passes_the_stamp_of_the_command_on(peer):
+def test_a_slave_sends_no_setpoint_before_its_arm_has_said_where_it_is(peer):
+    setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
+    peer.start("slave", has_arm=False)
+    peer.wait(lambda: "waits for slave/measured_js" in peer.status("slave").message, "concern")
+    peer.wait_value("slave", "ticks", lambda ticks: ticks > 500)
+    assert setpoints.take() == 0
+    peer.start("slave_sim")
+    peer.wait(lambda: setpoints.take() > 100, "setpoints")
+    np.testing.assert_allclose(setpoints.values[0], HOME, atol=1e-12)
+
+
+def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer):
     setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
-    peer.start("slave_sim")
+    peer.start("slave")
     peer.wait(lambda: measured.take() > 100, "slave/measured_js")
     assert set(setpoints.stamps) <= {topics.NO_COMMAND_NS}
     wanted, stamp = HOME - 0.001 * np.eye(6)[0], 0
@@ -229,18 +240,11 @@ def test_every_node_ends_with_0(peer, tmp_path, number):
 
 def test_parameters_are_described_with_unit_and_bounds(peer):
     peer.start("slave_sim", autostart=False, wait="unconfigured")
-    names = [
-        "command_timeout",
-        "gravity_compensation",
-        "robot",
-        "controller.pid.kp",
-        "integration_steps",
-    ]
+    names = ["viscous", "gravity_compensation", "robot", "controller.pid.kp", "integration_steps"]
     request = DescribeParameters.Request(names=names)
     found = peer.call(DescribeParameters, "/slave_sim/describe_parameters", request).descriptors
-    timeout, gravity, robot, gains, steps = found
-    assert timeout.description.endswith("[s]")
-    assert timeout.floating_point_range[0].to_value == 5.0
+    viscous, gravity, robot, gains, steps = found
+    assert viscous.description.endswith("[N·m·s/rad or N·s/m]")
     assert gravity.additional_constraints == "one of published, all, none"
     assert robot.read_only
     assert not gains.read_only
@@ -252,12 +256,13 @@ def test_parameters_are_described_with_unit_and_bounds(peer):
 
 
 def test_parameters_are_accepted_or_refused_with_the_reason(peer):
-    peer.start("slave_sim")
+    peer.start("slave")
     accepted, refused, wrong_type, read_only, length, unknown = (
-        peer.set("slave_sim", **{name: value})[0]
-        for name, value in (
-            ("command_timeout", 0.2), ("command_timeout", 50.0), ("command_timeout", 1),
-            ("robot", "scara"), ("controller__pid__kp", [1.0, 2.0]), ("no_such", 1.0),
+        peer.set(node, **{name: value})[0]
+        for node, name, value in (
+            ("slave", "command_timeout", 0.2), ("slave", "command_timeout", 50.0),
+            ("slave", "command_timeout", 1), ("slave", "robot", "scara"),
+            ("slave_sim", "controller__pid__kp", [1.0, 2.0]), ("slave", "no_such", 1.0),
         )
     )  # fmt: skip
     assert accepted.successful
@@ -272,12 +277,12 @@ def test_parameters_are_accepted_or_refused_with_the_reason(peer):
 
 
 def test_relations_between_parameters_hold_and_can_be_changed_at_once(peer):
-    peer.start("slave_sim")
+    peer.start("slave")
     change = {"reference_filter__gain": 0.2, "reference_filter__zero": 50.0}
-    alone = peer.set("slave_sim", **change)
+    alone = peer.set("slave", **change)
     assert [entry.successful for entry in alone] == [False, False]
     assert "gain" in alone[0].reason
-    assert peer.set("slave_sim", at_once=True, **change)[0].successful
+    assert peer.set("slave", at_once=True, **change)[0].successful
 
 
 def test_a_new_gain_is_used_from_the_next_sample_on(peer):
@@ -357,13 +362,13 @@ def test_a_refused_configure_leaves_the_node_usable_by_the_supervisor(peer, tmp_
 @pytest.mark.parametrize(
     ("name", "content", "needed"),
     [
-        ("slave_sim", "command_timout: 0.1", "command_timeout"),
-        ("slave_sim", "command_timeout: 50.0", "between 0.002 and 5 s"),
+        ("slave", "command_timout: 0.1", "command_timeout"),
+        ("slave", "command_timeout: 50.0", "between 0.002 and 5 s"),
         ("slave_sim", "integration_steps: 1.5", "of type int"),
-        ("slave_sim", "robot: nobot", "rcrt1"),
+        ("slave", "robot: nobot", "rcrt1"),
         ("haptic_master", "operator: {kind: bag, bag: /no/such/bag}", "No such file"),
         ("recorder", "out: /tmp", "exists already"),
-        ("slave_sim", "bad: [1.0", "is not YAML"),
+        ("slave", "bad: [1.0", "is not YAML"),
     ],
 )
 def test_wrong_parameter_files_end_with_one_line_and_2(tmp_path, name, content, needed):

@@ -79,7 +79,7 @@ def command(peer, name):
 
 
 def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable_end_it(peer):
-    peer.start("slave_sim")
+    peer.start("slave")
     streamer = Streamer(peer)
     streamer.until(streamer.moves, "motion")
     button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
@@ -111,7 +111,7 @@ def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable
 
 
 def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer):
-    peer.start("slave_sim", operation__starts_enabled=False)
+    peer.start("slave", operation__starts_enabled=False)
     streamer = Streamer(peer)
     streamer.until(lambda: state(peer) is State.DISABLED, "DISABLED")
     streamer.until(lambda: len(streamer.setpoints.values) > 300, "setpoints")
@@ -130,8 +130,8 @@ def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer):
 
 
 def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer):
-    peer.start("slave_sim", arm="left")
-    peer.start("slave_sim", arm="right")
+    peer.start("slave", arm="left")
+    peer.start("slave", arm="right")
     for arm in ("left", "right"):
         answer = peer.call(Trigger, f"/{arm}/slave/pause", Trigger.Request())
         assert answer.success
@@ -151,7 +151,7 @@ def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer
 @pytest.fixture
 def button(peer):
     """A stop button as anybody would write it, found by a slave that is enabled."""
-    peer.start("slave_sim")
+    peer.start("slave")
     plain = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
     peer.wait(lambda: plain.get_subscription_count() == 2, "both readers of the stop")
     plain.publish(Bool(data=False))
@@ -198,7 +198,7 @@ def test_a_press_while_the_slave_stands_still_stops_the_arm(peer, button, releas
 def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer):
     button = StopButton(peer.node)
     button.say(is_pressed=True)
-    peer.start("slave_sim")
+    peer.start("slave")
     peer.wait(lambda: state(peer) is State.FAULT, "FAULT by a button that was pressed before")
     assert not command(peer, "reset")[0]
     button.say(is_pressed=False)

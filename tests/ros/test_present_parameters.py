@@ -52,7 +52,7 @@ def test_mode_as_a_parameter_follows_the_button_and_can_be_set_back(peer):
     assert mode(peer) == "fine"
 
 
-@pytest.mark.parametrize("name", ["slave_sim", "recorder"])
+@pytest.mark.parametrize("name", ["slave", "recorder"])
 def test_a_clock_of_others_is_refused_in_one_line_at_the_start(peer, tmp_path, name):
     node = peer.start(name, wait="", use_sim_time=True)
     assert node.wait() == 2
@@ -61,8 +61,8 @@ def test_a_clock_of_others_is_refused_in_one_line_at_the_start(peer, tmp_path, n
 
 
 def test_a_clock_of_others_is_refused_at_run_time(peer):
-    peer.start("slave_sim")
-    (result,) = peer.set("slave_sim", use_sim_time=True)
+    peer.start("slave")
+    (result,) = peer.set("slave", use_sim_time=True)
     assert not result.successful
     assert "nodes step in real time" in result.reason
 

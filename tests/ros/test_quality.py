@@ -32,16 +32,16 @@ def spun(peer, condition):
 
 def test_a_stream_reaches_reliable_and_best_effort_subscribers(peer):
     """The default of ROS's subscribers, and so of stock clients, is reliable."""
-    streams = [t for t in STAGES.find("slave_sim").writes if t.quality is Quality.STREAM]
+    streams = [t for t in STAGES.find("slave").writes if t.quality is Quality.STREAM]
     reliable = {topic: heard(peer, topic, QoSProfile(depth=10)) for topic in streams}
     best_effort = heard(peer, JS, qos_profile_sensor_data)
-    peer.start("slave_sim")
+    peer.start("slave")
     for topic, found in {**reliable, JS.name: best_effort}.items():
         peer.wait(spun(peer, lambda own=found: len(own) > 20), topic)
 
 
 def test_a_command_is_taken_from_senders_of_both_kinds(peer):
-    peer.start("slave_sim")
+    peer.start("slave")
     for qos in (QoSProfile(depth=10), qos_profile_sensor_data):
         kind = message_type(topics.SLAVE_SERVO_JP.kind.ros_type)
         own = peer.node.create_publisher(kind, topics.SLAVE_SERVO_JP.name, qos)
@@ -56,14 +56,14 @@ def test_an_override_changes_what_a_publisher_offers(peer):
     published = peer.node.get_publishers_info_by_topic
     (found,) = peer.wait(lambda: published(name), "the publisher")
     assert found.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT
-    other_name = f"/{topics.SLAVE_MEASURED_CP.name}"
+    other_name = f"/{topics.SLAVE_TRUE_CP.name}"
     (other,) = peer.wait(lambda: published(other_name), "the other publisher")
     assert other.qos_profile.reliability is ReliabilityPolicy.RELIABLE
 
 
 def test_an_override_changes_what_a_subscription_asks_for(peer):
     name = f"/{topics.SLAVE_SERVO_JP.name}"
-    peer.start("slave_sim", **{f"qos_overrides.{name}.subscription.reliability": "reliable"})
+    peer.start("slave", **{f"qos_overrides.{name}.subscription.reliability": "reliable"})
     peer.wait(lambda: peer.node.get_subscriptions_info_by_topic(name), "the subscription")
     (found,) = peer.node.get_subscriptions_info_by_topic(name)
     assert found.qos_profile.reliability is ReliabilityPolicy.RELIABLE
@@ -81,8 +81,8 @@ def test_a_wrong_override_ends_the_node_in_one_line(peer):
 
 def test_an_override_of_a_topic_that_is_not_open_is_told(peer):
     name = "qos_overrides./slave/measure_js.publisher.reliability"
-    peer.start("slave_sim", **{name: "reliable"})
-    peer.wait(lambda: f"no effect of {name}" in peer.status("slave_sim").message, "the warning")
+    peer.start("slave", **{name: "reliable"})
+    peer.wait(lambda: f"no effect of {name}" in peer.status("slave").message, "the warning")
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,13 @@ def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(peer
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", [(), ("--composed",)], ids=["processes", "composed"])
+@pytest.mark.parametrize(
+    "way",
+    [
+        pytest.param((), id="processes", marks=pytest.mark.soak),
+        pytest.param(("--composed",), id="composed"),
+    ],
+)
 def test_live_does_not_call_a_recording_that_moved_recorded(peer, tmp_path, way):
     live = LiveProcess(tmp_path, *way, env={"ROS_DOMAIN_ID": peer.domain})
     try:

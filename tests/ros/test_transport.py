@@ -57,14 +57,14 @@ def plain(**said):
 @pytest.mark.parametrize("said", [{}, {RANGE: "LOCALHOST"}])
 def test_a_plain_ros_process_hears_and_commands_our_nodes(peer, said):
     """The stranger has the middleware's own defaults: shared memory and all interfaces."""
-    peer.start("slave_sim")
+    peer.start("slave")
     names = json.dumps(load_robot("rcrt1").joint_names)
     with subprocess.Popen(
         [sys.executable, "-c", STRANGER, names, json.dumps(HOME)],
         env=plain(ROS_DOMAIN_ID=peer.domain, **said), stdout=subprocess.PIPE, text=True,
     ) as stranger:  # fmt: skip
         try:
-            peer.wait_value("slave_sim", "received.slave/servo_jp", lambda n: n > 50)
+            peer.wait_value("slave", "received.slave/servo_jp", lambda n: n > 50)
             assert stranger.stdout.readline() == "heard\n"
         finally:
             stranger.kill()
@@ -78,7 +78,7 @@ def test_a_node_has_sockets_of_this_machine_alone(peer, said):
     }
     os.environ.update(said)
     try:
-        node = peer.start("slave_sim")
+        node = peer.start("slave")
     finally:
         for name in said:
             os.environ.pop(name, None)
@@ -92,7 +92,7 @@ def test_a_node_has_sockets_of_this_machine_alone(peer, said):
 
 
 def test_a_node_that_is_open_to_others_says_so_in_one_line(peer):
-    node = peer.start("slave_sim", env={RANGE: "SUBNET", **dict.fromkeys(PROFILES, "")})
+    node = peer.start("slave", env={RANGE: "SUBNET", **dict.fromkeys(PROFILES, "")})
     lines = [line for line in node.stderr.read_text().splitlines() if "other machines" in line]
     assert len(lines) == 1
     assert f"{RANGE}=SUBNET" in lines[0]
@@ -129,7 +129,7 @@ def test_what_the_user_says_of_the_range_holds(said, chosen):
 @pytest.mark.slow
 def test_the_stream_of_a_slave_goes_on_while_those_who_read_it_are_killed(peer, tmp_path):
     """A reader that was killed held its writer's thread up for two seconds at a time."""
-    peer.start("slave_sim", real_time__freeze_gc=True)
+    peer.start("slave", real_time__freeze_gc=True)
     listener, longest = peer.listen(topics.SLAVE_MEASURED_CP), []
     for number in range(3):
         recorder = peer.start("recorder", out=str(tmp_path / f"bag{number}"))

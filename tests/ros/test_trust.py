@@ -11,13 +11,13 @@ from teleop_core.stage import STAGES
 pytestmark = pytest.mark.ros
 
 GARBAGE = b"\0\1\0\0" + bytes(range(200, 256))
-NODES = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim")
+NODES = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim")
 
 
 @pytest.mark.parametrize("name", NODES)
 def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(peer, name):
     reads = STAGES.find(name).reads
-    node = peer.start(name)
+    node = peer.start(name, has_arm=False)
 
     def refused():
         for topic in reads:

@@ -16,18 +16,22 @@ from teleop_core.nodes.children import environment
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 ROOT = Path(__file__).resolve().parents[2]
+CAN_COMPILE = all(map(shutil.which, ("cc", "c++", "cmake")))
 COLCON = Path(sys.executable).with_name("colcon")
-NODES = {"haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim", "recorder"}
+NODES = {"haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim", "recorder"}
 
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory):
-    """Copy of the repository's workspace, links as links."""
+    """Copy of the repository's workspace, links as links, built."""
     root = tmp_path_factory.mktemp("workspace")
     ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", "build", "install", "log")
     for folder in ("src", "config", "ros_ws", "tests"):
         shutil.copytree(ROOT / folder, root / folder, symlinks=True, ignore=ignored)
-    return root / "ros_ws"
+    made = root / "ros_ws"
+    assert "(ros.ament_python)" in colcon(made, "list")
+    colcon(made, "build", *(() if CAN_COMPILE else ("--packages-skip", "crtk_msgs")))
+    return made
 
 
 def colcon(workspace, *arguments):
@@ -41,10 +45,7 @@ def colcon(workspace, *arguments):
 
 
 def test_the_workspace_builds_and_a_built_node_answers(workspace, peer):
-    assert "(ros.ament_python)" in colcon(workspace, "list")
-    can_compile = all(map(shutil.which, ("cc", "c++", "cmake")))
-    colcon(workspace, "build", *(() if can_compile else ("--packages-skip", "crtk_msgs")))
-    if can_compile:
+    if CAN_COMPILE:
         assert list(workspace.glob("install/crtk_msgs/lib/python*/site-packages/crtk_msgs/msg"))
     installed = workspace / "install" / "teleop_core"
     executables = installed / "lib" / "teleop_core"
@@ -69,7 +70,6 @@ def test_the_workspace_builds_and_a_built_node_answers(workspace, peer):
 
 def test_colcon_test_runs_the_quick_tests_and_keeps_their_results(workspace):
     select = ("--packages-select", "teleop_core")
-    colcon(workspace, "build", *select)
     colcon(workspace, "test", *select, "--return-code-on-test-failure")
     results = ElementTree.parse(workspace / "build" / "teleop_core" / "pytest.xml").getroot()
     (suite,) = results.iter("testsuite")

@@ -154,7 +154,7 @@ def test_sim_refuses_wrong_input_in_one_line(teleop, tmp_path, arguments, words)
         ("nobody: {ros__parameters: {}}", "nobody"),
         ("slave_sim: 3", "ros__parameters"),
         ("slave_sim: {ros__parameters: {speed: 1.0}}", "speed"),
-        ("slave_sim: {ros__parameters: {command_timeout: 1}}", "float"),
+        ("slave: {ros__parameters: {command_timeout: 1}}", "float"),
     ],
 )
 def test_sim_refuses_wrong_parameter_files_in_one_line(teleop, tmp_path, text, word):

@@ -41,10 +41,11 @@ def test_tracking_is_what_its_definition_gives_of_the_recording():
     recording = tc.run("fine_box", seed=2, settings=law)
     frames = {name: recording[f"slave/{name}"].frame() for name in
               ("setpoint_cp", "measured_cp", "true_cp", "measured_js")}  # fmt: skip
-    kept = (recording["slave/setpoint_cp"].stamp_ns > NO_COMMAND_NS).nonzero()[0]
+    # A measured pose comes a tick after the setpoint that it was sampled with.
+    kept = (recording["slave/setpoint_cp"].stamp_ns[:-1] > NO_COMMAND_NS).nonzero()[0]
     wanted, seen, true = (
-        frames[name][["x", "y", "z"]].iloc[kept] * 1e6
-        for name in ("setpoint_cp", "measured_cp", "true_cp")
+        frames[name][["x", "y", "z"]].iloc[kept + late].reset_index(drop=True) * 1e6
+        for name, late in (("setpoint_cp", 0), ("measured_cp", 1), ("true_cp", 0))
     )
     error = ((seen - wanted) ** 2).sum(axis=1) ** 0.5
     assert math.isclose(found.rms, ((error**2).mean()) ** 0.5, rel_tol=1e-9)

@@ -73,6 +73,7 @@ def test_every_teleop_command_parses_with_its_settings(name):
                 assert parse_setting(setting)
 
 
+@pytest.mark.slow
 def test_every_session_of_a_documented_command_can_be_begun():
     parsers = next(action.choices for action in _parser()._actions if action.dest == "command")
     helps = "\n".join(parser.format_help() for parser in parsers.values())

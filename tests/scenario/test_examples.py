@@ -2,7 +2,6 @@
 
 import ast
 import json
-import os
 import re
 import subprocess
 import sys
@@ -11,49 +10,34 @@ from pathlib import Path
 
 import pytest
 
+from example_runs import EXAMPLES, numbers, run
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
-ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES = ROOT / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 PUBLIC = {
     "teleop_core.calibration", "teleop_core.operation", "teleop_core.console.app",
     "teleop_core.console.recorded", "teleop_core.console.server",
     "teleop_core", "teleop_core.evaluation", "teleop_core.operators", "teleop_core.fixtures",
     "teleop_core.controllers", "teleop_core.robots", "teleop_core.topics",
-    "teleop_core.experiments", "numpy",
+    "teleop_core.drill", "teleop_core.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",
 }  # fmt: skip
-ROS_EXAMPLES = {"crtk_client", "ros_device"}
+ROS_EXAMPLES = {"crtk_client", "foreign_slave", "own_exercise", "ros_device"}
 ROS = {
     "crtk_msgs.msg",
     "rclpy",
     "diagnostic_msgs.msg",
     "rclpy.node",
     "rclpy.qos",
+    "rclpy.signals",
     "geometry_msgs.msg",
     "sensor_msgs.msg",
+    "teleop_core.nodes.drill",
 }
 PARTS = [name for name in NAMES if name.startswith("own_")]
 
 pytestmark = pytest.mark.slow
-
-
-def run(name: str, folder: Path, **env: str) -> str:
-    """What an example prints; run in a folder of its own, in which it must leave nothing."""
-    done = subprocess.run(
-        [sys.executable, str(EXAMPLES / f"{name}.py")], cwd=folder, capture_output=True, text=True,
-        timeout=300, check=False, env=os.environ | env,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert not list(folder.iterdir())
-    return done.stdout
-
-
-def numbers(pattern: str, text: str) -> list[float]:
-    """Every number that a pattern finds."""
-    return [float(found) for found in re.findall(pattern, text)]
 
 
 def test_hand_and_slave_draw_the_circle_of_the_table(tmp_path):
@@ -207,28 +191,6 @@ def test_arms_are_led_closer_once_they_are_calibrated(tmp_path):
     assert tracker < ruler < 1.0
 
 
-@pytest.mark.ros
-def test_plain_ros_node_leads_the_slave_in_place_of_the_simulated_master(tmp_path):
-    from teleop_core.nodes.children import environment, free_domain
-
-    env = environment() | {"ROS_DOMAIN_ID": free_domain()}
-    nodes = [
-        subprocess.Popen([sys.executable, "-m", "teleop_core.nodes", name], env=env)
-        for name in ("motion_scaling", "inverse_kinematics", "slave_sim")
-    ]
-    try:
-        text = run("ros_device", tmp_path, **env)
-    finally:
-        for node in nodes:
-            node.terminate()
-        codes = [node.wait(60) for node in nodes]
-    assert codes == [0, 0, 0]
-    assert 18.0 < numbers(r"slave: ([\d.]+) mm", text)[0] < 20.5
-    forces, samples = (numbers(pattern, text)[0] for pattern in (r"(\d+) forces", r"(\d+) samples"))
-    assert samples == 2000
-    assert forces > 0.5 * samples
-
-
 def test_commands_take_the_parts_of_the_examples(tmp_path):
     files = [text for name in PARTS for text in ("--parts", str(EXAMPLES / f"{name}.py"))]
     settings = ["fixture=cylinder", "controller=following", "robot=gantry",
@@ -246,23 +208,6 @@ def test_commands_take_the_parts_of_the_examples(tmp_path):
     (score,) = json.loads(Path(scores).read_text(encoding="utf-8"))
     assert "velocity_limit" in score["latency_ms"]  # of nothing in virtual time: no row says so
     assert "jerk" in done.stdout
-
-
-@pytest.mark.ros
-def test_a_crtk_client_moves_the_tip_and_comes_back(tmp_path):
-    pytest.importorskip("crtk_msgs")
-    from teleop_core.nodes.children import environment, free_domain
-
-    env = environment() | {"ROS_DOMAIN_ID": free_domain()}
-    slave = subprocess.Popen([sys.executable, "-m", "teleop_core.nodes", "slave_sim"], env=env)
-    try:
-        text = run("crtk_client", tmp_path, **env)
-    finally:
-        slave.terminate()
-        code = slave.wait(60)
-    assert code == 0
-    assert "done" in text
-    assert text.splitlines()[-1] == "back"
 
 
 def test_laws_of_the_table_track_better_from_row_to_row(tmp_path):
@@ -319,9 +264,10 @@ def test_example_needs_the_public_api_alone(name):
     assert imported - standard <= allowed
 
 
-def test_every_example_is_run_here():
-    own = Path(__file__).read_text(encoding="utf-8")
-    assert all(f'run("{name}", tmp_path' in own for name in NAMES)
+def test_every_example_is_run_here_or_live():
+    live = Path(__file__).parents[1] / "ros" / "test_examples.py"
+    own = "".join(file.read_text(encoding="utf-8") for file in (Path(__file__), live))
+    assert all(f'run("{name}", tmp_path' in own or f'"{name}.py"' in own for name in NAMES)
 
 
 def test_examples_pass_a_strict_type_check_of_a_user():

@@ -36,7 +36,7 @@ TICKS = 1500
 MS = 1e-3
 HOME = load_robot("rcrt1").home
 # Slave and hand begin at once: neither moves to another start, nor waits for the other.
-AT_ONCE = (f"slave_sim.start={HOME.tolist()}", "patience=0.0")
+AT_ONCE = (f"slave.start={HOME.tolist()}", "patience=0.0")
 SHORT = (*AT_ONCE, "approach_time=0.5", "operator.period=2.0", "buttons.fixture=[0.2]",
          "buttons.clutch=[0.9, 1.0]", "fixture.box.size=[0.01, 0.01, 0.01]")  # fmt: skip
 

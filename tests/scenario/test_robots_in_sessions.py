@@ -54,6 +54,6 @@ def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model):
 def test_an_option_of_a_robot_reaches_both_stages_that_need_it():
     session = VirtualTime(configure(settings=["robot=scara_stewart", "geometry=[heading=carried]"]))
     fixed = load_robot("scara_stewart")
-    solver, slave = (session.stages[name].robot for name in ("inverse_kinematics", "slave_sim"))
+    solver, slave = (session.stages[name].robot for name in ("inverse_kinematics", "slave"))
     assert solver.geometry != fixed.geometry
     assert slave.geometry == solver.geometry

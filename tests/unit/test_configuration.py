@@ -52,7 +52,9 @@ def test_setting_with_its_stage_sets_that_parameter_alone():
 
 def test_bare_key_sets_every_stage_that_has_it():
     layer = parse_setting("robot=mma")
-    assert layer == {"inverse_kinematics": {"robot": "mma"}, "slave_sim": {"robot": "mma"}}
+    assert layer == {
+        name: {"robot": "mma"} for name in ("inverse_kinematics", "slave", "slave_sim")
+    }
     assert parse_setting("seed=5") == {"haptic_master": {"seed": 5}, "slave_sim": {"seed": 5}}
 
 
@@ -68,7 +70,7 @@ def test_bare_key_sets_every_stage_that_has_it():
         ("operator.bag=17", "haptic_master", "operator.bag", "17"),
         ("operator.center=[0, 0.01, 1e-3]", "haptic_master", "operator.center", (0.0, 0.01, 0.001)),
         ("buttons.clutch=[]", "haptic_master", "buttons.clutch", ()),
-        ("reference_filter.is_on=false", "slave_sim", "reference_filter.is_on", False),
+        ("reference_filter.is_on=false", "slave", "reference_filter.is_on", False),
     ],
 )
 def test_setting_is_read_as_its_declaration_wants(text, stage, name, value):
@@ -163,7 +165,7 @@ def test_settings_win_over_files_and_files_over_the_scenario(tmp_path):
         ("[1, 2]", "stages"),
         ("slave_sim: 3", "ros__parameters"),
         ("slave_sim: {robot: rcrt1}", "ros__parameters"),
-        ("slave: {ros__parameters: {}}", "slave_sim"),
+        ("slaves: {ros__parameters: {}}", "slave_sim"),
         ("a: [", "YAML"),
     ],
 )
@@ -182,10 +184,10 @@ def test_missing_file_is_refused_with_its_name(tmp_path):
 
 
 def test_unknown_name_in_a_file_is_refused_with_its_stage(tmp_path):
-    path = write(tmp_path / "mine.yaml", {"slave_sim": {"ros__parameters": {"speed": 1.0}}})
+    path = write(tmp_path / "mine.yaml", {"slave": {"ros__parameters": {"speed": 1.0}}})
     with pytest.raises(UnknownNameError) as error:
         configure(files=[path])
-    assert "slave_sim" in error.value.name
+    assert "slave" in error.value.name
     assert "command_timeout" in error.value.alternatives
 
 
@@ -210,6 +212,8 @@ def test_groups_of_a_configuration_cannot_be_changed_behind_its_back():
         ("fixture.size", "[0.1, 0.2, 0.3]", "motion_scaling", "fixture.box.size", (0.1, 0.2, 0.3)),
         ("pid.kp", "[1.0]", "slave_sim", "controller.pid.kp", (1.0,)),
         ("slave_sim.pid.bandwidth", "[1.0]", "slave_sim", "controller.pid.bandwidth", (1.0,)),
+        ("slave_sim.command_timeout", 0.2, "slave", "command_timeout", 0.2),
+        ("slave_sim.operation.heartbeat", 0.5, "slave", "operation.heartbeat", 0.5),
     ],
 )
 def test_former_name_sets_what_it_is_called_now(key, value, stage, name, meant):
@@ -220,12 +224,28 @@ def test_file_with_former_names_gives_the_same_configuration(tmp_path):
     old = {
         "haptic_master": {"path": {"kind": "circle", "period": 5.0}, "seed": 3},
         "motion_scaling": {"fixture.size": [0.1, 0.2, 0.3]},
-        "slave_sim": {"pid": {"kp": [1.0] * 6}},
+        "inverse_kinematics": {"robot": "puma560"},
+        "slave_sim": {
+            "pid": {"kp": [1.0] * 6},
+            "robot": "puma560",
+            "start_speed": 0.2,
+            "reference_filter": {"is_on": False},
+            "operation.tool_speed": 0.1,
+        },
+        "teleop": {"delays": ["slave/servo_jp@slave_sim=0.02"]},
     }
     now = {
         "haptic_master": {"operator.kind": "circle", "operator.period": 5.0, "seed": 3},
         "motion_scaling": {"fixture": {"box": {"size": [0.1, 0.2, 0.3]}}},
-        "slave_sim": {"controller.pid.kp": [1.0] * 6},
+        "inverse_kinematics": {"robot": "puma560"},
+        "slave": {
+            "robot": "puma560",
+            "start_speed": 0.2,
+            "reference_filter.is_on": False,
+            "operation": {"tool_speed": 0.1},
+        },
+        "slave_sim": {"controller.pid.kp": [1.0] * 6, "robot": "puma560"},
+        "teleop": {"delays": ["slave/servo_jp@slave=0.02"]},
     }
     first, second = (
         write(tmp_path / name, {stage: {"ros__parameters": group} for stage, group in file.items()})

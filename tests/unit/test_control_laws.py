@@ -11,17 +11,12 @@ from teleop_core.controllers.computed_torque import COMPUTED_TORQUE, computed_to
 from teleop_core.controllers.motion import known_friction
 from teleop_core.errors import ParameterError, PartError
 from teleop_core.experiments.joint_steps import answer_to_steps
-from teleop_core.operation import OperationParameters
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.signals import TICK_NS
-from teleop_core.slave.slave_sim import (
-    ControllerParameters,
-    PlantParameters,
-    ReferenceFilterParameters,
-    SlaveSim,
-    SlaveSimParameters,
-)
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.slave_sim import ControllerParameters, PlantParameters
 
 LAWS = ("friction_compensation", "computed_torque", "adaptive", "disturbance_observer")
 ARM = load_robot("rcrt1")
@@ -30,14 +25,10 @@ STEADY = {"hardware.without": ("wandering",)}
 UNFILTERED = ReferenceFilterParameters(is_on=False)
 
 
-TOLD = OperationParameters(reported=("tracking",))
-"""Of an arm whose law may be any: that it follows badly is told and no more."""
-
-
 def slave(law, plant="hardware", faults=None, own=None, robot="rcrt1", **values):
     """A slave at home under a law with parameters ``own``, on a plant with ``faults``."""
-    return SlaveSim(
-        SlaveSimParameters(
+    return SimulatedArm(
+        ArmParameters(
             robot=robot,
             starts_at_home=True,
             controller=build(ControllerParameters, {"kind": law, **(own or {})}),
@@ -91,7 +82,7 @@ def test_arm_that_sticks_comes_to_rest_at_the_nearest_count_and_stays(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_step_without_a_filter_overshoots_by_no_more_than_a_twentieth_on_the_hardware(law):
-    parameters = SlaveSimParameters(
+    parameters = ArmParameters(
         starts_at_home=True, interpolation="none", reference_filter=UNFILTERED,
         controller=build(ControllerParameters, {"kind": law}),
         plant=build(PlantParameters, {"kind": "hardware"}),
@@ -182,7 +173,7 @@ def test_adaptive_law_learns_the_friction_there_is():
     arm = slave("adaptive", faults=STEADY, own={"adaptive.friction_share": 0.4})
     run(arm, circling(12000))
     known = 0.4 * known_friction(ARM)
-    learned = known + arm.arm.memory[:, _FRICTION]
+    learned = known + arm.simulated.arm.memory[:, _FRICTION]
     # Bounded at twice what it began with; the amplifier's bias and the weight are load instead.
     assert np.allclose(learned[:2], np.minimum(known_friction(ARM), 2.0 * known)[:2], rtol=0.25)
 
@@ -196,7 +187,7 @@ def test_adaptive_law_stays_within_its_bounds_whatever_it_is_asked_for():
         ARM.lower, ARM.upper,
     )  # fmt: skip
     _, _, efforts = run(arm, way)
-    memory, drives = arm.arm.memory, ARM.drives
+    memory, drives = arm.simulated.arm.memory, ARM.drives
     assert np.isfinite(efforts).all()
     assert (np.abs(memory[:, _INERTIA]) <= 0.5 * drives.inertia).all()
     assert (np.abs(memory[:, _VISCOUS]) <= drives.viscous).all()
@@ -242,11 +233,11 @@ def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated
             "looking", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains, control, uses_model=True
         )
     )
-    arm = slave("looking", gravity_compensation="all", operation=TOLD)
+    arm = slave("looking", gravity_compensation="all", trials="small")
     arm.step()
     found = next(one for one in reversed(seen) if len(one) == 48)
     gravity = np.empty(6)
-    at = np.array(arm.state["measured"])
+    at = np.array(arm.simulated.state["measured"])
     ARM.dynamics.gravity(at, ARM.dynamics.parameters.copy(), gravity)
     assert np.array_equal(found[:6], gravity)
     assert np.allclose(found[6:12], gravity, rtol=0, atol=1e-9)  # at rest: bias is gravity
@@ -281,7 +272,7 @@ def test_law_that_does_not_ask_for_the_model_gets_gravity_alone(own_parts):
     register_controller(
         Controller("short", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains, control)
     )
-    slave("short", operation=TOLD).step()
+    slave("short", trials="small").step()
     assert set(lengths) == {0}
 
 

@@ -10,11 +10,11 @@ from teleop_core.controllers.pd import PD, PdParameters, pd_control
 from teleop_core.controllers.pid import PidParameters, pid_control, pid_gains
 from teleop_core.errors import ParameterError, PartError
 from teleop_core.kernels import kernel
-from teleop_core.operation import OperationParameters
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.signals import DT, TICK_NS
-from teleop_core.slave.slave_sim import ControllerParameters, SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.slave_sim import ControllerParameters
 
 ARM = load_robot("rcrt1")
 
@@ -26,13 +26,9 @@ def own(name="own", **more):
     return Controller(name, **{**parts, **more})
 
 
-TOLD = OperationParameters(reported=("tracking",))
-"""Of an arm whose law may be any: that it follows badly is told and no more."""
-
-
 def slave(kind, **values):
-    return SlaveSim(
-        SlaveSimParameters(
+    return SimulatedArm(
+        ArmParameters(
             controller=build(ControllerParameters, {"kind": kind}),
             start=tuple(ARM.home.tolist()),
             **values,
@@ -114,7 +110,7 @@ def test_effort_of_every_law_is_cut_at_the_drive_s(own_parts):
         effort[:] = 1e6
 
     register_controller(own("strong", control=control))
-    efforts = trace(slave("strong", operation=TOLD), ARM.home, 5)[:, 12:]
+    efforts = trace(slave("strong", trials="small"), ARM.home, 5)[:, 12:]
     assert (np.abs(efforts) <= ARM.drives.effort_limit).all()
 
 

@@ -22,7 +22,7 @@ ALONE = {"plant.hardware.without": ("friction", "wandering", "bias", "drive_step
 
 
 def slave(**settings):
-    given = {"plant.kind": "hardware", "controller.kind": "source_pid", "starts_at_home": True}
+    given = {"plant.kind": "hardware", "controller.kind": "source_pid"}
     return SlaveSim(build(SlaveSimParameters, given | settings))
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from teleop_core.errors import ParameterError
 from teleop_core.mapping.filters import lag_step
 from teleop_core.parameters import build
-from teleop_core.slave.slave_sim import ReferenceFilterParameters
+from teleop_core.slave.slave import ReferenceFilterParameters
 
 GAIN, ZERO, POLE, DT = 0.1, 100.0, 10.0, 1e-3
 # One difference equation of three terms.

@@ -17,7 +17,7 @@ from teleop_core.parameters import build
 from teleop_core.plants.hardware import faults_of
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
-from teleop_core.slave.slave_sim import SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters
 
 pytestmark = pytest.mark.slow
 ARM = load_robot("rcrt1")
@@ -26,7 +26,7 @@ NAMES = ARM.joint_names
 
 def slave(**settings):
     given = {"plant.kind": "hardware", "controller.kind": "source_pid"}
-    return build(SlaveSimParameters, given | settings)
+    return build(ArmParameters, given | settings)
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +56,14 @@ def test_fitted_rests_are_the_measured_ones_but_for_point_1(found):
     off = (found.predicted - found.measured)[1:, [0, 1, 3]] / ARM.drives.encoder_step[[0, 1, 3]]
     assert np.sqrt(np.mean(off**2)) < 6.0
     assert abs(found.predicted[0, 1] - found.measured[0, 1]) / ARM.drives.encoder_step[1] > 50
+
+
+def test_spread_of_runs_is_the_pooled_deviation_about_the_means_of_their_points():
+    rng = np.random.default_rng(5)
+    rests = tuple(rng.normal(size=(runs, 2)) for runs in (3, 4, 6))
+    table = RestTable("drawn", np.zeros((3, 2)), rests)
+    squares = sum((len(rest) - 1) * rest.var(axis=0, ddof=1) for rest in rests)
+    np.testing.assert_allclose(table.spread, np.sqrt(squares / (13 - 3)), rtol=1e-12)
 
 
 def test_fitted_spread_of_the_runs_is_the_measured_one(found):

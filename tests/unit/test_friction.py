@@ -198,12 +198,13 @@ def test_an_arm_at_rest_stays_there_however_long_it_is_held():
     from teleop_core.fitting.rests import Mover
     from teleop_core.fitting.table import PUBLISHED, read_rests
     from teleop_core.robots import load_robot
+    from teleop_core.slave.pair import ArmParameters
 
     arm = load_robot("rcrt1")
     given = {"plant.kind": "hardware", "controller.kind": "source_pid", "seed": 3}
     for target in np.clip(read_rests(PUBLISHED, arm).targets, arm.lower, arm.upper)[1:4]:
         counts = np.array([
-            Mover(build(SlaveSimParameters, given), settle=seconds).move(target)
+            Mover(build(ArmParameters, given), settle=seconds).move(target)
             / arm.drives.encoder_step
             for seconds in (1.0, 5.0, 20.0, 60.0)
         ])  # fmt: skip

@@ -46,7 +46,7 @@ def feeds(graph, reader, port):
 # What follows.
 
 
-@pytest.mark.parametrize("order", list(permutations(range(4))))
+@pytest.mark.parametrize("order", list(permutations(range(5))))
 def test_order_of_a_tick_is_that_of_the_data_however_stages_are_listed(order):
     assert names(Graph(tuple(BASE[i] for i in order))) == list(BUILT_IN)
 
@@ -148,7 +148,7 @@ def test_delay_of_an_unknown_topic_is_refused_with_the_known_ones():
 
 def test_delay_to_an_unknown_reader_is_refused_with_the_known_ones():
     with pytest.raises(UnknownNameError) as error:
-        configure(settings=["teleop.delays=[slave/servo_jp@slave=0.02]"])
+        configure(settings=["teleop.delays=[slave/servo_jp@slaves=0.02]"])
     assert "slave_sim" in error.value.alternatives
 
 
@@ -167,11 +167,11 @@ UNFED = stage(reads=(SLAVE_MEASURED_CP, UNWRITTEN))
 NOTED = stage(writes=(), notes=(("command_status", "i8"),))
 BAD_GRAPHS = {
     "reader nobody writes for": ((*BASE, UNFED), "echo", "test/unwritten, which no stage writes"),
-    "two stages of one name": ((*BASE, BASE[3]), "slave_sim", "two have this name"),
+    "two stages of one name": ((*BASE, BASE[3]), "slave", "two have this name"),
     "two writers of a topic": (
         (*BASE, stage("a"), stage("b")), "b", "the only one that writes test/echo; a does",
     ),
-    "two stages for one column": ((*BASE, NOTED), "echo", "slave_sim uses"),
+    "two stages for one column": ((*BASE, NOTED), "echo", "slave uses"),
     "stages that wait for each other": ((*BASE, *CIRCLE), "forth", "forth, back wait"),
 }  # fmt: skip
 

@@ -15,7 +15,8 @@ from teleop_core.robots.hardware import ENTRIES, Hardware
 from teleop_core.robots.link_errors import LinkErrors
 from teleop_core.session.configuration import configure
 from teleop_core.signals import TICK_NS
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.slave_sim import SlaveSim
 
 ARM = load_robot("rcrt1")
 TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])
@@ -23,7 +24,7 @@ TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])
 
 def slave(plant="hardware", controller="source_pid", **settings):
     given = {"plant.kind": plant, "controller.kind": controller}
-    return build(SlaveSimParameters, given | settings)
+    return build(ArmParameters, given | settings)
 
 
 def rest(*without, **settings):
@@ -41,7 +42,7 @@ def test_without_any_fault_the_hardware_is_the_ideal_plant_without_friction():
 
 def test_dry_friction_stops_a_joint_short_by_its_size_over_kp():
     mover, off = rest("wandering", "bias", "weights", "drive_steps")
-    kp = mover.slave.arm.gains[:, 0]
+    kp = mover.slave.simulated.arm.gains[:, 0]
     short = faults_of(ARM).coulomb / kp
     towards = np.sign(ARM.home - TARGET)
     step = ARM.drives.encoder_step
@@ -52,7 +53,7 @@ def test_dry_friction_stops_a_joint_short_by_its_size_over_kp():
 
 def test_bias_and_weight_push_a_joint_without_friction_off_by_their_size_over_kp():
     mover, off = rest("wandering", "friction", "drive_steps")
-    kp, faults = mover.slave.arm.gains[:, 0], faults_of(ARM)
+    kp, faults = mover.slave.simulated.arm.gains[:, 0], faults_of(ARM)
     gravity = np.zeros(6)
     ARM.dynamics.gravity(TARGET, faults.dynamics.copy(), gravity)
     known = np.zeros(6)
@@ -66,12 +67,12 @@ def test_bias_and_weight_push_a_joint_without_friction_off_by_their_size_over_kp
 @pytest.mark.parametrize("law", ["pid", "friction_compensation", "adaptive"])
 def test_a_law_that_can_hold_bias_and_weight_begins_in_balance(law):
     # Without friction whatever is not held moves axis 1, of the bias, or 2, of the weight, at once.
-    made = SlaveSim(slave(controller=law, starts_at_home=True,
+    made = SimulatedArm(slave(controller=law, starts_at_home=True,
                           **{"plant.hardware.without": ("friction", "wandering")}))  # fmt: skip
     for tick in range(1, 301):
         made.signals["now_ns"] = tick * TICK_NS
         made.step()
-        off = np.abs(made.arm.q - ARM.home)[:2]
+        off = np.abs(made.simulated.arm.q - ARM.home)[:2]
         assert (off < 1.5 * ARM.drives.encoder_step[:2]).all(), tick
 
 
@@ -82,8 +83,8 @@ def test_encoders_see_nothing_that_lies_behind_them():
 
 def test_true_tip_is_that_of_the_arm_as_built_behind_its_play():
     mover, _ = rest()
-    faults, s = faults_of(ARM), mover.slave.state
-    encoders = mover.slave.arm.q
+    faults, s = faults_of(ARM), mover.slave.simulated.state
+    encoders = mover.slave.simulated.arm.q
     lag = encoders - s["carried"]
     assert np.abs(lag[:4]).max() < 1e-5  # what a joint hunts in the tick since
     assert abs(abs(lag[4]) - faults.play[4]) < 1e-5
@@ -107,7 +108,7 @@ def test_drives_give_efforts_in_steps_of_their_converter():
     mover = Mover(slave(**{"plant.hardware.drive_bits": 8}))
     mover.move(TARGET)
     step = 2.0 * ARM.drives.effort_limit / 256
-    effort = mover.slave.arm.effort - faults_of(ARM).bias
+    effort = mover.slave.simulated.arm.effort - faults_of(ARM).bias
     assert np.abs(effort / step - np.round(effort / step)).max() < 1e-9
 
 
@@ -139,11 +140,11 @@ def test_every_number_of_the_hardware_says_how_it_is_known():
 
 @pytest.mark.parametrize("name", ["puma560", "scara", "scara_stewart"])
 def test_other_robots_stick_by_their_drive_table_and_are_made_as_drawn(name):
-    made = SlaveSim(build(SlaveSimParameters, {"robot": name, "plant.kind": "hardware"}))
+    made = SimulatedArm(build(ArmParameters, {"robot": name, "plant.kind": "hardware"}))
     robot = made.robot
-    assert np.array_equal(made.parameters["coulomb"], robot.drives.coulomb)
-    assert (made.parameters["bristle"] > 0.0).all()
-    assert np.array_equal(made.arm.tip_geometry, robot.geometry_row)
+    assert np.array_equal(made.simulated.parameters["coulomb"], robot.drives.coulomb)
+    assert (made.simulated.parameters["bristle"] > 0.0).all()
+    assert np.array_equal(made.simulated.arm.tip_geometry, robot.geometry_row)
 
 
 def test_a_plant_of_ones_own_moves_the_slave():

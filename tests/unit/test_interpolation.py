@@ -9,7 +9,8 @@ from scipy.interpolate import BPoly
 from teleop_core.robots import load_robot
 from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.commands import CommandStatus
-from teleop_core.slave.slave_sim import INTERPOLATIONS, SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.slave import INTERPOLATIONS
 
 ROBOT = load_robot("planar_3r")  # it starts at home, with room on all sides
 HOME, SPEED = ROBOT.home, ROBOT.drives.speed_limit
@@ -28,7 +29,7 @@ def way(interpolation, commands, ticks_between, robot="planar_3r", after=0):
         robot: Name of the robot.
         after: Ticks after the last command.
     """
-    slave = SlaveSim(SlaveSimParameters(robot=robot, interpolation=interpolation))
+    slave = SimulatedArm(ArmParameters(robot=robot, interpolation=interpolation))
     row, now_ns, found = slave.signals, 0, []
     for command, ticks in zip(commands, [*ticks_between, after], strict=True):
         for tick in range(ticks):
@@ -38,7 +39,7 @@ def way(interpolation, commands, ticks_between, robot="planar_3r", after=0):
                 row["slave_servo_jp"], row["slave_servo_jp_ns"] = command, now_ns
             slave.step()
             assert row["command_status"] in {CommandStatus.FRESH, CommandStatus.STALE}
-            found.append(slave.state["command"].copy())
+            found.append(slave.server.state["command"].copy())
     return np.array(found)
 
 
@@ -146,35 +147,35 @@ def test_minimum_jerk_way_is_as_smooth_at_its_ends_as_on_the_way():
     ("first", "then"), [("linear", "minimum_jerk"), ("minimum_jerk", "linear")]
 )
 def test_kinds_change_on_the_way_without_a_jump(first, then):
-    slave = SlaveSim(SlaveSimParameters(robot="planar_3r", interpolation=first))
+    slave = SimulatedArm(ArmParameters(robot="planar_3r", interpolation=first))
     row, found = slave.signals, []
     for tick in range(600):
         if tick == 300:
-            slave.retune(SlaveSimParameters(robot="planar_3r", interpolation=then))
+            slave.retune(ArmParameters(robot="planar_3r", interpolation=then))
         row["now_ns"] = (tick + 1) * TICK_NS
         if tick % 50 == 0:
             row["slave_servo_jp"] = HOME + 1e-3 * tick * 0.2 * SPEED
             row["slave_servo_jp_ns"] = row["now_ns"]
         slave.step()
-        found.append(slave.state["command"].copy())
+        found.append(slave.server.state["command"].copy())
     # Commands run at constant speed, and so does the way, after a period to begin.
     steps = np.diff(found, axis=0)[100:]
     assert np.allclose(steps, 0.2e-3 * SPEED, rtol=1e-9, atol=0)
 
 
 def test_a_still_command_after_other_kinds_is_a_still_way():
-    slave = SlaveSim(SlaveSimParameters(robot="planar_3r", interpolation="minimum_jerk"))
+    slave = SimulatedArm(ArmParameters(robot="planar_3r", interpolation="minimum_jerk"))
     row, found = slave.signals, []
     kinds = {100: "none", 200: "linear", 300: "minimum_jerk"}
     for tick in range(500):
         if tick in kinds:
-            slave.retune(SlaveSimParameters(robot="planar_3r", interpolation=kinds[tick]))
+            slave.retune(ArmParameters(robot="planar_3r", interpolation=kinds[tick]))
         row["now_ns"] = (tick + 1) * TICK_NS
         if tick % 20 == 0:
             row["slave_servo_jp"] = HOME + 1e-3 * min(tick, 80) * 0.4 * SPEED
             row["slave_servo_jp_ns"] = row["now_ns"]
         slave.step()
-        found.append(slave.state["command"].copy())
+        found.append(slave.server.state["command"].copy())
     assert np.ptp(found[:120], axis=0).min() > 0.05
     assert np.ptp(found[120:], axis=0).max() == 0.0
 
@@ -188,7 +189,7 @@ D3, TOP = 2, SLIDING.upper[2]
 
 def slide(interpolation, places, ticks):
     """Commands in force (N,) of d3 [m], under commands to some places below its upper end [m]."""
-    slave = SlaveSim(SlaveSimParameters(start=tuple(SLIDING.home), interpolation=interpolation))
+    slave = SimulatedArm(ArmParameters(start=tuple(SLIDING.home), interpolation=interpolation))
     row, now_ns, found = slave.signals, 0, []
     for place in places:
         for tick in range(ticks):
@@ -199,7 +200,7 @@ def slide(interpolation, places, ticks):
                 row["slave_servo_jp"][D3] = TOP - place
             slave.step()
             assert row["command_status"] == CommandStatus.FRESH
-            found.append(float(slave.state["command"][D3]))
+            found.append(float(slave.server.state["command"][D3]))
     return np.array(found)
 
 

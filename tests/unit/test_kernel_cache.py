@@ -289,3 +289,27 @@ def test_another_version_of_numba_is_refused_in_one_line(found):
     expected = rf"^numba is {re.escape(found)}, must be >= 0\.68 and < 0\.69$"
     with pytest.raises(ImportError, match=expected):
         check_version(found)
+
+
+PAIRS = (
+    "from typing import NamedTuple\n\nclass {0}(NamedTuple):\n    first: float\n    second: float\n"
+)
+TOTAL = """
+from pairs import {0}
+from teleop_core.kernels import kernel
+
+@kernel
+def total(pair) -> float:
+    return pair.first + pair.second
+
+print(total({0}(1.0, 2.0)))
+print(sum(total.stats.cache_hits.values()))
+"""
+
+
+def test_kernels_kept_for_a_class_that_is_gone_are_compiled_anew(tmp_path):
+    for name in ("Pair", "Couple"):
+        files = {"pairs.py": PAIRS, "outer.py": TOTAL}
+        write_all(tmp_path, {file: text.format(name) for file, text in files.items()})
+        assert run(tmp_path) == ([3.0], 0)
+        assert run(tmp_path) == ([3.0], 1)

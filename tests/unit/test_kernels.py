@@ -66,6 +66,43 @@ def test_numbers_written_in_a_call_share_one_compilation():
     assert len(both.py_func.__globals__["power"].overloads) == 1
 
 
+@compiled_only
+def test_arrays_and_fields_of_all_lengths_share_one_compilation():
+    called = "@inner\ndef first(x):\n    return x[0]\n"
+    caller = "@kernel\ndef both(r, x):\n    return first(r.two) + first(r.three) + first(x)\n"
+    both = uncached(called + caller, "both")
+    record = records([("two", "f8", (2,)), ("three", "f8", (3,))])[0]
+    record.two[:], record.three[:] = (1.0, 2.0), (4.0, 5.0, 6.0)
+    assert both(record, np.array([10.0])) == 15.0
+    assert len(both.py_func.__globals__["first"].overloads) == 1
+
+
+SLICE = """
+import numpy as np
+from teleop_core.kernels import kernel
+from teleop_core.kernels.progress import compiled_count
+
+@kernel
+def fill(row, values):
+    row[:, 0] = values
+
+row = np.zeros((3, 2))
+fill(row, np.ones(3))
+print(row[:, 0].sum(), compiled_count())
+try:
+    fill(row, np.ones(4))
+except ValueError as error:
+    print(error)
+"""
+
+
+@compiled_only
+def test_slice_is_assigned_and_checked_without_compiling_functions_on_texts():
+    command = [sys.executable, "-c", SLICE]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=True)
+    assert done.stdout == "3.0 2\ncannot assign slice from input of different size\n"
+
+
 def test_what_the_decorators_made_is_told_from_other_functions():
     def plain(x):
         return x

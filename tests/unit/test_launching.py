@@ -12,7 +12,7 @@ from teleop_core.errors import ParameterError
 from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, processes
 
 LAUNCH = Path(__file__).resolve().parents[2] / "src" / "teleop_core" / "launch"
-STAGES = {"haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim"}
+STAGES = {"haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim"}
 
 
 def given(own=ONE_ARM, **values):
@@ -57,7 +57,9 @@ def test_nothing_records_where_it_is_not_wanted():
 
 def test_a_robot_is_that_of_all_stages_of_its_arm():
     one = parameters(processes(given(robot="puma560"))[0])
-    assert {one[f"/{name}"]["robot"] for name in ("slave_sim", "inverse_kinematics")} == {"puma560"}
+    assert {one[f"/{name}"]["robot"] for name in ("slave", "slave_sim", "inverse_kinematics")} == {
+        "puma560"
+    }
     both = processes(given(TWO_ARMS, right_robot="puma560"))
     two = parameters(both[0])
     assert two["/slave_sim"]["robot"] == "rcrt1"
@@ -74,7 +76,7 @@ def test_an_argument_of_no_meaning_is_refused(name, value):
 
 
 @pytest.mark.parametrize(
-    ("file", "own", "count"), [("teleop", ONE_ARM, 5), ("two_arms", TWO_ARMS, 9)]
+    ("file", "own", "count"), [("teleop", ONE_ARM, 6), ("two_arms", TWO_ARMS, 11)]
 )
 def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(monkeypatch, file, own, count):
     # Stand-ins for launch and launch_ros, which PyPI does not have, as far as they are used.
@@ -100,4 +102,4 @@ def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(monkeypatch, 
     assert {node["namespace"] for node in started} <= {"/lab", "/lab/right"}
     assert all(node["exec_name"] == node["name"] for node in started)
     stays = {node["name"] for node in started if not node["respawn"]}
-    assert stays == {"slave_sim", "recorder"}
+    assert stays == {"slave", "slave_sim", "recorder"}

@@ -7,7 +7,7 @@ from teleop_core.geometry import pose_from_transform
 from teleop_core.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.robots import load_robot
 from teleop_core.signals import DT, TICK_NS
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 ARM = load_robot("rcrt1")
 MIDDLE = np.array([0.1, 1.7, 0.36, 0.2, 0.5, 0.1])
@@ -18,10 +18,10 @@ class Chain:
 
     def __init__(self):
         self.solver = InverseKinematics(InverseKinematicsParameters())
-        self.slave = SlaveSim(SlaveSimParameters(start=tuple(MIDDLE.tolist()), start_speed=1.0))
+        self.slave = SimulatedArm(ArmParameters(start=tuple(MIDDLE.tolist()), start_speed=1.0))
         self.now_ns = 10**9
         self.run(1)
-        while self.slave.operation["is_busy"]:
+        while self.slave.server.operation["is_busy"]:
             self.run(100)
 
     def run(self, ticks):
@@ -80,7 +80,7 @@ def test_lone_poses_with_pauses_between_them_are_all_reached(chain):
 def test_a_lone_pose_after_a_move_starts_from_where_the_move_ended(chain):
     chain.send(moved(chain.tip, 0.02, 0.0, 0.0))
     chain.run(1500)
-    chain.slave.motion.move(MIDDLE - np.array([0.2, 0.1, 0.05, 0.3, 0.2, 0.2]))
+    chain.slave.server.motion.move(MIDDLE - np.array([0.2, 0.1, 0.05, 0.3, 0.2, 0.2]))
     chain.run(3000)
     goal = moved(chain.tip, 0.0, 0.015, 0.0)
     chain.send(goal)
@@ -90,9 +90,9 @@ def test_a_lone_pose_after_a_move_starts_from_where_the_move_ended(chain):
 
 def test_a_lone_pose_far_away_is_gone_to_no_farther_than_the_slave_takes(chain):
     goal = moved(chain.tip, 0.0, 0.3, 0.0)
-    refused = chain.slave.refused
+    refused = chain.slave.server.refused
     chain.send(goal)
     chain.run(3000)
-    assert chain.slave.refused == refused
+    assert chain.slave.server.refused == refused
     way = np.linalg.norm(chain.tip[:3, 3] - goal[:3, 3])
     assert 0.0 < way < 0.3

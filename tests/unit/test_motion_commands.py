@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 
 from teleop_core.errors import ShapeError
 from teleop_core.geometry import rotation, transform
+from teleop_core.operation import OperationParameters
 from teleop_core.operation.states import Answer, State
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.signals import DT, TICK_NS
-from teleop_core.slave.slave_sim import OperationParameters, SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.topics import NO_COMMAND_NS
 
 ARM = load_robot("rcrt1")
@@ -35,10 +36,10 @@ class Bench:
             | DIRECT
             | values
         )
-        self.slave = SlaveSim(build(SlaveSimParameters, given))
-        self.robot, self.motion, self.now_ns = self.slave.robot, self.slave.motion, 10**9
+        self.slave = SimulatedArm(build(ArmParameters, given))
+        self.robot, self.motion, self.now_ns = self.slave.robot, self.slave.server.motion, 10**9
         self.run(1)
-        while self.slave.operation["is_busy"]:
+        while self.slave.server.operation["is_busy"]:
             self.run(100)
         self.run(200)
 
@@ -88,12 +89,12 @@ def test_a_move_goes_from_rest_to_rest_at_its_goal_and_tells_so(bench):
     assert answer is Answer.DONE
     np.testing.assert_array_equal(bench.motion.goal, MIDDLE + SMALL)
     path = bench.run(1)
-    assert bench.slave.operation["is_busy"] == 1.0
+    assert bench.slave.server.operation["is_busy"] == 1.0
     assert bench.motion.source == "move"
     path = np.vstack((path, bench.run(2000)))
     np.testing.assert_array_equal(path[-1], MIDDLE + SMALL)
     insist_on_limits(ARM, path)
-    assert bench.slave.operation["is_busy"] == 0.0
+    assert bench.slave.server.operation["is_busy"] == 0.0
     # Between two points joints go straight: every joint has done the same share of its way.
     shares = (path - MIDDLE) / SMALL
     np.testing.assert_allclose(shares, shares[:, :1] * np.ones(6), atol=1e-9)
@@ -149,7 +150,7 @@ def test_goals_that_the_joints_cannot_have_are_refused(bench, goal, why):
     answer, text = bench.motion.move(goal)
     assert answer is Answer.REFUSED
     assert why in text
-    assert bench.slave.operation["is_busy"] == 0.0
+    assert bench.slave.server.operation["is_busy"] == 0.0
 
 
 def test_a_step_moves_by_that_much_from_the_setpoint(bench):
@@ -166,7 +167,9 @@ def test_another_number_of_joints_is_wrong_use(bench, command):
 
 @pytest.mark.parametrize("state", [State.DISABLED, State.PAUSED, State.FAULT])
 def test_nothing_is_moved_outside_enabled(bench, state):
-    bench.slave.request({"DISABLED": "disable", "PAUSED": "pause", "FAULT": "stop"}[state.name])
+    bench.slave.server.request(
+        {"DISABLED": "disable", "PAUSED": "pause", "FAULT": "stop"}[state.name]
+    )
     before, now_ns = bench.run(500)[-1], bench.now_ns
     told = [
         bench.motion.move(MIDDLE + SMALL), bench.motion.move_by(SMALL),
@@ -181,14 +184,14 @@ def test_nothing_is_moved_outside_enabled(bench, state):
 
 def test_before_homing_is_done_no_motion_command_is_taken():
     bench = Bench(**{"operation.starts_enabled": False})
-    bench.slave.request("enable")
+    bench.slave.server.request("enable")
     assert bench.motion.move(MIDDLE)[0] is Answer.REFUSED
     assert "home first" in bench.motion.drive_joints(SMALL, bench.now_ns)[1]
-    bench.slave.request("home")
+    bench.slave.server.request("home")
     bench.run(10)
     assert "homing" in bench.motion.move(MIDDLE)[1]
     assert "homing" in bench.motion.hold()[1]
-    while bench.slave.operation["is_busy"]:
+    while bench.slave.server.operation["is_busy"]:
         bench.run(100)
     assert bench.motion.move(MIDDLE + SMALL)[0] is Answer.DONE
 
@@ -197,11 +200,11 @@ def test_before_homing_is_done_no_motion_command_is_taken():
 def test_a_state_that_stops_a_move_drops_it_for_good(bench, event):
     bench.motion.move(MIDDLE + 4.0 * SMALL)
     bench.run(200)
-    bench.slave.request(event)
+    bench.slave.server.request(event)
     stopped = bench.run(1000)[-1]
     for cure in ("reset", "enable", "resume", "enable"):
-        bench.slave.request(cure)
-    assert bench.slave.state["state"] == State.ENABLED
+        bench.slave.server.request(cure)
+    assert bench.slave.server.state["state"] == State.ENABLED
     np.testing.assert_array_equal(bench.run(500)[-1], stopped)
 
 
@@ -306,7 +309,7 @@ def test_a_move_takes_over_from_a_stream_which_is_followed_again_afterwards(benc
         bench.follow(MIDDLE)
     bench.motion.move(MIDDLE + SMALL)
     bench.follow(MIDDLE)
-    while bench.slave.operation["is_busy"]:
+    while bench.slave.server.operation["is_busy"]:
         bench.follow(MIDDLE)
     np.testing.assert_array_equal(bench.setpoint, MIDDLE + SMALL)
     for _ in range(200):
@@ -382,10 +385,10 @@ def test_hold_brakes_what_moves_and_stays(bench, kind):
 def test_after_a_pause_the_arm_stays_where_it_came_to_rest(bench):
     for share in np.linspace(0.0, 1.0, 200):
         bench.follow(MIDDLE + share * SMALL)
-    bench.slave.request("pause")
+    bench.slave.server.request("pause")
     rest = bench.run(1000)[-1]
     assert np.abs(rest - MIDDLE - SMALL).max() > 1e-6  # braking takes it past the last reference
-    bench.slave.request("resume")
+    bench.slave.server.request("resume")
     np.testing.assert_array_equal(bench.run(200)[-1], rest)
 
 
@@ -426,14 +429,14 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(commands
                 "hold": motion.hold,
             }[name]()
         else:
-            bench.slave.request(name)
+            bench.slave.server.request(name)
         path.append(bench.run(ticks))
     joined = np.vstack(path)
     speed = np.diff(joined, axis=0) / DT
     assert (np.abs(speed) <= ARM.drives.speed_limit * (1 + 1e-9)).all()
     assert ((joined >= ARM.lower) & (joined <= ARM.upper)).all()
     tips = np.array([ARM.fk(q)[:3, 3] for q in joined[::10]])
-    most = bench.slave.parameters["tool_speed"] * 10 * DT
+    most = bench.slave.server.parameters["tool_speed"] * 10 * DT
     assert (np.linalg.norm(np.diff(tips, axis=0), axis=1) <= most * (1 + 1e-6)).all()
     assert math.isfinite(np.abs(joined).sum())
 

@@ -19,7 +19,7 @@ from teleop_core.operation import (
 )
 from teleop_core.operation.states import COMMANDS, STATE_FIELDS, TABLE, answer_text, change
 from teleop_core.parameters import build
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 D, E, P, F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT
 EXPECTED = {
@@ -124,7 +124,7 @@ class Arm:
         chosen = {"controller.kind": law, "reference_filter.is_on": is_filtered}
         given = {f"operation.{name}": value for name, value in operation.items()}
         start = {"robot": "rcrt1", "starts_at_home": True}
-        self.slave = SlaveSim(build(SlaveSimParameters, start | chosen | given))
+        self.slave = SimulatedArm(build(ArmParameters, start | chosen | given))
         self.row, self.ns = self.slave.signals, 10**9
         self.limit = self.slave.robot.drives.speed_limit
         self.home = self.slave.robot.home
@@ -148,40 +148,40 @@ class Arm:
 
     @property
     def state(self):
-        return State(int(self.slave.operation["state"]))
+        return State(int(self.slave.server.operation["state"]))
 
 
 def test_a_slave_enables_and_homes_itself_unless_it_is_told_not_to():
     arm = Arm(seconds=0.01)
-    assert (arm.state, arm.slave.operation["is_homed"]) == (E, 1.0)
+    assert (arm.state, arm.slave.server.operation["is_homed"]) == (E, 1.0)
     arm = Arm(seconds=1.0, starts_enabled=False)
-    assert (arm.state, arm.slave.operation["is_homed"]) == (D, 0.0)
+    assert (arm.state, arm.slave.server.operation["is_homed"]) == (D, 0.0)
     assert not arm.steps.any()
-    assert arm.slave.request("home")[0] is Answer.REFUSED
-    assert arm.slave.request("enable")[0] is Answer.DONE
+    assert arm.slave.server.request("home")[0] is Answer.REFUSED
+    assert arm.slave.server.request("enable")[0] is Answer.DONE
     arm.run(0.5)
     assert not arm.steps.any()
-    arm.slave.request("home")
+    arm.slave.server.request("home")
     arm.run(1.0)
-    assert arm.slave.operation["is_homed"] == 1.0
+    assert arm.slave.server.operation["is_homed"] == 1.0
     assert arm.steps[-1].any()
 
 
 def test_homing_is_smooth_and_within_the_limits():
     robot = "puma560"
-    slave = SlaveSim(
-        SlaveSimParameters(robot=robot, operation=OperationParameters(starts_enabled=False))
+    slave = SimulatedArm(
+        ArmParameters(robot=robot, operation=OperationParameters(starts_enabled=False))
     )
     row, found, ns = slave.signals, [], 10**9
-    slave.request("enable")
-    slave.request("home")
+    slave.server.request("enable")
+    slave.server.request("home")
     for _ in range(10_000):
         ns += 10**6
         row["now_ns"] = ns
         slave.step()
         found.append(np.array(row["slave_setpoint_js"]))
-    assert slave.operation["is_homed"] == 1.0
-    start = slave.parameters["start"]
+    assert slave.server.operation["is_homed"] == 1.0
+    start = slave.server.parameters["start"]
     assert np.allclose(found[-1], start, rtol=0, atol=1e-12)
     drives = slave.robot.drives
     speed = np.abs(np.diff(found, axis=0)) / 1e-3
@@ -194,21 +194,21 @@ def test_homing_is_smooth_and_within_the_limits():
 def test_nothing_moves_outside_enabled_however_one_got_there(word):
     arm = Arm(seconds=1.13)
     assert arm.steps[-1].any()
-    arm.slave.request(word)
+    arm.slave.server.request(word)
     arm.run(0.5)
     before = len(arm.setpoints)
     arm.run(1.0)
     assert not arm.steps[before:].any()
-    assert abs(arm.slave.arm.dq).max() < 1e-3 * arm.limit.max()
+    assert abs(arm.slave.simulated.arm.dq).max() < 1e-3 * arm.limit.max()
 
 
 def test_from_an_emergency_stop_the_setpoint_stands_still_in_the_next_tick():
     arm = Arm(seconds=1.13)
     before = len(arm.setpoints)
-    arm.slave.press(is_pressed=True, now_ns=arm.ns)
+    arm.slave.server.press(is_pressed=True, now_ns=arm.ns)
     arm.run(1.0)
     assert not arm.steps[before - 1 :].any()
-    values = arm.slave.operation
+    values = arm.slave.server.operation
     assert values["is_stopped"] == 1.0
     drives = arm.slave.robot.drives
     braking = (0.1 * 2 * np.pi * arm.limit / arm.limit.max()) / (
@@ -219,21 +219,21 @@ def test_from_an_emergency_stop_the_setpoint_stands_still_in_the_next_tick():
 
 def test_brakes_stop_an_arm_no_farther_than_its_speed_needs():
     arm = Arm(seconds=1.13, standstill="brake")
-    q, dq = arm.slave.arm.q.copy(), arm.slave.arm.dq.copy()
-    arm.slave.request("stop")
+    q, dq = arm.slave.simulated.arm.q.copy(), arm.slave.simulated.arm.dq.copy()
+    arm.slave.server.request("stop")
     arm.run(0.5)
     drives = arm.slave.robot.drives
     needed = 0.5 * dq**2 / (drives.effort_limit / drives.inertia) + np.abs(dq) * 1e-3
-    assert (np.abs(arm.slave.arm.q - q) <= needed + 1e-6).all()
+    assert (np.abs(arm.slave.simulated.arm.q - q) <= needed + 1e-6).all()
     assert not arm.row["slave_measured_js"][12:].any()
 
 
 def test_after_a_stop_the_arm_follows_again_without_a_jump():
     arm = Arm(seconds=1.13)
-    arm.slave.request("stop")
+    arm.slave.server.request("stop")
     arm.run(0.5)
     for word in ("reset", "enable"):
-        assert arm.slave.request(word)[0] is Answer.DONE
+        assert arm.slave.server.request(word)[0] is Answer.DONE
     arm.run(0.5)
     assert arm.state is E
     assert arm.steps[-100:].any()
@@ -258,21 +258,21 @@ def test_after_a_long_outage_motion_is_resumed_on_purpose_only():
     before = len(arm.setpoints)
     arm.run(1.0)
     assert not arm.steps[before:].any()
-    assert arm.slave.request("resume")[0] is Answer.DONE
+    assert arm.slave.server.request("resume")[0] is Answer.DONE
     arm.run(0.5)
     assert arm.steps[-100:].any()
 
 
 def test_a_silent_heartbeat_is_a_stop():
     arm = Arm(seconds=0.05, heartbeat=0.1)
-    arm.slave.press(is_pressed=False, now_ns=arm.ns)
+    arm.slave.server.press(is_pressed=False, now_ns=arm.ns)
     arm.run(0.09)
     assert arm.state is E
     arm.run(0.03)
     assert arm.state is F
-    assert arm.slave.request("reset")[0] is Answer.STOPPED
-    arm.slave.press(is_pressed=False, now_ns=arm.ns)
-    assert arm.slave.request("reset")[0] is Answer.DONE
+    assert arm.slave.server.request("reset")[0] is Answer.STOPPED
+    arm.slave.server.press(is_pressed=False, now_ns=arm.ns)
+    assert arm.slave.server.request("reset")[0] is Answer.DONE
 
 
 def test_a_script_commands_at_its_times():
@@ -301,20 +301,22 @@ def test_no_session_can_have_an_emergency_stop_told_only(word):
 @pytest.mark.parametrize("law", ["pid", "source_pid"])
 def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_turn(law, seconds):
     arm = Arm(law=law, is_filtered=False, seconds=seconds)
-    arm.slave.request("pause")
-    while arm.slave.request("resume")[0] is Answer.BRAKING:
+    arm.slave.server.request("pause")
+    while arm.slave.server.request("resume")[0] is Answer.BRAKING:
         arm.run(0.001)
-    assert arm.slave.state["state"] == E
+    assert arm.slave.server.state["state"] == E
     paused = Arm(law=law, is_filtered=False, seconds=seconds)
-    paused.slave.request("pause")
+    paused.slave.server.request("pause")
     paused.run(1e-9 * (arm.ns - paused.ns))
     for _ in range(200):  # nothing of the swing is left to come
-        assert (np.abs(paused.slave.arm.dq) <= paused.slave.parameters["rest_speed"]).all()
+        assert (
+            np.abs(paused.slave.simulated.arm.dq) <= paused.slave.server.parameters["rest_speed"]
+        ).all()
         paused.run(0.001)
 
 
 def test_an_arm_that_was_paused_while_it_homed_homes_when_it_is_resumed():
-    slave = SlaveSim(SlaveSimParameters(robot="puma560"))
+    slave = SimulatedArm(ArmParameters(robot="puma560"))
     row, ns = slave.signals, 10**9
 
     def run(ticks):
@@ -325,14 +327,16 @@ def test_an_arm_that_was_paused_while_it_homed_homes_when_it_is_resumed():
             slave.step()
 
     run(200)
-    assert slave.state["is_homing"]
-    slave.fail(Fault.STALL, 3.0, 2.0)
+    assert slave.server.state["is_homing"]
+    slave.server.fail(Fault.STALL, 3.0, 2.0)
     run(1000)
-    assert (slave.operation["state"], slave.operation["is_homed"]) == (P, 0.0)
-    assert slave.request("resume")[0] is Answer.DONE
+    assert (slave.server.operation["state"], slave.server.operation["is_homed"]) == (P, 0.0)
+    assert slave.server.request("resume")[0] is Answer.DONE
     run(10_000)
-    assert slave.operation["is_homed"] == 1.0
-    assert np.allclose(row["slave_setpoint_js"], slave.parameters["start"], rtol=0, atol=1e-12)
+    assert slave.server.operation["is_homed"] == 1.0
+    assert np.allclose(
+        row["slave_setpoint_js"], slave.server.parameters["start"], rtol=0, atol=1e-12
+    )
 
 
 def test_unhome_and_disable_end_what_a_pause_left_of_homing():

@@ -89,12 +89,12 @@ def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path):
     )  # fmt: skip
     file = tmp_path / "placement.yaml"
     file.write_text(placement.parameter_file())
-    assert yaml.safe_load(file.read_text())["slave_sim"]["ros__parameters"]["start"] == list(START)
+    assert yaml.safe_load(file.read_text())["slave"]["ros__parameters"]["start"] == list(START)
     texts = shlex.split(" ".join(shlex.quote(text) for text in placement.texts()))
     ways = ({"files": [file]}, {"texts": texts}, {"settings": placement.settings()})
     for way in ways:
         made = tc.configuration(**way)
-        slave = made.group("slave_sim")
+        slave = made.group("slave")
         taken = Placement.of(made.group("motion_scaling"), slave, slave.start)
         assert taken == placement
 
@@ -105,7 +105,7 @@ def test_a_placement_that_needs_no_change_is_written_too(tmp_path):
     file = tmp_path / "reach.yaml"
     file.write_text(found.parameter_file())
     start = found.given.placement.start
-    assert tc.configuration(files=[file]).group("slave_sim").start == tuple(start)
+    assert tc.configuration(files=[file]).group("slave").start == tuple(start)
 
 
 def test_a_placement_of_an_arm_leaves_the_other_arms_alone():

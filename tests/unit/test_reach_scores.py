@@ -199,7 +199,7 @@ def test_what_inverse_kinematics_left_is_counted_while_the_slave_follows(path):
 
 
 def configured(interpolation):
-    return f"slave_sim: {{ros__parameters: {{interpolation: '{interpolation}'}}}}"
+    return f"slave: {{ros__parameters: {{interpolation: '{interpolation}'}}}}"
 
 
 @pytest.mark.parametrize(

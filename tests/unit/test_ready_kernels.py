@@ -10,17 +10,19 @@ from teleop_core.kernels import IS_COMPILED
 # In a process of its own: here other tests have compiled them already.
 SCRIPT = """
 import gc
+import weakref
 import numpy as np
 from teleop_core.kernels import is_kernel
 from teleop_core.operation import Fault
 from teleop_core.operation.states import COMMANDS
 from teleop_core.parameters import build
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 
 def ready():
     return {f"{k.py_func.__module__}.{k.py_func.__qualname__}"
-            for k in gc.get_objects() if is_kernel(k) and k.signatures}
+            for k in gc.get_objects()
+            if type(k) is not weakref.ProxyType and is_kernel(k) and k.signatures}
 
 
 def tick(slave, count):
@@ -29,30 +31,31 @@ def tick(slave, count):
         slave.step()
 
 
-slave = SlaveSim(SlaveSimParameters(starts_at_home=True))
-slave.motion.load()
+slave = SimulatedArm(ArmParameters(starts_at_home=True))
+slave.server.motion.load()
 tick(slave, 10)
 before = ready()
-slave.press(is_pressed=False, now_ns=0)
-slave.press(is_pressed=True, now_ns=0)
-slave.fail(Fault.STALL, 1.0, 0.5)
+slave.server.press(is_pressed=False, now_ns=0)
+slave.server.press(is_pressed=True, now_ns=0)
+slave.server.fail(Fault.STALL, 1.0, 0.5)
 for command in COMMANDS:
-    slave.request(command)
+    slave.server.request(command)
     tick(slave, 10)
 home = slave.robot.home
-slave.motion.move(home - 0.01)
-slave.motion.move_by(0.0 * home)
-slave.motion.move_to_pose(slave.robot.fk(home))
-slave.motion.drive_joints(0.0 * home, 0)
-slave.motion.drive_tip(np.zeros(6), 0)
+slave.server.motion.move(home - 0.01)
+slave.server.motion.move_by(0.0 * home)
+slave.server.motion.move_to_pose(slave.robot.fk(home))
+slave.server.motion.drive_joints(0.0 * home, 0)
+slave.server.motion.drive_tip(np.zeros(6), 0)
 soft = {"starts_at_home": True, "controller.pid.bandwidth": (20.0,) * 6}
-slave.retune(build(SlaveSimParameters, soft))
+slave.retune(build(ArmParameters, soft))
 tick(slave, 10)
 assert any(name.endswith("_request") for name in before), before
 print(*sorted(ready() - before))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not IS_COMPILED, reason="nothing is compiled in pure Python")
 def test_commands_faults_and_new_gains_compile_nothing_once_a_slave_runs():
     done = subprocess.run(

@@ -18,6 +18,7 @@ from teleop_core.bags.transforms import TransformMessages
 from teleop_core.errors import ShapeError, UnknownNameError
 from teleop_core.fixtures.sphere import SPHERE
 from teleop_core.session.markers import FORCE_SCALE, TAIL, ArmMarkers
+from teleop_core.signals import TICK_NS
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 ROUNDING = 1e-12
@@ -57,6 +58,7 @@ def test_the_recorded_tip_frame_is_the_measured_tip(tmp_path: Path, robot: str) 
     tips, tip = frames(tmp_path / "bag")["slave_base>slave_tip"], recording["slave/measured_cp"]
     measured = dict(zip(tip.stamp_ns.tolist(), tip.values, strict=True))
     assert len(tips) > 10
+    tips.pop(max(measured) + TICK_NS, None)  # a pose is told a tick after its joints
     for stamp_ns, pose in tips.items():
         sign = np.sign(pose[3:] @ measured[stamp_ns][3:])
         assert pose[:3] == pytest.approx(measured[stamp_ns][:3], abs=1e-9)

@@ -17,7 +17,7 @@ DELAY_TICKS = 20
 
 
 def test_setpoints_are_recorded_with_the_stamp_of_the_command_in_force(tmp_path):
-    settings = ["duration=0.5", f"slave_sim.start={HOME}"]
+    settings = ["duration=0.5", f"slave.start={HOME}"]
     settings.append(f"teleop.delays=[slave/servo_jp={DELAY_TICKS * 1e-3}]")
     simulate(configure(settings=settings), tmp_path / "bag")
     bag = Bag(tmp_path / "bag")
@@ -52,11 +52,11 @@ def test_recording_of_before_is_read_and_replayed_from_where_it_began(tmp_path):
 
 
 def test_arms_that_begin_farther_away_are_waited_for_before_the_recorded_hand_moves():
-    at_home = api.run("coarse_box", duration=1.0, slave_sim__start=HOME)
+    at_home = api.run("coarse_box", duration=1.0, slave__start=HOME)
     again = api.replay(at_home)
     for topic in ("slave/setpoint_js", "slave/measured_cp"):
         assert np.array_equal(again[topic].values, at_home[topic].values)
-    elsewhere = {"slave_sim.start": [], "slave_sim.starts_at_home": False}
+    elsewhere = {"slave.start": [], "slave.starts_at_home": False}
     later = api.replay(at_home, settings=elsewhere)
     state, first_ns = at_home["teleop/state"], int(at_home["master/measured_cp"].stamp_ns[0])
     follows_ns = int(state.stamp_ns[np.argmax(state["is_following"] > 0.0)])

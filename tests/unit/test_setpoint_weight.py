@@ -14,12 +14,9 @@ from teleop_core.kernels import kernel
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.signals import DT, TICK_NS
-from teleop_core.slave.slave_sim import (
-    ControllerParameters,
-    ReferenceFilterParameters,
-    SlaveSim,
-    SlaveSimParameters,
-)
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.slave_sim import ControllerParameters
 
 ROBOTS = {name: load_robot(name) for name in ("rcrt1", "scara", "puma560", "stewart", "rps3")}
 AXES = [(name, axis) for name, robot in ROBOTS.items() for axis in range(robot.n)]
@@ -151,18 +148,20 @@ def slave_step_trace(name, axis, size):
     robot = ROBOTS[name]
     start = robot.home.copy()
     start[axis] = min(start[axis], robot.upper[axis] - size)
-    slave = SlaveSim(
-        SlaveSimParameters(
+    slave = SimulatedArm(
+        ArmParameters(
             robot=name, starts_at_home=True, gravity_compensation="all", interpolation="none",
             controller=build(ControllerParameters, {"kind": "pid", "pid.setpoint_weight": THIRD}),
             reference_filter=ReferenceFilterParameters(is_on=False),
         )
     )  # fmt: skip
-    slave.arm.q[:] = start
-    for field in ("command", "filtered", "setpoint", "target", "measured"):
-        slave.state[field] = start
-    slave.arm.memory[:] = 0.0
-    PID.begin(slave.arm.memory, start, np.zeros(robot.n))
+    slave.simulated.arm.q[:] = start
+    slave.simulated.state["measured"] = start
+    for field in ("command", "filtered", "setpoint", "target"):
+        slave.server.state[field] = start
+    slave.signals["slave_measured_js"][: robot.n] = start
+    slave.simulated.arm.memory[:] = 0.0
+    PID.begin(slave.simulated.arm.memory, start, np.zeros(robot.n))
     row, reach = slave.signals, 0.099 * robot.drives.speed_limit[axis]
     ticks = int(800 + 1100 * size / robot.drives.speed_limit[axis])
     goal, trace = start.copy(), np.empty(ticks)
@@ -173,7 +172,7 @@ def slave_step_trace(name, axis, size):
         row["slave_servo_jp"], row["slave_servo_jp_ns"] = goal, row["now_ns"]
         slave.step()
         assert row["command_status"] == 0
-        trace[k] = slave.arm.q[axis] - start[axis]
+        trace[k] = slave.simulated.arm.q[axis] - start[axis]
     return trace
 
 

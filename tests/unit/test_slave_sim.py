@@ -20,12 +20,9 @@ from teleop_core.robots.drives import ACCELERATION, independent_acceleration
 from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.joints import integrate
-from teleop_core.slave.slave_sim import (
-    ControllerParameters,
-    ReferenceFilterParameters,
-    SlaveSim,
-    SlaveSimParameters,
-)
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.slave_sim import ControllerParameters, SlaveSim, SlaveSimParameters
 
 ARM = load_robot("rcrt1")
 DRIVES = ARM.drives
@@ -46,7 +43,7 @@ class Bench:
     """A slave and the ticks that its commands come in."""
 
     def __init__(self, **values):
-        self.slave = SlaveSim(SlaveSimParameters(**{"start": AT_HOME} | values))
+        self.slave = SimulatedArm(ArmParameters(**{"start": AT_HOME} | values))
         self.row, self.now_ns = self.slave.signals, 0
 
     def tick(self, command=None, stamp_ns=None):
@@ -75,7 +72,7 @@ class Bench:
 
     @property
     def joints(self):
-        return self.slave.arm.q.copy()
+        return self.slave.simulated.arm.q.copy()
 
     @property
     def setpoint(self):
@@ -108,7 +105,7 @@ def test_error_against_the_exact_solution_falls_with_the_fourth_power_of_the_ste
 def test_default_steps_resolve_the_stiffest_friction_of_the_arm():
     # Dry friction grows through zero speed like viscous friction of coulomb / friction_speed.
     rates = (DRIVES.viscous + DRIVES.coulomb / DRIVES.friction_speed) / DRIVES.inertia
-    steps = SlaveSimParameters().integration_steps
+    steps = ArmParameters().integration_steps
     # Fifth-order term (rate h)^5 / 120 in each step of h = 1 ms / steps: 670/s makes 7e-5.
     bound = steps * (rates.max() * 1e-3 / steps) ** 5 / 120.0
     assert bound < 1e-4
@@ -116,13 +113,14 @@ def test_default_steps_resolve_the_stiffest_friction_of_the_arm():
 
 
 def test_more_steps_change_the_path_of_the_arm_less_and_less():
-    slave, ends = SlaveSim(SlaveSimParameters(start=AT_HOME)), []
+    slave, ends = SlaveSim(SlaveSimParameters()), []
+    arm = slave.arm
     effort = np.array([2.0, -3.0, 5.0, 0.05, 0.03, 0.02])
     for steps in (1, 2, 4, 8):
         q, dq = MIDDLE.copy(), np.array([1.0, -1.0, 0.02, 1.0, -1.0, 1.0])
         for _ in range(100):
             integrate(
-                slave.arm.acceleration, slave.arm.dynamics, slave.parameters, slave.state, steps,
+                arm.acceleration, arm.dynamics, slave.parameters, slave.state, steps,
                 effort, q, dq, DT,
             )  # fmt: skip
         ends.append(q)
@@ -208,7 +206,7 @@ def test_setpoint_that_starts_to_move_kicks_the_drive_no_more_than_its_speed_doe
     bench = Bench()
     bench.go_to(MIDDLE)
     rest = bench.row["slave_measured_js"][12:].copy()
-    gains = bench.slave.arm.gains.copy()
+    gains = bench.slave.simulated.arm.gains.copy()
     speed = np.array([0.05, 0.05, 0.002, 0.05, 0.05, 0.05])
     efforts = []
     for k in range(1, 20):
@@ -227,7 +225,7 @@ bounded_joints = st.tuples(*[st.floats(-1.0, 1.0)] * 6).map(np.array)
 def test_drives_and_setpoint_keep_their_limits_under_any_commands(shares):
     bench, last = Bench(), ARM.home.copy()
     for share in shares:
-        command = bench.slave.state["command"] + 0.099 * share * DRIVES.speed_limit
+        command = bench.slave.server.state["command"] + 0.099 * share * DRIVES.speed_limit
         for _ in range(50):
             bench.tick(command)
             setpoint, effort = bench.setpoint, bench.row["slave_measured_js"][12:]
@@ -235,7 +233,7 @@ def test_drives_and_setpoint_keep_their_limits_under_any_commands(shares):
             assert (np.abs(setpoint - last) <= DRIVES.speed_limit * 1e-3 + 1e-15).all()
             assert ((setpoint >= ARM.lower) & (setpoint <= ARM.upper)).all()
             # Beyond its rated speed a motor gives nothing after another tenth.
-            assert (np.abs(bench.slave.arm.dq) <= 1.1 * DRIVES.speed_limit).all()
+            assert (np.abs(bench.slave.simulated.arm.dq) <= 1.1 * DRIVES.speed_limit).all()
             assert np.isfinite(bench.joints).all()
             last = setpoint
 
@@ -248,7 +246,7 @@ def test_long_move_runs_at_the_speed_limit_and_recovers_without_windup(joint):
     for _ in range(900):
         goal[joint] = min(goal[joint] + 1e-3 * DRIVES.speed_limit[joint], target)
         bench.tick(goal)
-        fastest = max(fastest, abs(bench.slave.arm.dq[joint]))
+        fastest = max(fastest, abs(bench.slave.simulated.arm.dq[joint]))
     joints, _ = bench.trace(goal, 1500)
     assert fastest <= 1.1 * DRIVES.speed_limit[joint]
     assert np.abs(joints[:, joint]).max() <= target + COUNT[joint]
@@ -260,12 +258,12 @@ def test_integral_stays_bounded_while_an_overload_holds_the_arm_back():
     # cannot.
     told = OperationParameters(reported=("tracking", "tip", "effort"))
     bench = Bench(operation=told)
-    bench.slave.parameters["coulomb"][0] = 20.0
+    bench.slave.simulated.parameters["coulomb"][0] = 20.0
     goal = ARM.home + np.array([0.2, 0, 0, 0, 0, 0])
     bench.trace(goal, 5000)
-    integral = abs(bench.slave.arm.memory[0, 0])
+    integral = abs(bench.slave.simulated.arm.memory[0, 0])
     assert integral <= DRIVES.effort_limit[0]
-    bench.slave.parameters["coulomb"][0] = DRIVES.coulomb[0]
+    bench.slave.simulated.parameters["coulomb"][0] = DRIVES.coulomb[0]
     joints, _ = bench.trace(goal, 2000)
     assert abs(joints[-1, 0] - goal[0]) <= COUNT[0]
     # An eighth of the way at most: a tenth of a second of full torque before it brakes.
@@ -275,18 +273,18 @@ def test_integral_stays_bounded_while_an_overload_holds_the_arm_back():
 def test_an_effort_that_was_a_fault_is_none_any_more_after_a_reset():
     others = OperationParameters(reported=("tracking", "tip", "overspeed"))
     bench = Bench(operation=others)
-    bench.slave.parameters["coulomb"][0] = 20.0  # as of an arm that is caught
+    bench.slave.simulated.parameters["coulomb"][0] = 20.0  # as of an arm that is caught
     goal = ARM.home + np.array([0.2, 0, 0, 0, 0, 0])
     bench.trace(goal, 5000)
-    assert bench.slave.operation["fault"] == Fault.EFFORT
-    assert bench.slave.state["full_ticks"].max() == 0
-    bench.slave.parameters["coulomb"][0] = DRIVES.coulomb[0]
+    assert bench.slave.server.operation["fault"] == Fault.EFFORT
+    assert bench.slave.server.state["full_ns"].max() == 0
+    bench.slave.simulated.parameters["coulomb"][0] = DRIVES.coulomb[0]
     for command in ("reset", "enable"):
-        answer, text = bench.slave.request(command)
+        answer, text = bench.slave.server.request(command)
         assert answer is Answer.DONE, text
     for _ in range(500):
         bench.tick(goal)
-    assert bench.slave.operation["state"] == State.ENABLED
+    assert bench.slave.server.operation["state"] == State.ENABLED
 
 
 # Encoders.
@@ -307,11 +305,14 @@ def test_readings_are_whole_counts_within_half_a_count_of_the_joints():
 def test_poses_are_those_of_setpoint_and_readings():
     bench = Bench()
     bench.go_to(MIDDLE)
+    row = bench.row
+    read, read_ns = row["slave_measured_js"][:6].copy(), int(row["slave_measured_js_ns"])
+    bench.tick(MIDDLE)
     for joints, pose in (
-        (bench.setpoint, bench.row["slave_setpoint_cp"]),
-        (bench.row["slave_measured_js"][:6].copy(), bench.row["slave_measured_cp"]),
-    ):
+        (bench.setpoint, row["slave_setpoint_cp"]), (read, row["slave_measured_cp"])
+    ):  # fmt: skip
         assert np.allclose(ARM.fk(joints)[:3, 3], pose[:3], rtol=0, atol=1e-15)
+    assert row["now_ns"] - read_ns == TICK_NS
 
 
 def test_measured_speed_follows_the_motion():
@@ -365,7 +366,7 @@ def test_jump_is_refused_counted_and_not_followed(joint):
     jump = MIDDLE.copy()
     jump[joint] += 0.1001 * DRIVES.speed_limit[joint]
     assert bench.tick(jump) is CommandStatus.REFUSED
-    assert bench.slave.refused == 1
+    assert bench.slave.server.refused == 1
     calm.tick()
     assert np.array_equal(bench.setpoint, calm.setpoint)
     assert np.array_equal(bench.joints, calm.joints)
@@ -405,7 +406,7 @@ def test_command_that_is_no_number_is_refused_and_harms_nothing(joint, bad):
     command = ARM.home.copy()
     command[joint] = bad
     assert bench.tick(command) is CommandStatus.REFUSED
-    assert bench.slave.refused == 1
+    assert bench.slave.server.refused == 1
     joints, efforts = bench.trace(ARM.home, 200)
     assert (np.abs(joints - ARM.home) <= COUNT).all()
     assert np.isfinite(efforts).all()
@@ -415,23 +416,23 @@ def test_old_stamps_are_not_taken_again():
     bench = Bench()
     bench.go_to(MIDDLE)
     bench.tick(MIDDLE + 0.05 * DRIVES.speed_limit, stamp_ns=bench.now_ns - 10 * TICK_NS)
-    assert np.array_equal(bench.slave.state["command"], MIDDLE)
+    assert np.array_equal(bench.slave.server.state["command"], MIDDLE)
 
 
 def test_a_stamp_from_the_future_does_not_shut_out_the_commands_after_it():
     bench = Bench()
     bench.go_to(MIDDLE)
     bench.tick(MIDDLE, stamp_ns=bench.now_ns + 3600 * 10**9)
-    assert bench.slave.refused == 1
+    assert bench.slave.server.refused == 1
     goal = MIDDLE + 0.05 * DRIVES.speed_limit
     bench.tick(goal)
-    assert np.array_equal(bench.slave.state["target"], goal)
+    assert np.array_equal(bench.slave.server.state["target"], goal)
 
 
 def test_command_outside_the_limits_is_followed_up_to_them():
     bench = Bench()
     bench.tick(ARM.home + np.array([0, 0, 1e-3, 0, 0, 0]))
-    assert bench.slave.state["command"][2] == ARM.upper[2]
+    assert bench.slave.server.state["command"][2] == ARM.upper[2]
 
 
 def test_stamp_of_the_command_in_force_is_passed_on():
@@ -483,7 +484,7 @@ def test_reset_repeats_the_motion_to_the_bit():
 def test_retuning_at_rest_moves_the_arm_by_a_few_counts_at_most(values):
     bench = Bench()
     bench.go_to(MIDDLE)
-    bench.slave.retune(SlaveSimParameters(**values))
+    bench.slave.retune(ArmParameters(**values))
     joints, _ = bench.trace(MIDDLE, 1000)
     # Friction and gravity stay held by what holds them; sixteen counts are 0.1 mm at the tip.
     assert (np.abs(joints - MIDDLE) <= 16 * COUNT).all()
@@ -500,14 +501,14 @@ def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth):
         efforts = []
         for _ in range(count):
             bench.tick(MIDDLE + way * np.sin(np.pi * 1e-9 * (bench.now_ns - begin_ns)))
-            efforts.append(bench.slave.arm.effort.copy())
+            efforts.append(bench.slave.simulated.arm.effort.copy())
         return np.array(efforts)
 
     begin_ns = bench.now_ns
     before = moved(4000)[-40:]
-    damping = bench.slave.arm.gains[:, 2].copy()
+    damping = bench.slave.simulated.arm.gains[:, 2].copy()
     bench.slave.retune(
-        SlaveSimParameters(start=tuple(MIDDLE.tolist()), controller=pid(bandwidth=bandwidth))
+        ArmParameters(start=tuple(MIDDLE.tolist()), controller=pid(bandwidth=bandwidth))
     )
     step = np.abs(moved(3) - before.mean(axis=0)).max(axis=0)
     # What the integrators held against the derivatives; steps of encoders are in the rest.
@@ -518,9 +519,9 @@ def test_gains_that_change_in_motion_make_no_step_of_effort(bandwidth):
 def test_gains_that_change_before_the_first_tick_count_from_the_begin(law):
     soft = {"start": AT_HOME, "controller.kind": law}
     soft |= {f"controller.{law}.bandwidth": tuple((0.5 * DRIVES.bandwidth).tolist())}
-    changed = SlaveSim(build(SlaveSimParameters, soft | {f"controller.{law}.bandwidth": ()}))
-    changed.retune(build(SlaveSimParameters, soft))
-    made = SlaveSim(build(SlaveSimParameters, soft))
+    changed = SimulatedArm(build(ArmParameters, soft | {f"controller.{law}.bandwidth": ()}))
+    changed.retune(build(ArmParameters, soft))
+    made = SimulatedArm(build(ArmParameters, soft))
     for k in range(200):
         for slave in (changed, made):
             slave.signals["now_ns"] = slave.signals["slave_servo_jp_ns"] = (k + 1) * TICK_NS
@@ -535,22 +536,22 @@ def test_gains_that_change_before_the_first_tick_count_from_the_begin(law):
 @pytest.mark.parametrize("name", ["viscous", "coulomb"])
 def test_list_of_another_length_than_the_joints_is_refused(name, length):
     with pytest.raises(ParameterError) as error:
-        SlaveSim(SlaveSimParameters(**{name: (1.0,) * length}))
+        SimulatedArm(ArmParameters(**{name: (1.0,) * length}))
     assert error.value.name == f"slave_sim.{name}"
 
 
 @pytest.mark.parametrize("name", ["bandwidth", "kp", "ki", "kd"])
 def test_gains_of_another_length_than_the_joints_are_refused(name):
     with pytest.raises(ParameterError) as error:
-        SlaveSim(SlaveSimParameters(controller=pid(**{name: (1.0,) * 5})))
+        SimulatedArm(ArmParameters(controller=pid(**{name: (1.0,) * 5})))
     assert error.value.name == f"slave_sim.controller.pid.{name}"
 
 
 def test_refused_retuning_changes_nothing():
     bench = Bench()
-    before, gains = bench.slave.parameters.copy(), bench.slave.arm.gains.copy()
-    wrong = SlaveSimParameters(viscous=(1.0,) * 6, controller=pid(kp=(1.0,) * 5))
+    before, gains = bench.slave.simulated.parameters.copy(), bench.slave.simulated.arm.gains.copy()
+    wrong = ArmParameters(viscous=(1.0,) * 6, controller=pid(kp=(1.0,) * 5))
     with pytest.raises(ParameterError):
         bench.slave.retune(wrong)
-    assert bench.slave.parameters == before
-    assert np.array_equal(bench.slave.arm.gains, gains)
+    assert bench.slave.simulated.parameters == before
+    assert np.array_equal(bench.slave.simulated.arm.gains, gains)

@@ -13,12 +13,12 @@ from teleop_core.kernels import kernel
 from teleop_core.parameters import build
 from teleop_core.plants import PLANTS
 from teleop_core.robots import ROBOTS, load_robot
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 
 def slave(**values):
     named = {name.replace("__", "."): value for name, value in values.items()}
-    return SlaveSim(build(SlaveSimParameters, {"robot": "rcrt1", "starts_at_home": True} | named))
+    return SimulatedArm(build(ArmParameters, {"robot": "rcrt1", "starts_at_home": True} | named))
 
 
 @pytest.mark.parametrize(
@@ -50,13 +50,13 @@ def test_friction_that_is_stiff_for_the_steps_is_one_that_the_drive_cannot_follo
 
 def test_refused_gains_leave_the_slave_as_it_was():
     one, other = slave(), slave()
-    bad = build(SlaveSimParameters, {
+    bad = build(ArmParameters, {
         "robot": "rcrt1", "starts_at_home": True, "controller.pid.bandwidth": (500.0,) * 6
     })  # fmt: skip
-    good = build(SlaveSimParameters, {"robot": "rcrt1", "starts_at_home": True})
+    good = build(ArmParameters, {"robot": "rcrt1", "starts_at_home": True})
     with pytest.raises(ParameterError):
         one.retune(bad)
-    assert one.parameters["steps"] == other.parameters["steps"]
+    assert one.simulated.parameters["steps"] == other.simulated.parameters["steps"]
     one.retune(good)
     for k in range(500):
         for arm in (one, other):
@@ -132,8 +132,8 @@ def test_dry_friction_too_stiff_for_the_integrator_is_refused_and_taken_with_mor
     slave(coulomb=dry, integration_steps=20)
 
 
-def test_a_law_that_does_not_come_back_is_taken_where_tracking_is_told_only():
+def test_a_law_that_does_not_come_back_is_taken_where_small_errors_alone_are_tried():
     weak = {"controller__pid__bandwidth": (0.1,) * 6}
-    slave(**weak, operation__reported=("tracking",))
+    slave(**weak, trials="small")
     with pytest.raises(ParameterError, match="comes back"):
         slave(**weak)

@@ -45,7 +45,7 @@ def test_what_a_program_says_between_two_steps_holds_from_the_next_one_on():
     own.run(8000)
     moving = own.step()
     assert np.abs(own.step()["slave_setpoint_js"] - moving["slave_setpoint_js"]).max() > 1e-6
-    own.stages["slave_sim"].request("stop")
+    own.stages["slave"].request("stop")
     still = own.step()
     assert still["slave_operation"][0] == State.FAULT
     np.testing.assert_array_equal(own.step()["slave_setpoint_js"], still["slave_setpoint_js"])

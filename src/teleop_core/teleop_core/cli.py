@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from teleop_core.commands import (
     calibrate,
+    compiling,
     conformance,
     console,
     devices,
@@ -127,6 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     conformance.add(commands)
     console.add(commands)
     devices.add(commands)
+    compiling.add(commands)
     return parser
 
 

@@ -7,6 +7,7 @@ back as a status beside the value.
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from teleop_core.texts import LONGEST_LINE, one_line, printable, shown
 
@@ -22,6 +23,16 @@ class TeleopError(Exception):
 
     def __init__(self, text: str = "") -> None:
         super().__init__(one_line(text))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Parts from which another process makes the same error."""
+        return _same, (type(self), str(self), self.__dict__)
+
+
+def _same(kind: type[TeleopError], text: str, attributes: dict[str, object]) -> TeleopError:
+    error = kind.__new__(kind, text)
+    error.__dict__.update(attributes)
+    return error
 
 
 class ParameterError(TeleopError, ValueError):

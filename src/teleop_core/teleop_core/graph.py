@@ -14,7 +14,7 @@ from teleop_core.topics import Kind, Topic
 
 __all__ = ["BUILT_IN", "RECORDER_NAME", "Delay", "Graph", "Link", "Member", "build_graph"]
 
-BUILT_IN = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave_sim")
+BUILT_IN = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim")
 """Names of the stages that every arm has."""
 RECORDER_NAME = "recorder"
 
@@ -28,7 +28,7 @@ class Member:
 
     @property
     def name(self) -> str:
-        """Name of the node, with its namespace: ``left/slave_sim``."""
+        """Name of the node, with its namespace: ``left/slave``."""
         return f"{self.arm}/{self.stage.name}" if self.arm else self.stage.name
 
     @property

@@ -75,6 +75,12 @@ class Stream:
             raise UnknownNameError(f"column of {self.topic}", column, self.columns)
         return self.columns.index(column)
 
+    def part(self, rows: slice) -> "Stream":
+        """Some of its messages."""
+        stamp_ns, log_ns = self.stamp_ns[rows], self.log_ns[rows]
+        values = self.values[rows]
+        return Stream(self.topic, self.columns, stamp_ns, log_ns, values, self.start_ns)
+
     def frame(self) -> "pandas.DataFrame":
         """The stream as a pandas data frame over the time [s], with its stamps."""
         import pandas

@@ -37,6 +37,12 @@ class Runner(Protocol):
     arguments: tuple[Any, ...]
     ahead: int
     """Ticks for which it can be prepared at once, 1000 at most."""
+    changes_itself: bool
+    """Whether it changes parameters by itself, as a mode button does; see :meth:`present`."""
+
+    @property
+    def lead(self) -> int:
+        """Ticks before it can follow, as for a move to where it starts."""
 
     def prepare(self, ticks: int) -> None:
         """Get ready for the next ``ticks`` steps, ``ahead`` at most."""
@@ -52,6 +58,21 @@ class Runner(Protocol):
 
     def load(self) -> object:
         """Compile or load the kernel, so that the first step takes no longer than others."""
+
+    def examine(self, parameters: Any) -> None:
+        """Try parameters beside the running steps, where that takes long, before :meth:`retune`."""
+
+    def present(self) -> Any:
+        """Parameters as they are now; asked for only where it changes them by itself."""
+
+    def fall_silent(self) -> None:
+        """Make outputs safe when the topic that it answers has fallen silent."""
+
+    def concerns(self) -> list[str]:
+        """What is wrong now, in words, for people; asked once a second."""
+
+    def described(self) -> dict[str, str]:
+        """Names and texts that its report tells beside its numbers."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -195,8 +216,13 @@ class RunningStage:
         )[0]
         self.kernel: Callable[..., None] = _nothing
         self.arguments: tuple[Any, ...] = ()
-        self.ahead = 1000
+        self.ahead, self.changes_itself = 1000, False
         self._bound: Callable[[], object] | None = None
+
+    @property
+    def lead(self) -> int:
+        """Ticks before it can follow: none."""
+        return 0
 
     def prepare(self, ticks: int) -> None:
         """Get ready for the next ``ticks`` steps; nothing to do here."""
@@ -206,6 +232,24 @@ class RunningStage:
 
     def retune(self, parameters: Any) -> None:
         """Take new parameters from the next step on."""
+
+    def examine(self, parameters: Any) -> None:
+        """Try parameters before they are taken; nothing to do here."""
+
+    def present(self) -> Any:
+        """Parameters as they are now, of a stage that changes them by itself."""
+        raise NotImplementedError
+
+    def fall_silent(self) -> None:
+        """Make outputs safe when the topic that it answers has fallen silent; nothing here."""
+
+    def concerns(self) -> list[str]:
+        """What is wrong now, in words: nothing."""
+        return []
+
+    def described(self) -> dict[str, str]:
+        """Names and texts that its report tells beside its numbers: none."""
+        return {}
 
     def step(self) -> None:
         """Make one step."""
@@ -310,6 +354,7 @@ STAGES: Registry[Stage] = Registry(
         "haptic_master": "teleop_core.master.haptic_master:HAPTIC_MASTER",
         "motion_scaling": "teleop_core.mapping.motion_scaling:MOTION_SCALING",
         "inverse_kinematics": "teleop_core.mapping.inverse_kinematics:INVERSE_KINEMATICS",
+        "slave": "teleop_core.slave.slave:SLAVE",
         "slave_sim": "teleop_core.slave.slave_sim:SLAVE_SIM",
         "recorder": "teleop_core.bags.recording:RECORDER",
     },

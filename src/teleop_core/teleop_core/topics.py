@@ -13,12 +13,13 @@ STATE_COMMANDS = (
 """What an arm in operation is told, by name; see :mod:`teleop_core.operation`."""
 OPERATION = (
     "state", "is_homed", "is_busy", "is_stopped", "fault", "fault_joint", "fault_value",
-    "fault_bound", "rest_time", "travel",
+    "fault_bound", "rest_time", "travel", "is_braked",
 )  # fmt: skip
 """Numbers of ``slave/operation``: :class:`~teleop_core.operation.State`, flags,
 :class:`~teleop_core.operation.Fault`, the joint that it is about (-1: none), what was found and
 what it must not exceed; since it last had to stop: the time until it was at rest [s] and how far
-the tip got meanwhile [m], both 0 until then."""
+the tip got meanwhile [m], both 0 until then; whether its drives are to be off and brakes to hold
+it."""
 
 
 class Quality(Enum):
@@ -252,7 +253,9 @@ SLAVE_SETPOINT_JS = Topic(
 )
 SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, in_force("slave/servo_jp"), "slave_base")
 SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, SAMPLED, "slave_base")
-SLAVE_MEASURED_CP = Topic("slave/measured_cp", Kind.POSE, SAMPLED, "slave_base")
+SLAVE_MEASURED_CP = Topic(
+    "slave/measured_cp", Kind.POSE, passed_on("slave/measured_js"), "slave_base"
+)
 SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
 """Where the tip really is, which no encoder sees: only a simulator knows, or a tracker."""
 SLAVE_OPERATION = Topic("slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED,

@@ -3,7 +3,7 @@
 Topics of the default arm have the plain names; those of an arm called ``left`` are below ``left/``.
 The metadata name the arms under ``arms``, with blanks between them and the default one first; robot
 and seed of a further arm are in ``left/robot`` and ``left/seed``. All arms share ``diagnostics``,
-in which the nodes of an arm are called ``left/slave_sim``.
+in which the nodes of an arm are called ``left/slave``.
 
 What a recorder records in a namespace is below that as well, which the metadata tell under
 ``namespace``: arms keep their names, and ``left`` of ``/lab`` is below ``lab/left/``.

@@ -96,7 +96,7 @@ class Bodies:
         Raises:
             ShapeError: Another shape.
         """
-        joints = np.ascontiguousarray(q, dtype=np.float64)
+        joints = np.array(q, dtype=np.float64, order="C")  # a copy: one that can be written
         if joints.ndim not in {1, 2} or joints.shape[-1] != self.n:
             raise ShapeError("q", (self.n,), joints.shape)
         rows = joints.reshape(-1, self.n)

@@ -56,7 +56,7 @@ def setting_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", dest="settings",
-        help="parameter over all files, e.g. fine_gain=0.2 or slave_sim.command_timeout=0.2",
+        help="parameter over all files, e.g. fine_gain=0.2 or slave.command_timeout=0.2",
     )  # fmt: skip
 
 

@@ -2,13 +2,14 @@
 
 import argparse
 import json
+import shlex
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from teleop_core.commands.arguments import command, ros_module, setting_arguments
-from teleop_core.errors import RecordingError
+from teleop_core.errors import ParameterError, RecordingError
 
 if TYPE_CHECKING:
     from teleop_core.drill import Exercise, Outcome
@@ -19,6 +20,7 @@ without a name all faults are injected, which takes minutes:
   teleop drill stop_topic kill_motion_scaling
   teleop drill --short                     five faults, less than a minute
   teleop drill --composed --json drill.json
+  teleop drill --drives "python examples/foreign_slave.py"    drives of your own
   teleop drill --set real_time.priority=50  on a machine that others keep busy
 it starts sessions of its own, simulated, on a ROS domain of their own, kills and stops processes of
 these sessions alone, and keeps the machine's cores busy for seconds. Exit code 0: all as expected.
@@ -37,6 +39,10 @@ def add(commands: Any) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table as Markdown")
     parser.add_argument(
+        "--drives", metavar="COMMAND", type=shlex.split, default=(),
+        help="command of drives that the slave leads in place of the simulated ones",
+    )  # fmt: skip
+    parser.add_argument(
         "--out", type=Path, metavar="DIR", help="keep the recordings here; must not exist"
     )
     setting_arguments(parser)
@@ -52,6 +58,8 @@ def _run(arguments: argparse.Namespace) -> int:
         for one in exercises:
             print(f"{one.name:24} {one.text}")
         return 0
+    if arguments.drives and arguments.composed:
+        raise ParameterError("--drives", shlex.join(arguments.drives), "without --composed")
     for file in (arguments.json, arguments.markdown):
         if file is not None:
             check_place(file)
@@ -76,6 +84,7 @@ def _outcomes(exercises: "tuple[Exercise, ...]", arguments: argparse.Namespace) 
             exercises, folder,
             lambda line: console.print(line, highlight=False, markup=False, soft_wrap=True),
             is_composed=arguments.composed, files=arguments.config, texts=arguments.settings,
+            drives=arguments.drives,
         )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ class Progress:
     def __init__(self) -> None:
         self.ticks = self.sessions = 0
         self.show: Callable[[int, int], None] | None = None
+        self.say: Callable[[str], None] | None = None
 
     def __call__(self, done: int, total: int) -> None:
         """Take how many ticks are done, of how many."""
@@ -43,19 +44,29 @@ def shown_progress(text: str) -> Iterator[Progress]:
 
 
 def _watch(progress: Progress, ended: threading.Event) -> None:
-    """Wait for what takes long, and say it."""
+    """Wait for what takes long, and say it: in the bar, or once where there is none."""
     wait = PATIENCE
-    while not ended.wait(wait) and not progress.ticks and not say_compiling():
+    while not ended.wait(wait) and not progress.ticks:
+        if say_compiling(progress.say) and progress.say is None:
+            return
         wait = 0.2
 
 
-def say_compiling() -> bool:
-    """Say that kernels are compiled, if any are now; whether that was said."""
-    from teleop_core.kernels.progress import is_compiling
+def say_compiling(say: Callable[[str], None] | None = None) -> bool:
+    """Say that kernels are compiled, if any are now; whether that was said.
 
-    if is_compiling():
+    Args:
+        say: Shows a text in place of the last one; None prints a line.
+    """
+    from teleop_core.kernels.progress import compiled_count, is_compiling
+
+    if not is_compiling():
+        return False
+    if say is None:
         print("compiling kernels, once for this graph …", file=sys.stderr)
-    return is_compiling()
+    else:
+        say(f"compiling kernels, {compiled_count()} so far")
+    return True
 
 
 def _shown(text: str, progress: Progress) -> Iterator[Progress]:
@@ -78,4 +89,5 @@ def _shown(text: str, progress: Progress) -> Iterator[Progress]:
             bar.update(task, completed=done, total=total, description=text + number)
 
         progress.show = show
+        progress.say = lambda words: bar.update(task, description=words)
         yield progress

@@ -85,7 +85,7 @@ class ParameterInfo:
     """A parameter of a node: what it is now, and what it may be.
 
     Attributes:
-        node: Name of the node with its namespace, such as ``left/slave_sim``.
+        node: Name of the node with its namespace, such as ``left/slave``.
         name: Dotted name.
         value: Present value.
         doc: Meaning, with its unit.

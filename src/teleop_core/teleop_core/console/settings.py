@@ -13,7 +13,7 @@ from teleop_core.errors import TeleopError
 QUICK = (
     ("motion_scaling", "mode"), ("motion_scaling", "coarse_gain"), ("motion_scaling", "fine_gain"),
     ("motion_scaling", "fixture.kind"), ("motion_scaling", "fixture.box.size"),
-    ("motion_scaling", "fixture.sphere.diameter"), ("slave_sim", "reference_filter.is_on"),
+    ("motion_scaling", "fixture.sphere.diameter"), ("slave", "reference_filter.is_on"),
     ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"), ("teleop", "delays"),
 )  # fmt: skip
 """What people change most, by stage and name."""

@@ -5,18 +5,39 @@ from teleop_core.drill.outcome import Outcome
 from teleop_core.drill.processes import PROCESSES
 from teleop_core.drill.samples import SAMPLES
 from teleop_core.drill.stops import STOPS
-from teleop_core.errors import UnknownNameError
+from teleop_core.errors import PartError, UnknownNameError
+from teleop_core.registry import Registry
 
-__all__ = ["EXERCISES", "SHORT", "Cure", "Exercise", "Master", "Motion", "Outcome", "Rig", "chosen"]
+__all__ = [
+    "EXERCISES", "SHORT", "Cure", "Exercise", "Master", "Motion", "Outcome", "Rig", "chosen",
+    "register_exercise",
+]  # fmt: skip
 
 EXERCISES = (*STOPS, *PROCESSES, *SAMPLES)
-"""All of them; some once for each way of running."""
+"""Built-in ones; some once for each way of running."""
 SHORT = ("stop_topic", "kill_motion_scaling", "teleport", "second_commander", "kill_bystander")
 """What is enough to see that nothing is badly wrong."""
 
 
+def _checked(name: str, part: object) -> Exercise:
+    if not isinstance(part, Exercise):
+        raise PartError("exercise", name, f"an Exercise, not a {type(part).__name__}")
+    if part.name != name or any(one.name == name for one in EXERCISES):
+        raise PartError("exercise", name, "registered under its own name, which must be free")
+    return part
+
+
+FURTHER: Registry[Exercise] = Registry("exercise", "exercises", {}, _checked)
+"""Those of installed packages and of the program."""
+
+
+def register_exercise(exercise: Exercise, *, replace: bool = False) -> Exercise:
+    """Add an exercise under its name for the rest of the program; see :meth:`Registry.add`."""
+    return FURTHER.add(exercise.name, exercise, replace=replace)
+
+
 def chosen(names: tuple[str, ...], *, is_composed: bool) -> tuple[Exercise, ...]:
-    """Exercises of a way of running, in the order of the table.
+    """Exercises of a way of running, in the order of the table, further ones last.
 
     Args:
         names: Which; none for all.
@@ -25,9 +46,10 @@ def chosen(names: tuple[str, ...], *, is_composed: bool) -> tuple[Exercise, ...]
     Raises:
         UnknownNameError: One is not there in this way of running.
     """
-    fitting = [one for one in EXERCISES if is_composed in one.ways]
+    further = map(FURTHER.find, FURTHER)
+    fitting = [one for one in (*EXERCISES, *further) if is_composed in one.ways]
     for name in names:
         if name not in {one.name for one in fitting}:
-            way = "composed" if is_composed else "five processes"
+            way = "composed" if is_composed else "a process for each node"
             raise UnknownNameError(f"fault ({way})", name, [one.name for one in fitting])
     return tuple(one for one in fitting if not names or one.name in names)

@@ -137,6 +137,17 @@ def outage(numbers: Numbers) -> float:
     return numbers.longest_outage
 
 
+def silence(numbers: Numbers) -> float:
+    """Of an arm that says no more where it is: until that is a fault."""
+    return numbers.longest_silence
+
+
+def unheard(numbers: Numbers) -> float:
+    """Of an arm that says no more where it is: the command timeout, then it brakes."""
+    braking = max(numbers.speed_limit / numbers.braking)
+    return numbers.command_timeout + float(braking)
+
+
 def never(_: Numbers) -> float:
     """No time at all."""
     return 0.0
@@ -176,6 +187,7 @@ class Exercise:
         watch: Time for which it is watched after the injection [s].
         ways: Which ways of running it makes sense in: True for composed.
         cuts_recording: Whether its recorder cannot close it.
+        breaks_simulator: Whether it needs the simulated arm, which it breaks.
         repeats: How often it is done; the worst of all is told.
     """
 
@@ -199,4 +211,5 @@ class Exercise:
     watch: float = 0.5
     ways: tuple[bool, ...] = (False, True)
     cuts_recording: bool = False
+    breaks_simulator: bool = False
     repeats: int = 1

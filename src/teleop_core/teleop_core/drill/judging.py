@@ -129,10 +129,10 @@ def _always(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measur
     way = measure.travel(seen.true_cp, seen.begin_ns, seen.end_ns)
     most = measure.RESOLUTION + 0.1 * (0.0 if math.isnan(way) else way)
     yield Measured("apart_m", text, measure.apart(measured, seen.true_cp), most)
-    # All three leave the slave in the same tick: one that falls silent hides what the arm does.
+    # Who falls silent hides what the arm does; the slave holds an arm that is silent for longer.
     text = "the tip or the joints fell silent {0:.0f} ms before the setpoints, at most {1:.0f}"
     silence = max(measure.silence(one, setpoints) for one in (seen.true_cp, seen.measured_js))
-    yield Measured("silent_s", text, silence, late(seen, numbers))
+    yield Measured("silent_s", text, silence, numbers.command_timeout + late(seen, numbers))
 
 
 def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:

@@ -10,7 +10,7 @@ from teleop_core.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
 from teleop_core.signals import DT
-from teleop_core.slave.slave_sim import SlaveSim
+from teleop_core.slave.slave import Slave
 
 OVERSHOOT = 1.5
 """Speed of the tip over that of its setpoint, at most: three equal poles with a zero at a third of
@@ -53,6 +53,7 @@ class Numbers:
         tool_speed: Largest speed of the tip's setpoint [m/s].
         command_timeout: Silence of commands after which the setpoint brakes [s].
         longest_outage: Silence after which the arm is PAUSED [s].
+        longest_silence: Silence of the arm itself that is a fault [s].
         longest_pause: Silence of the hand after which it is aligned anew [s].
         button_silence: Silence of the buttons that counts as a pressed clutch [s].
         effort_time: Time at the effort limit that is a fault [s].
@@ -68,6 +69,7 @@ class Numbers:
     tool_speed: float
     command_timeout: float
     longest_outage: float
+    longest_silence: float
     longest_pause: float
     button_silence: float
     effort_time: float
@@ -92,8 +94,8 @@ class Numbers:
     @staticmethod
     def of(configuration: Configuration) -> "Numbers":
         """Those of a session."""
-        given, scaling = configuration.group("slave_sim"), configuration.group("motion_scaling")
-        slave, lag = SlaveSim(given), given.reference_filter
+        given, scaling = configuration.group("slave"), configuration.group("motion_scaling")
+        slave, lag = Slave(given), given.reference_filter
         drives = slave.robot.drives
         assert drives is not None
         is_coarse = scaling.mode == "coarse"
@@ -105,6 +107,7 @@ class Numbers:
             tool_speed=float(slave.parameters["tool_speed"]),
             command_timeout=given.command_timeout,
             longest_outage=given.operation.longest_outage or math.inf,
+            longest_silence=given.operation.longest_silence,
             longest_pause=scaling.longest_pause,
             button_silence=scaling.plausible.button_silence,
             effort_time=given.operation.effort_time,

@@ -101,4 +101,4 @@ def _state(state: State | None) -> str:
 
 
 def _number(value: float) -> float | None:
-    return None if math.isnan(value) else round(value, 9)
+    return round(value, 9) if math.isfinite(value) else None

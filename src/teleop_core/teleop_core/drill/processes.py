@@ -12,6 +12,8 @@ from teleop_core.drill.exercise import (
     after,
     at_once,
     outage,
+    silence,
+    unheard,
 )
 from teleop_core.drill.inside import HANGS, RAISES, WORKS
 from teleop_core.operation import Fault, State
@@ -100,24 +102,36 @@ def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exerci
 PROCESSES = (
     *(_killed(node) for node in _STAGES),
     Exercise(
-        name="kill_slave_sim", text="slave_sim killed", inject=partial(_kill, "slave_sim"),
+        name="kill_slave", text="slave killed", inject=partial(_kill, "slave"),
         states=(None,), cures=(Cure.RESTART,), master=Master.DEVICE, ways=(False,),
+    ),
+    Exercise(
+        name="kill_slave_sim", text="slave_sim killed", inject=partial(_kill, "slave_sim"),
+        states=(State.FAULT,), faults=(Fault.FEEDBACK,), cures=(Cure.RESTART,), told=silence,
+        allowed=unheard,
+        master=Master.DEVICE, watch=2.6, ways=(False,),
     ),
     Exercise(
         name="kill_recorder", text="recorder killed", inject=partial(_kill, "recorder"),
         motion=Motion.GOES_ON, master=Master.DEVICE, watch=1.0, ways=(False,), cuts_recording=True,
     ),
     Exercise(
-        name="kill_session", text="whole session killed", inject=partial(_kill, "slave_sim"),
+        name="kill_session", text="whole session killed", inject=partial(_kill, "slave"),
         states=(None,), cures=(Cure.RESTART,), master=Master.DEVICE, ways=(True,),
         cuts_recording=True,
     ),
     *(_frozen(node) for node in _STAGES),
     Exercise(
-        name="freeze_slave_sim", text=f"slave_sim stopped for {FREEZE:g} s",
-        inject=partial(_freeze, "slave_sim"), states=(State.PAUSED,),
+        name="freeze_slave", text=f"slave stopped for {FREEZE:g} s",
+        inject=partial(_freeze, "slave"), states=(State.PAUSED,),
         faults=(Fault.STALL,), told=at_once,
         cures=(Cure.RESUME,), master=Master.DEVICE, ways=(False,),
+    ),
+    Exercise(
+        name="freeze_slave_sim", text=f"slave_sim stopped for {FREEZE:g} s",
+        inject=partial(_freeze, "slave_sim"), states=(State.FAULT,),
+        faults=(Fault.FEEDBACK,), told=silence, allowed=unheard, gap=unheard,
+        cures=(Cure.RESET,), master=Master.DEVICE, ways=(False,),
     ),
     Exercise(
         name="freeze_recorder", text=f"recorder stopped for {FREEZE:g} s",
@@ -126,7 +140,7 @@ PROCESSES = (
     ),
     Exercise(
         name="freeze_session", text=f"whole session stopped for {FREEZE:g} s",
-        inject=partial(_freeze, "slave_sim"), states=(State.PAUSED,),
+        inject=partial(_freeze, "slave"), states=(State.PAUSED,),
         faults=(Fault.STALL,), told=at_once,
         cures=(Cure.RESUME,), master=Master.DEVICE, ways=(True,),
     ),

@@ -51,7 +51,7 @@ def _disturbed(
 
 def _shake(rig: Rig) -> None:
     """A hand far faster than the tool may be."""
-    rig.set("slave_sim", "operation.tool_speed", _SLOW)
+    rig.set("slave", "operation.tool_speed", _SLOW)
     rig.mark()
     rig.distort(hand.shaken(_SHAKE, _SHAKES))
     rig.wait(_FOR)
@@ -60,7 +60,7 @@ def _shake(rig: Rig) -> None:
 def _calm(rig: Rig) -> None:
     rig.distort(hand.faithful)
     rig.wait(0.5)
-    rig.set("slave_sim", "operation.tool_speed", 0.0)
+    rig.set("slave", "operation.tool_speed", 0.0)
 
 
 def _press_limit(rig: Rig) -> None:

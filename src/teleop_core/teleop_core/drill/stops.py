@@ -31,7 +31,7 @@ def _press_briefly(rig: Rig) -> None:
         for _ in range(30):
             rig.press(is_pressed=False)
 
-    rig.freeze("slave_sim", _STILL, press)
+    rig.freeze("slave", _STILL, press)
 
 
 def _release(rig: Rig) -> None:
@@ -55,13 +55,13 @@ def _miss_heartbeat(rig: Rig) -> None:
         rig.press(is_pressed=False)
         rig.wait(0.02)
         if count == 1:
-            rig.set("slave_sim", "operation.heartbeat", HEARTBEAT)
+            rig.set("slave", "operation.heartbeat", HEARTBEAT)
     rig.press(is_pressed=False)
     rig.mark()
 
 
 def _hear_again(rig: Rig) -> None:
-    rig.set("slave_sim", "operation.heartbeat", 0.0)
+    rig.set("slave", "operation.heartbeat", 0.0)
     _release(rig)
 
 
@@ -84,17 +84,17 @@ def _resume_early(rig: Rig) -> None:
 def _hold_fast(fault: Fault, rig: Rig) -> None:
     """Friction that no drive overcomes: as a payload far too heavy, or a hand that holds."""
     others = [one.word for one in _STUCK if one is not fault]
-    rig.set("slave_sim", "operation.reported", others)
+    rig.set("slave", "operation.reported", others)
     if fault is Fault.TIP:
-        rig.set("slave_sim", "operation.tip_error", 0.5 * hand.RADIUS)
+        rig.set("slave", "operation.tip_error", 0.5 * hand.RADIUS)
     rig.mark()
     rig.control(STICKS)
 
 
 def _let_go(rig: Rig) -> None:
     rig.control(WORKS)
-    rig.set("slave_sim", "operation.reported", [])
-    rig.set("slave_sim", "operation.tip_error", 0.0)
+    rig.set("slave", "operation.reported", [])
+    rig.set("slave", "operation.tip_error", 0.0)
 
 
 _STUCK = (Fault.TRACKING, Fault.TIP, Fault.EFFORT, Fault.OVERSPEED)
@@ -109,6 +109,7 @@ def _stuck(fault: Fault, told: Time) -> Exercise:
         name=f"stuck_{fault.word}", text=f"joints held fast; {fault.word} alone may stop them",
         inject=partial(_hold_fast, fault), undo=_let_go, states=(State.FAULT,), faults=(fault,),
         cures=(Cure.RESET,), allowed=lambda n: told(n) + 0.5 * _ROUNDS, told=told, watch=3.0,
+        breaks_simulator=True,
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from teleop_core import plain_yaml
 from teleop_core.bags.reader import Bag
@@ -14,6 +15,7 @@ from teleop_core.mapping.parameters import MotionScalingParameters, axis_map, to
 from teleop_core.master.haptic_master import HAPTIC_MASTER
 from teleop_core.parameters import build
 from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer
+from teleop_core.slave.slave import SLAVE
 from teleop_core.slave.slave_sim import SLAVE_SIM
 from teleop_core.stage import STAGES
 from teleop_core.topics import Topic
@@ -35,6 +37,8 @@ class Origin:
             simulator is told of.
         controller: Its control law; None if it is not told.
         geometry: Settings that its robot was made with.
+        lag: By how many setpoints a measured pose comes after that which it was sampled with: by
+            one since it is the arm's server that tells it.
         tool: Quaternions (4,) of the maps from the master's base to the slave's axes, and from the
             stylus to the tool; None where the tool does not turn as much as the stylus.
     """
@@ -47,6 +51,7 @@ class Origin:
     plant: str | None = None
     controller: str | None = None
     geometry: tuple[str, ...] = ()
+    lag: int = 0
 
     @cached_property
     def chain(self) -> tuple[tuple[str, Topic], ...]:
@@ -74,23 +79,35 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
         bag: The recording, or the view of one arm.
         arm: Name of the arm.
     """
-    layer = _layer(bag)
+    content = _content(bag)
+    layer, has_server = _layer(bag, content), any(_stage(name) == SLAVE.name for name in content)
     return Origin(
         _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
         _tool(layer, arm), *_slave(layer, arm), _geometry(layer, arm),
+        int(has_server),
     )  # fmt: skip
 
 
-def _layer(bag: Bag) -> Layer:
-    """What is stored about stages that are installed."""
+def _content(bag: Bag) -> Mapping[Any, Any]:
+    """What is stored about stages, installed or not."""
     try:
         content = plain_yaml.parse(bag.metadata.get("configuration", ""))
-        if not isinstance(content, Mapping):
-            return {}
-        known = {SESSION, *STAGES}
-        kept = {k: v for k, v in content.items() if str(k).rpartition("/")[2] in known}
+    except plain_yaml.UnreadableError:
+        return {}
+    return content if isinstance(content, Mapping) else {}
+
+
+def _stage(name: object) -> str:
+    return str(name).rpartition("/")[2]
+
+
+def _layer(bag: Bag, content: Mapping[Any, Any]) -> Layer:
+    """What is stored about stages that are installed."""
+    known = {SESSION, *STAGES}
+    kept = {name: said for name, said in content.items() if _stage(name) in known}
+    try:
         return parse_layer(kept, f"{bag.path}: configuration")
-    except (plain_yaml.UnreadableError, TeleopError):
+    except TeleopError:
         return {}
 
 
@@ -111,7 +128,7 @@ def _said(layer: Layer, stage: str, arm: str) -> dict[str, object]:
 
 def _interpolation(layer: Layer, arm: str) -> str | None:
     """Way of the slave between commands, if it is told."""
-    said = _said(layer, SLAVE_SIM.name, arm).get("interpolation")
+    said = _said(layer, SLAVE.name, arm).get("interpolation")
     return said if isinstance(said, str) else None
 
 

@@ -115,7 +115,7 @@ def studies(
     return [study(bag, arm, further, span) for arm in arm_names(bag)]
 
 
-Cut = Callable[[Bag, Iterable[Topic], StateHistory], Iterable[Window]]
+Cut = Callable[[Bag, Iterable[Topic], StateHistory, int], Iterable[Window]]
 
 
 def _run(
@@ -139,7 +139,7 @@ def _feed(context: Context, makers: Sequence[type[Metric]], cut: Cut) -> list[Me
             metrics.append(context.shared(maker))
     context.shared(Gains)
     accumulators = context.begin()
-    found = cut(context.bag, context.topics, context.history)
+    found = cut(context.bag, context.topics, context.history, context.origin.lag)
     # What foreign devices record may be infinite; such samples are left out and counted.
     with np.errstate(invalid="ignore", over="ignore"):
         for window in context.span.cut(found) if context.span else found:

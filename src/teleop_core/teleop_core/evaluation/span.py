@@ -27,7 +27,7 @@ class Span(NamedTuple):
             after_ns = max(window.after_ns, self.first_ns - 1)
             until_ns = min(window.until_ns, self.last_ns)
             if until_ns > after_ns:
-                yield Window(after_ns, until_ns, window.series, window.history)
+                yield Window(after_ns, until_ns, window.series, window.history, window.lag)
 
 
 Seconds = tuple[float, float]

@@ -31,8 +31,9 @@ class Tracked:
 
     Attributes:
         log_ns: When they were recorded, shape (N,), [ns].
+        stamp_ns: When they were sampled, shape (N,), [ns].
         poses: slave/measured_cp, shape (N, 7).
-        setpoints: slave/setpoint_cp of the same tick, shape (N, 7).
+        setpoints: slave/setpoint_cp of the tick in which they were sampled, shape (N, 7).
         commands: Latest slave/servo_cp at the stamp of the pose, shape (N, 7).
         is_paired: Whether the setpoint of the same tick was recorded, shape (N,).
         against: Errors against the setpoints.
@@ -40,6 +41,7 @@ class Tracked:
     """
 
     log_ns: Integers
+    stamp_ns: Integers
     poses: Array
     setpoints: Array
     commands: Array
@@ -59,12 +61,13 @@ def _track(window: Window) -> Tracked:
     partner = same_tick(all_measured.log_ns, setpoint.log_ns)[window.own(SLAVE_MEASURED_CP)]
     # Until a command is in force, as on the way to where it starts, the slave follows nobody.
     is_led = partner == NONE
+    partner = np.where(is_led, NONE, np.maximum(partner - window.lag, 0))
     is_led[~is_led] = setpoint.stamp_ns[partner[~is_led]] > NO_COMMAND_NS
     measured, partner = measured.only(is_led), partner[is_led]
     poses, setpoints = measured.values, rows_of(setpoint, partner)
     commands = rows_of(command, latest(measured.stamp_ns, command.stamp_ns))
     return Tracked(
-        measured.log_ns, poses, setpoints, commands, partner != NONE,
+        measured.log_ns, measured.stamp_ns, poses, setpoints, commands, partner != NONE,
         pose_errors(poses, setpoints), pose_errors(poses, commands),
     )  # fmt: skip
 

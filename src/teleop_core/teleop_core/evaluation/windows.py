@@ -30,12 +30,14 @@ class Window:
         series: Per topic name, in the order of log times; at least the sample before the window
             is in it, if there is one. Topics without samples are left out.
         history: What teleop/state said at any time.
+        lag: By how many setpoints a measured pose comes after that which it was sampled with.
     """
 
     after_ns: int
     until_ns: int
     series: dict[str, Series]
     history: StateHistory = NO_HISTORY
+    lag: int = 0
     _known: dict[object, object] = field(default_factory=dict, repr=False)
 
     def samples(self, topic: Topic) -> Series:
@@ -83,14 +85,14 @@ class DisorderError(Exception):
 
 
 def whole(
-    bag: Bag, topics: Iterable[Topic], history: StateHistory = NO_HISTORY
+    bag: Bag, topics: Iterable[Topic], history: StateHistory = NO_HISTORY, lag: int = 0
 ) -> Iterator[Window]:
     """The recording as one window, whatever the order in its file."""
-    yield Window(-_FOREVER, _FOREVER, bag.read_many(topics), history)
+    yield Window(-_FOREVER, _FOREVER, bag.read_many(topics), history, lag)
 
 
 def windows(
-    bag: Bag, topics: Iterable[Topic], history: StateHistory = NO_HISTORY
+    bag: Bag, topics: Iterable[Topic], history: StateHistory = NO_HISTORY, lag: int = 0
 ) -> Iterator[Window]:
     """Windows of a recording in the order of time; memory does not grow with its length.
 
@@ -111,10 +113,10 @@ def windows(
         until_ns = newest_ns - CONTEXT_NS
         if until_ns - after_ns >= WINDOW_NS:
             pending = _joined(pending, waiting)
-            yield Window(after_ns, until_ns, pending, history)
+            yield Window(after_ns, until_ns, pending, history, lag)
             pending = {name: _since(series, until_ns) for name, series in pending.items()}
             waiting, after_ns = [], until_ns
-    yield Window(after_ns, _FOREVER, _joined(pending, waiting), history)
+    yield Window(after_ns, _FOREVER, _joined(pending, waiting), history, lag)
 
 
 def _joined(pending: dict[str, Series], waiting: list[dict[str, Series]]) -> dict[str, Series]:

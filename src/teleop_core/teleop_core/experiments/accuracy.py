@@ -17,7 +17,7 @@ from teleop_core.experiments.outcome import Findings, Row, absolute
 from teleop_core.fitting.rests import Mover
 from teleop_core.geometry import Array, rotation, transform
 from teleop_core.robots import Robot, load_robot
-from teleop_core.slave.slave_sim import SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters
 
 DESIRED_MM = np.arange(10.0, 101.0, 10.0)
 ESCAPE_MM = 1e3 * ESCAPE
@@ -116,7 +116,7 @@ def longer_d3(robot: Robot, offset_mm: float) -> Rest:
     return rest
 
 
-def moved_plant(parameters: SlaveSimParameters) -> Rest:
+def moved_plant(parameters: ArmParameters) -> Rest:
     """The plant under its controller, moved by cubics, one target after the other."""
     mover = Mover(parameters)
 

@@ -10,7 +10,7 @@ from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.evaluation import Score
 from teleop_core.geometry import Array
 from teleop_core.recording import Stream
-from teleop_core.slave.slave_sim import SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters
 from teleop_core.topics import NO_COMMAND_NS
 
 Setting = float | str | bool | tuple[float, ...] | tuple[str, ...]
@@ -25,6 +25,7 @@ _KEPT = (
     "slave/setpoint_cp", "slave/measured_js", "slave/measured_cp", "slave/true_cp",
     "teleop/state",
 )  # fmt: skip
+_OF_SLAVE = ("slave/setpoint_js", "slave/setpoint_cp", "slave/measured_js", "slave/true_cp")
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +149,7 @@ class Bench:
         """The same session by several hands; see :meth:`session`."""
         return [self.session(scenario, seed, settings) for seed in self.seeds]
 
-    def slave(self, settings: Settings | None = None) -> SlaveSimParameters:
+    def slave(self, settings: Settings | None = None) -> ArmParameters:
         """Parameters of a slave under the bench's settings and more, for moves of the slave alone.
 
         Raises:
@@ -157,9 +158,8 @@ class Bench:
         from teleop_core.api import configuration
 
         given = {"seed": self.seed, **self._settings, **dict(settings or {})}
-        group = configuration(settings=given).group("slave_sim")
-        assert isinstance(group, SlaveSimParameters)
-        return group
+        made = configuration(settings=given)
+        return ArmParameters.of(made.group("slave"), made.group("slave_sim"))
 
     def _run(
         self, scenario: str, seed: int, settings: Settings
@@ -167,7 +167,15 @@ class Bench:
         from teleop_core.api import run
 
         recording = run(scenario, seed=seed, settings=settings, progress=self.progress)
-        return recording.score(), {name: recording[name] for name in _KEPT}
+        return recording.score(), _aligned({name: recording[name] for name in _KEPT})
+
+
+def _aligned(streams: dict[str, Stream]) -> Mapping[str, Stream]:
+    """Streams of the slave with rows of the same samples: its measured pose comes a tick later."""
+    for name in _OF_SLAVE:
+        streams[name] = streams[name].part(slice(0, -1))
+    later = streams["slave/measured_cp"]
+    return streams | {"slave/measured_cp": later.part(slice(1, None))}
 
 
 def mean(values: Iterable[float]) -> float:

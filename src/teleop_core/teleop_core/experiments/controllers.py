@@ -41,8 +41,8 @@ RESOLUTION_UM = 11.4
 """Resolution of the tip, by the encoders [µm] (Vongbunyong 2008, table 3.8)."""
 GOAL_UM = 3.0 * RESOLUTION_UM
 _STEPS: Settings = {
-    "reference_filter.is_on": False, "slave_sim.interpolation": "none",
-    "slave_sim.starts_at_home": True, "robot": "rcrt1",
+    "reference_filter.is_on": False, "slave.interpolation": "none",
+    "slave.starts_at_home": True, "robot": "rcrt1",
 }  # fmt: skip
 _CURVE = 10
 

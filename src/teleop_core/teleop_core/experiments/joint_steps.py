@@ -6,7 +6,7 @@ import numpy as np
 
 from teleop_core.geometry import Array
 from teleop_core.signals import TICK_NS
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 _STEP_S = 0.02  # a step is as large as what a joint makes in this time at full speed
 _SETTLED_TICKS, _WAIT_TICKS, _REST_TICKS = 300, 1500, 2000
@@ -28,23 +28,23 @@ class StepAnswer(NamedTuple):
     rest_travel: Array
 
 
-def answer_to_steps(parameters: SlaveSimParameters) -> StepAnswer:
+def answer_to_steps(parameters: ArmParameters) -> StepAnswer:
     """Step each joint by itself, from home, towards the middle of its range.
 
     Args:
         parameters: Of the slave. Its reference filter should be off, and its start at home.
     """
-    n = SlaveSim(parameters).robot.n
+    n = SimulatedArm(parameters).robot.n
     overshoot, travel, errors = np.zeros(n), np.zeros(n), []
     for joint in range(n):
-        over, error, moved = _one_step(SlaveSim(parameters), joint)
+        over, error, moved = _one_step(SimulatedArm(parameters), joint)
         overshoot[joint] = over
         errors.append(error)
         travel = np.maximum(travel, moved)
     return StepAnswer(overshoot, float(np.sqrt(np.mean(np.square(errors)))), travel)
 
 
-def _one_step(slave: SlaveSim, joint: int) -> tuple[float, float, Array]:
+def _one_step(slave: SimulatedArm, joint: int) -> tuple[float, float, Array]:
     """Overshoot [share], rest error of the tip [m] and travel at rest (n,) [counts] of a step."""
     robot = slave.robot
     drives, n = robot.drives, robot.n
@@ -62,7 +62,7 @@ def _one_step(slave: SlaveSim, joint: int) -> tuple[float, float, Array]:
     return max(beyond, 0.0), error, np.round(np.ptp(rests[:, :n], axis=0) / drives.encoder_step)
 
 
-def _measured(slave: SlaveSim, goal: Array, ticks: int) -> Array:
+def _measured(slave: SimulatedArm, goal: Array, ticks: int) -> Array:
     """What the encoders show (ticks, n) under a constant command."""
     row, n = slave.signals, slave.robot.n
     rows = np.empty((ticks, n))

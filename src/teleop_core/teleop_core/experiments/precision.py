@@ -16,6 +16,7 @@ from teleop_core.fitting.table import PUBLISHED, RestTable, read_rests
 from teleop_core.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
+from teleop_core.slave.pair import ArmParameters
 
 _RUNS = 10
 # Table 7.7, mm: RMS, S.D., largest, smallest of each point.
@@ -44,7 +45,7 @@ def simulated_rests(bench: Bench, settings: Settings) -> Rests:
     table = _table()
     pairs = {"robot": "rcrt1", "seed": bench.seed, **settings}
     group = configure(None, settings=[f"{name}={value}" for name, value in pairs.items()])
-    parameters = group.group("slave_sim")
+    parameters = ArmParameters.of(group.group("slave"), group.group("slave_sim"))
     robot = load_robot("rcrt1")
     inside = np.clip(table.targets, robot.lower, robot.upper)
     rests = rest_positions(parameters, inside, _RUNS)

@@ -12,7 +12,7 @@ from teleop_core.experiments.outcome import EXACT, Findings, Row, absolute, fact
 from teleop_core.geometry import Array
 from teleop_core.mapping.filters import lag_step
 from teleop_core.signals import DT
-from teleop_core.slave.slave_sim import ReferenceFilterParameters
+from teleop_core.slave.slave import ReferenceFilterParameters
 
 # Eqs. 6.2.8 and 6.2.9, sign corrected; printed to two digits.
 _COEFFICIENTS = {"of the last output": 0.99, "of the last input": -0.09, "of the input": 0.1}

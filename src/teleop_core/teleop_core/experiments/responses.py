@@ -26,7 +26,7 @@ from teleop_core.fitting.table import PUBLISHED, read_rests
 from teleop_core.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.signals import TICK_NS
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 
 # What the text reads from its plots once the tip rests [mm].
@@ -67,11 +67,11 @@ class Response(NamedTuple):
         return self.reached_mm - self.wanted_mm
 
 
-def response(parameters: SlaveSimParameters, target: Array) -> Response:
+def response(parameters: ArmParameters, target: Array) -> Response:
     """Move the slave from home to a joint target (n,) by a cubic, and let it rest there."""
     robot = load_robot(parameters.robot)
     assert robot.drives is not None
-    slave = SlaveSim(replace(parameters, start=tuple(robot.home.tolist())))
+    slave = SimulatedArm(replace(parameters, start=tuple(robot.home.tolist())))
     goal = np.clip(target, robot.lower, robot.upper)
     move_time = shortest_move_time(robot.home, goal, _SPEED * robot.drives.speed_limit)
     times = slave.dt * np.arange(1.0, round((move_time + _SETTLE_S) / slave.dt) + 1.0)

@@ -13,7 +13,7 @@ from teleop_core.experiments.experiment import Experiment
 from teleop_core.experiments.outcome import Findings, Row
 from teleop_core.plants.hardware import faults_of
 from teleop_core.robots import load_robot
-from teleop_core.slave.slave_sim import SlaveSim
+from teleop_core.slave.pair import SimulatedArm
 
 _PLANT: Settings = {"plant": "hardware", "robot": "rcrt1"}
 _SECONDS = 12.0  # of each session
@@ -70,7 +70,7 @@ def error_of(bench: Bench, law: str, disturbance: str) -> tuple[float, float] | 
 def is_stable(bench: Bench, law: str, more: Settings) -> bool:
     """Whether a slave begins with a law on a plant: small errors die away, large ones come back."""
     try:
-        SlaveSim(bench.slave({**_PLANT, **LAWS[law], **more, "slave_sim.starts_at_home": True}))
+        SimulatedArm(bench.slave({**_PLANT, **LAWS[law], **more, "slave.starts_at_home": True}))
     except ParameterError:
         return False
     return True

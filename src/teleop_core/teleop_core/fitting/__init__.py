@@ -58,10 +58,11 @@ def fit_plant(
     """
     from teleop_core.robots import load_robot_set
     from teleop_core.session.configuration import configure
+    from teleop_core.slave.pair import ArmParameters
 
     given = [f"robot={robot}", "plant=hardware", "controller=source_pid"]
     made = configure(None, [Path(file) for file in files], [*given, *texts])
-    slave = made.group("slave_sim")
+    slave = ArmParameters.of(made.group("slave"), made.group("slave_sim"))
     arm = load_robot_set(slave.robot, slave.geometry)
     rests = read_rests(Path(table or PUBLISHED), arm)
     return fit(rests, slave, free, progress, loss=loss)

@@ -21,7 +21,8 @@ from teleop_core.plants.hardware import faults_of
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
+from teleop_core.slave.pair import ArmParameters
+from teleop_core.slave.slave_sim import SlaveSim
 
 _WEAK = 0.1  # singular value over the largest below which a direction is not identifiable
 _STEP = 0.01  # of differences, in units of the start
@@ -122,7 +123,7 @@ class _Problem:
     """Rests of a robot as a function of scaled numbers; 1 is of the size that the table shows."""
 
     def __init__(
-        self, robot: Robot, parameters: SlaveSimParameters, table: RestTable, free: Sequence[str]
+        self, robot: Robot, parameters: ArmParameters, table: RestTable, free: Sequence[str]
     ) -> None:
         self.robot, self.parameters, self.table, self.free = robot, parameters, table, tuple(free)
         stiffness = np.abs(SlaveSim(parameters).arm.gains[:, 0])
@@ -225,7 +226,7 @@ def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
 
 def fit(
     table: RestTable,
-    parameters: SlaveSimParameters,
+    parameters: ArmParameters,
     free: Sequence[str] | None = None,
     progress: Callable[[float], None] = lambda share: None,
     *,

@@ -58,4 +58,6 @@ def parameter_file(found: "FitResult") -> str:
     if weights:
         given["plant.hardware.weights"] = weights
     slave = {"robot": found.robot, "plant.kind": "hardware", "controller.kind": "source_pid"}
-    return yaml.safe_dump({"slave_sim": {"ros__parameters": slave | given}}, sort_keys=False)
+    content = {"slave_sim": slave | given, "slave": {"robot": found.robot}}
+    named = {name: {"ros__parameters": values} for name, values in content.items()}
+    return yaml.safe_dump(named, sort_keys=False)

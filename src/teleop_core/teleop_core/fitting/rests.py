@@ -12,22 +12,21 @@ from teleop_core.kernels import kernel
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.hardware import Hardware
 from teleop_core.signals import TICK_NS
-from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
-from teleop_core.slave.step import slave_step
+from teleop_core.slave.pair import ArmParameters, SimulatedArm, arm_step
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 
 _FINE = 1e-4  # of an encoder step
 
 
 @kernel
-def _drive(p: Any, s: Any, arm: Any, row: Any, way: Array, begin_ns: int, dt: float) -> None:
+def _drive(server: Any, simulated: Any, row: Any, way: Array, begin_ns: int, dt: float) -> None:
     """Command a way (N, n), a joint vector a tick, from the tick after ``begin_ns`` on."""
     for k in range(way.shape[0]):
         row.now_ns = begin_ns + (k + 1) * TICK_NS
         row.slave_servo_jp_ns = row.now_ns
         for i in range(way.shape[1]):
             row.slave_servo_jp[i] = way[k, i]
-        slave_step(p, s, arm, row, dt)
+        arm_step(server, simulated, row, dt)
 
 
 class Mover:
@@ -43,7 +42,7 @@ class Mover:
 
     def __init__(
         self,
-        parameters: SlaveSimParameters,
+        parameters: ArmParameters,
         faults: Hardware | None = None,
         speed: float = 0.5,
         settle: float = 1.0,
@@ -51,15 +50,16 @@ class Mover:
         is_smooth: bool = False,
     ) -> None:
         home = load_robot_set(parameters.robot, parameters.geometry).home
-        self.slave = SlaveSim(replace(parameters, start=tuple(home.tolist())))
+        self.slave = SimulatedArm(replace(parameters, start=tuple(home.tolist())))
+        simulated = self.slave.simulated
         if faults is not None:
             for name in ("coulomb", "bias", "wander"):
-                self.slave.parameters[name] = getattr(faults, name)
+                simulated.parameters[name] = getattr(faults, name)
             if len(faults.dynamics):
-                self.slave.arm.dynamics[:] = faults.dynamics
+                simulated.arm.dynamics[:] = faults.dynamics
         if is_smooth:
-            self.slave.parameters["encoder_step"] *= _FINE
-            self.slave.parameters["effort_step"] = 0.0
+            simulated.parameters["encoder_step"] *= _FINE
+            simulated.parameters["effort_step"] = 0.0
         self._speed, self._settle, self._now_ns = speed, settle, 0
         self.goal = self.slave.robot.home.copy()
         assert self.slave.robot.drives is not None
@@ -74,8 +74,8 @@ class Mover:
         time = shortest_move_time(self.goal, goal, self._limit)
         count = math.ceil((time + self._settle) / slave.dt)
         way = cubic_move(self.goal, goal, time, slave.dt * np.arange(1.0, count + 1.0))[0]
-        p, s, arm = slave.arguments
-        _drive(p, s, arm, slave.signals, np.ascontiguousarray(way), self._now_ns, slave.dt)
+        server, simulated = slave.arguments
+        _drive(server, simulated, slave.signals, np.ascontiguousarray(way), self._now_ns, slave.dt)
         self._now_ns += count * TICK_NS
         self.goal = goal
         return np.array(slave.signals["slave_measured_js"][: len(goal)])
@@ -86,7 +86,7 @@ class Mover:
 
 
 def rest_positions(
-    parameters: SlaveSimParameters,
+    parameters: ArmParameters,
     targets: Array,
     runs: int,
     faults: Hardware | None = None,

@@ -9,6 +9,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from pickle import UnpicklingError
 from types import FunctionType
 from typing import Any
@@ -23,13 +24,17 @@ from numba.core.errors import (
     NumbaExperimentalFeatureWarning,
     UnsupportedBytecodeError,
 )
+from numba.core.imputils import lower_cast
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
+from numba.extending import overload
+from numba.np import arrayobj
 
 from teleop_core import __version__
 from teleop_core.kernels.callables import entry_of
 from teleop_core.kernels.dependencies import digest, source_digest
 from teleop_core.kernels.mistakes import kernel_error
+from teleop_core.kernels.shipped import places
 
 # Function pointers as arguments are what lets one compiled graph run any robot.
 warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatureWarning)
@@ -89,10 +94,39 @@ class Dispatcher(CPUDispatcher):
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Type of a call from another kernel."""
-        plain = [types.unliteral(kind) for kind in args]
+        plain = [_general(kind) for kind in args]
         return super().get_call_template(
-            plain, {name: types.unliteral(kind) for name, kind in kws.items()}
+            plain, {name: _general(kind) for name, kind in kws.items()}
         )
+
+
+def _general(kind: Any) -> Any:
+    """Type without the value of a literal, or the shape of an array in a record."""
+    if isinstance(kind, types.NestedArray):
+        return types.Array(kind.dtype, kind.ndim, "C")
+    return types.unliteral(kind)
+
+
+@lower_cast(types.NestedArray, types.Array)
+def _as_array(_context: Any, _builder: Any, _from: Any, _to: Any, value: Any) -> Any:
+    """Array in a record as an array of any shape: both are laid out the same."""
+    return value
+
+
+def _mismatch(_source: Any, _target: Any) -> None:
+    """Stand in for what compiled code does where a slice is assigned another number of values."""
+
+
+@overload(_mismatch)
+def _raise_mismatch(_source: Any, _target: Any) -> Callable[..., None]:
+    def raise_it(_source: Any, _target: Any) -> None:
+        raise ValueError("cannot assign slice from input of different size")
+
+    return raise_it
+
+
+# numba's own writes both shapes into the message: forty functions on texts, two seconds to compile.
+arrayobj.raise_with_shape_context = _mismatch
 
 
 class InnerDispatcher(Dispatcher):
@@ -153,17 +187,36 @@ def entry(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
     return found
 
 
+# As after a loss of power, or of a version whose classes are no longer there.
+_BROKEN = (OSError, EOFError, UnpicklingError, AttributeError, ImportError)
+
+
 class _Cache(FunctionCache):
     """Cache on disk that is as good as none where its files are broken or cannot be written."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was kept for a signature; None without."""
+        """What was kept for a signature, here or in the wheel; None without."""
         try:
-            return super().load_overload(sig, target_context)
-        except (OSError, EOFError, UnpicklingError):  # as after a loss of power
+            found = super().load_overload(sig, target_context)
+        except _BROKEN:
             with suppress(OSError):
                 self.flush()
-            return None
+            found = None
+        return found or self._shipped(sig, target_context)
+
+    def _shipped(self, sig: Any, target_context: Any) -> Any:
+        """What the wheel holds for a signature, of the best tier that this processor can run."""
+        _, (triple, *_), code = self._index_key(sig, target_context.codegen())
+        own, file = self._cache_file, self._py_func.__code__.co_filename
+        source = Path(__file__ if self._py_func in _generated else file)
+        name = own._index_name.removesuffix(".nbi")
+        for tier, folder in places(source):
+            shipped = IndexDataCacheFile(str(folder), name, own._source_stamp)
+            with suppress(*_BROKEN):
+                data = shipped.load((sig, (triple, tier, ""), code))
+                if data is not None:
+                    return self._impl.rebuild(target_context, data)
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled for a signature, if the disk lets us."""

@@ -310,6 +310,7 @@ class MotionScaling(RunningStage):
 
     def __init__(self, parameters: MotionScalingParameters, dt: float = DT) -> None:
         super().__init__(MOTION_SCALING, 0, dt)
+        self.changes_itself = True  # its mode, by a button
         self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
         self._sent = records(SENT_FIELDS, SENT)
         self._values = parameters

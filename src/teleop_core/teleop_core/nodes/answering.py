@@ -62,7 +62,7 @@ class AnsweringNode(CoreNode):
     def _tell_silence(self) -> None:
         """Report once that nothing is answered any more, where a stage has something to say."""
         is_silent = self._question.age() > self._timeout
-        if is_silent and not self._was_silent and hasattr(self.stage, "fall_silent"):
+        if is_silent and not self._was_silent:
             with self.lock:
                 self.stage.fall_silent()
             self.send_report(time.time_ns())

@@ -31,7 +31,7 @@ from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.layers import RealTimeParameters
 from teleop_core.session.runner import report_of
 from teleop_core.signals import TICK_NS
-from teleop_core.stage import Stage, joints_of
+from teleop_core.stage import Runner, Stage, joints_of
 from teleop_core.topics import Kind, Topic
 
 SUCCESS, FAILURE, ERROR = (
@@ -143,6 +143,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self.add_on_set_parameters_callback(self._accept)
         self._shows_present = False
         self._present = self.create_guard_condition(self._show_present)
+        self.runner: Runner | None = None
+        """The stage at work, which :attr:`stage` is too; None for a node without one."""
         self.stage: Any = None
         self.row: Any = None
         """The stage's signals, to be read and written by names of fields only."""
@@ -174,8 +176,8 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def setup(self, parameters: Any) -> None:
         """Make the stage and open its topics."""
-        self.stage = self.description.run(parameters, TICK_NS / 1e9)
-        self.stage.load()
+        self.stage = self.runner = self.description.run(parameters, TICK_NS / 1e9)
+        self.runner.load()
         self.ports = Ports(
             self, self.arm, self.description, self.stage.signals, joints_of(parameters),
             self.options.feeds, self.open_publisher, self.options.joy_buttons,
@@ -272,15 +274,15 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def send_report(self, stamp_ns: int) -> None:
         """Report the state if it, or a parameter that may be told beside it, has changed."""
-        if self._report is None:
+        if self._report is None or self.runner is None:
             return
         bits, parameters = self._state.tobytes(), self.parameters
         if bits == self._reported[0] and parameters is self._reported[1]:
             return
         self._reported = bits, parameters
-        described: dict[str, str] = getattr(self.stage, "described", dict)()
+        described = self.runner.described()
         self._report_publisher.publish(report_of(self._report, stamp_ns, self._state, described))
-        if hasattr(self.stage, "present"):
+        if self.runner.changes_itself:
             self._present.trigger()  # the executor shows it: setting parameters takes long
 
     def input(self, port: Topic) -> Input:
@@ -296,7 +298,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         for publisher in self._own_publishers:
             self.destroy_lifecycle_publisher(publisher)
         self.ports, self._own_publishers = NO_PORTS, []
-        self.stage = self.row = None
+        self.stage = self.runner = self.row = None
 
     # -- lifecycle -------------------------------------------------------------------------------
 
@@ -480,13 +482,17 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     def _take_present(self) -> None:
         """Take parameters that the stage has changed by itself, as the mode button does."""
-        if hasattr(self.stage, "present") and self.lock.acquire(timeout=_LOCK_PATIENCE):
-            self.parameters = self.stage.present()
+        if self._changes_itself() and self.lock.acquire(timeout=_LOCK_PATIENCE):
+            assert self.runner is not None
+            self.parameters = self.runner.present()
             self.lock.release()
+
+    def _changes_itself(self) -> bool:
+        return self.runner is not None and self.runner.changes_itself
 
     def _show_present(self) -> None:
         """Show parameters that the stage has changed by itself, without setting them again."""
-        if not hasattr(self.stage, "present"):
+        if not self._changes_itself():
             return
         before = values_of(self.parameters)
         self._take_present()
@@ -499,16 +505,15 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
                 self._shows_present = False
 
     def _retune(self, parameters: Any) -> None:
-        if self.stage is None or not hasattr(self.stage, "retune"):
+        if self.runner is None:
             return
-        if hasattr(self.stage, "examine"):  # takes long: beside the loop, which goes on meanwhile
-            self.stage.examine(parameters)
+        self.runner.examine(parameters)  # takes long: beside the loop, which goes on meanwhile
         if not self.lock.acquire(timeout=_LOCK_PATIENCE):
             raise SessionError(f"{self.member_name} is in a step that takes too long; try again")
         try:
-            self.stage.retune(parameters)
+            self.runner.retune(parameters)
         except TeleopError:
-            self.stage.retune(self.parameters)
+            self.runner.retune(self.parameters)
             raise
         finally:
             self.lock.release()
@@ -541,7 +546,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         concerns += self.ports.concerns()
         if is_active:
             concerns += self.overrides.concerns() + self.concerns()
-            concerns += getattr(self.stage, "concerns", list)()
+            concerns += self.runner.concerns() if self.runner is not None else []
         elif self._word == "failed":
             concerns.append("failed; see its log")
         rate = self._reporter.rate(self.counts.ticks)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import IO, Any, cast
 
@@ -78,6 +78,7 @@ class Child:
         name: Stage with its namespace, or a whole session.
         parameters: Open parameter file.
         env: Its environment.
+        command: What it runs in place of the node of that name.
 
     Attributes:
         name: As given.
@@ -85,7 +86,9 @@ class Child:
         is_told: Whether its end has been told already.
     """
 
-    def __init__(self, name: str, parameters: IO[Any], env: dict[str, str]) -> None:
+    def __init__(
+        self, name: str, parameters: IO[Any], env: dict[str, str], command: Sequence[str] = ()
+    ) -> None:
         arm, _, stage = name.rpartition("/")
         self.name, self.doing = name, "starting"
         self.is_told = self._is_asked = False
@@ -94,14 +97,14 @@ class Child:
         self._text = b""
         # Closed with us: nobody else knows its name.
         self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
-        command = [sys.executable, "-m", "teleop_core.nodes", stage]
-        command += ["--ros-args", "--params-file", f"/dev/fd/{parameters.fileno()}"]
+        ours = [sys.executable, "-m", "teleop_core.nodes", stage]
+        ours += ["--ros-args", "--params-file", f"/dev/fd/{parameters.fileno()}"]
         if arm:
-            command += ["-r", f"__ns:=/{arm}"]
+            ours += ["-r", f"__ns:=/{arm}"]
         with theirs:
             # A session of its own: Ctrl-C on the terminal reaches us, and we end it in order.
             self._process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
+                command or ours, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
                 env=env | {VARIABLE: str(theirs.fileno())}, start_new_session=True,
                 pass_fds=(theirs.fileno(), parameters.fileno()),
             )  # fmt: skip

@@ -176,7 +176,7 @@ class LiveLink:
         self._begun = self._heard = time.monotonic()
 
     def _robot(self, arm: str) -> Any:
-        slave = "/".join(filter(None, (arm, "slave_sim")))
+        slave = "/".join(filter(None, (arm, "slave")))
         name = str(self._value(slave, "robot") or "rcrt1")
         geometry = self._value(slave, "geometry")
         return load_robot_set(name, geometry if isinstance(geometry, tuple) else ())  # type: ignore[arg-type]
@@ -239,7 +239,7 @@ class LiveLink:
         view.news = tuple(
             f"{name}: {s.message}" for name, s in self._statuses.items() if s.level >= WARNING
         )
-        slave = self._statuses.get("/".join(filter(None, (self.arms[0].name, "slave_sim"))))
+        slave = self._statuses.get("/".join(filter(None, (self.arms[0].name, "slave"))))
         if slave is not None:
             unknown = "delay_ms.median" not in slave.values
             median, worst = (slave.number(f"delay_ms.{w}") * 1e-3 for w in ("median", "p99"))

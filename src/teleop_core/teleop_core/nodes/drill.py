@@ -44,6 +44,7 @@ def drill(
     is_composed: bool = False,
     files: Sequence[Path] = (),
     texts: Sequence[str] = (),
+    drives: Sequence[str] = (),
 ) -> list[Outcome]:
     """Do exercises in sessions of their own, on a ROS domain of their own.
 
@@ -54,6 +55,8 @@ def drill(
         is_composed: Whether all nodes share one process.
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
+        drives: Command of drives that the slave leads in place of the simulated ones, with its
+            arguments; exercises that break the simulator are left out.
 
     Raises:
         TeleopError: A parameter is wrong, or a session cannot be started.
@@ -61,12 +64,12 @@ def drill(
     sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for its turn
     outcomes: list[Outcome] = []
     for master in Master:
-        own = [one for one in exercises if one.master is master]
+        own = [o for o in exercises if o.master is master and not (drives and o.breaks_simulator)]
         if own:
             place = folder / master.name.lower()
             place.mkdir(parents=True)
             made = _configuration(master, files, texts)
-            part = _Drill(master, made, place, say, is_composed=is_composed)
+            part = _Drill(master, made, place, say, is_composed=is_composed, drives=drives)
             outcomes += part.run(own)
             if part.is_over:
                 break
@@ -79,8 +82,9 @@ class _Drill:
 
     def __init__(
         self, master: Master, configuration: Configuration, folder: Path, say: Say, *,
-        is_composed: bool,
+        is_composed: bool, drives: Sequence[str],
     ) -> None:  # fmt: skip
+        self._drives = drives
         self._master, self._folder, self._say = master, folder, say
         self._is_composed, self._configuration = is_composed, configuration
         self._numbers, self._scheduling = Numbers.of(configuration), Scheduling()
@@ -140,7 +144,7 @@ class _Drill:
             folder.mkdir()
             self._rig = LiveRig(
                 self._configuration, self._numbers.robot, folder, _environment(self._master),
-                is_composed=self._is_composed, master=self._master,
+                is_composed=self._is_composed, master=self._master, drives=self._drives,
             )  # fmt: skip
             way = "one process" if self._is_composed else "a process for each node"
             self._say(f"starts a session: {way}, the hand is that of {_who(self._master)}")

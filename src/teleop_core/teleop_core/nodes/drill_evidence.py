@@ -9,6 +9,7 @@ from teleop_core.drill.outcome import Outcome
 from teleop_core.nodes.drill_rig import LiveRig
 from teleop_core.operation import Fault, State
 from teleop_core.topics import (
+    SLAVE_MEASURED_CP,
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
     SLAVE_SETPOINT_JS,
@@ -40,7 +41,7 @@ def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None
     if told:
         first_ns, outcome.told_by = min(told)
         outcome.detected = 1e-9 * (first_ns - begin_ns)
-    if rig.session.is_running("slave_sim"):
+    if rig.session.is_running("slave"):
         outcome.state = State(int(rig.operation()["state"]))
 
 
@@ -56,11 +57,13 @@ def seen_of(
         scheduling: How late this machine was at the start.
     """
     begin_ns, end_ns = time_ns
+    true_cp = rig.tap.trace(SLAVE_TRUE_CP)  # which only a simulator tells
+    tip = true_cp if len(true_cp) else rig.tap.trace(SLAVE_MEASURED_CP)
     told_ns = None if outcome.told is None else begin_ns + round(1e9 * outcome.told)
     warned = [ns for ns in rig.warned.values() if ns >= begin_ns]
     return Seen(
         begin_ns, end_ns, rig.tap.trace(SLAVE_SETPOINT_JS), rig.tap.trace(SLAVE_MEASURED_JS),
-        rig.tap.trace(SLAVE_TRUE_CP), told_ns, min(warned, default=None),
+        tip, told_ns, min(warned, default=None),
         rig.tap.scheduling(begin_ns).beside(scheduling), max(0.0, 1e-9 * (rig.woken_ns - begin_ns)),
     )  # fmt: skip
 

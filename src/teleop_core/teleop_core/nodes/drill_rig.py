@@ -3,7 +3,7 @@
 import re
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,7 @@ from teleop_core.session.layers import SESSION
 from teleop_core.topics import SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
 
 _NUMBERS = re.compile(r"[-+]?[0-9][0-9.e]*")
+_SLAVE = ("slave", "slave_sim")
 _EMPTY = {"operation.reported": Parameter.Type.STRING_ARRAY}
 _PERIOD_NS = 1_000_000_000  # of reports: what comes later tells of the time since the fault
 _ANSWER = 3.0  # patience with a service [s]
@@ -54,11 +55,12 @@ class LiveRig:
         env: Environment of the processes, with their ROS domain.
         is_composed: Whether all nodes share one process.
         master: Who moves the hand.
+        drives: Command of drives in place of the simulated ones.
     """
 
     def __init__(
         self, configuration: Configuration, robot: Robot, folder: Path, env: dict[str, str], *,
-        is_composed: bool, master: Master,
+        is_composed: bool, master: Master, drives: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self.is_composed, self._robot = is_composed, robot
         domain = int(env["ROS_DOMAIN_ID"])
@@ -66,8 +68,9 @@ class LiveRig:
         env = env | {inside.VARIABLE: str(folder / "control")}
         self.observer = Observer(domain)
         self.session = DrillSession(
-            configuration, folder, env, self.observer, is_composed=is_composed, master=master
-        )
+            configuration, folder, env, self.observer, is_composed=is_composed, master=master,
+            drives=drives,
+        )  # fmt: skip
         self._context = Context()
         self._context.init(args=[], domain_id=domain)
         self._node, self._own = (self._make_node("drill"), self._make_node("drill_hand"))
@@ -81,7 +84,10 @@ class LiveRig:
         self._services = {
             name: self._node.create_client(Trigger, f"/slave/{name}") for name in COMMANDS
         }
-        self._settings = self._node.create_client(SetParameters, "/slave_sim/set_parameters")
+        self._settings = {
+            node: self._node.create_client(SetParameters, f"/{node}/set_parameters")
+            for node in _SLAVE
+        }
         self._intruders: dict[str, Any] = {}
         self.begin_ns, self.warned, self.said = 0, dict[str, int](), ""
         self.woken_ns, self._warned_before = 0, dict[str, str]()
@@ -169,7 +175,7 @@ class LiveRig:
         operation = self.operation()
         if not operation or operation["state"] != State.ENABLED or operation["is_busy"]:
             return False
-        if self.tap.age(SLAVE_SETPOINT_JS) > _FRESH or not self.session.is_running("slave_sim"):
+        if self.tap.age(SLAVE_SETPOINT_JS) > _FRESH or not self.session.is_running("slave"):
             return False
         rows = self.tap.recent(SLAVE_SETPOINT_JS, 60)
         moves = np.any(np.diff(rows, axis=0) != 0.0, axis=1)
@@ -202,7 +208,7 @@ class LiveRig:
             meanwhile()
             self.wait(seconds - (time.monotonic() - begin))
         finally:
-            if self.is_composed or node == "slave_sim":
+            if self.is_composed or node in _SLAVE:
                 self.woken_ns = time.time_ns()
             self.session.send(node, signal.SIGCONT)
 
@@ -294,14 +300,13 @@ class LiveRig:
 
     def set(self, node: str, name: str, value: object) -> bool:
         """Set a parameter of a running node; whether it was taken."""
-        assert node == "slave_sim", node
         entry = (
             Parameter(name, _EMPTY.get(name, Parameter.Type.DOUBLE_ARRAY), [])
             if value == []
             else Parameter(name, value=value)
         )
         request = SetParameters.Request(parameters=[entry.to_parameter_msg()])
-        found = self._call(self._settings, request)
+        found = self._call(self._settings[node], request)
         return bool(found is not None and all(one.successful for one in found.results))
 
     def _call(self, client: Any, request: Any) -> Any:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
@@ -24,7 +25,7 @@ from teleop_core.session.configuration import Configuration
 
 _NEVER_NS = 2**62
 START_TIMEOUT = 180.0
-_MASTER = "haptic_master"
+_MASTER, _SIMULATOR = "haptic_master", "slave_sim"
 _BUSY = "while True: pass"
 _BYSTANDER = "from teleop_core.nodes.drill_tap import stand_by; stand_by()"
 _MIDDLEWARE = ("FASTRTPS_", "FASTDDS_", "ROS_AUTOMATIC", "ROS_LOCALHOST", "ROS_STATIC")
@@ -40,6 +41,7 @@ class DrillSession:
         observer: Who hears what nodes say of themselves.
         is_composed: Whether all nodes share one process.
         master: Who moves the hand.
+        drives: Command of the drives that the slave leads in place of the simulated ones.
 
     Attributes:
         recordings: Recordings so far, the present one last.
@@ -47,11 +49,11 @@ class DrillSession:
 
     def __init__(
         self, configuration: Configuration, folder: Path, env: dict[str, str], observer: Observer,
-        *, is_composed: bool, master: Master,
+        *, is_composed: bool, master: Master, drives: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self._configuration, self._folder, self._env = configuration, folder, env
         self._observer, self._is_composed = observer, is_composed
-        self._has_device = master is Master.DEVICE
+        self._has_device, self._drives = master is Master.DEVICE, tuple(drives)
         self._children: dict[str, Child] = {}
         self._files: list[IO[str]] = []
         self._others: list[subprocess.Popen[Any]] = []
@@ -75,7 +77,7 @@ class DrillSession:
                 if not self.is_running(process):
                     waiting += nodes
                     self._launch(process)
-            self._await(waiting)
+            self._await([name for name in waiting if not self._is_foreign(name)])
 
     def _crews(self) -> tuple[dict[str, list[str]], ...]:
         if self._is_composed:
@@ -93,7 +95,11 @@ class DrillSession:
         self._files.append(file)
         if process in self._children:
             self._children[process].end()
-        self._children[process] = Child(process, file, self._env)
+        command = self._drives if self._is_foreign(process) else ()
+        self._children[process] = Child(process, file, self._env, command)
+
+    def _is_foreign(self, process: str) -> bool:
+        return bool(self._drives) and process == _SIMULATOR
 
     def _parameters(self) -> str:
         text = parameter_file(self._configuration, str(self.recordings[-1]))

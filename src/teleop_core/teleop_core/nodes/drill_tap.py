@@ -10,7 +10,15 @@ from typing import Any
 import numpy as np
 from rclpy.node import Node
 
-from teleop_core.bags.messages import SECOND_NS, layout, read_numbers
+from teleop_core.bags.messages import (
+    SECOND_NS,
+    Layout,
+    Refusal,
+    Values,
+    layout,
+    read_any,
+    read_numbers,
+)
 from teleop_core.drill import hand
 from teleop_core.drill.hand import Distortion, Sample
 from teleop_core.drill.measure import Trace
@@ -95,8 +103,8 @@ class Tap:
         with self._lock:
             heard = list(self._heard[topic.name])
         form = layout(topic, self._joint_names)
-        found = [(sent, number, form.decode_one(data)) for sent, number, data in heard]
-        sound = [(sent, number, one) for sent, number, one in found if one is not None]
+        found = [(sent, number, self._read(topic, form, data)) for sent, number, data in heard]
+        sound = [(s, number, one) for s, number, one in found if not isinstance(one, Refusal)]
         rows = [values for *_, (_, values) in sound]
         return Trace(
             np.array([sent for sent, *_ in sound], np.int64),
@@ -122,9 +130,13 @@ class Tap:
         with self._lock:
             heard = self._heard[topic.name][-count:]
         form = layout(topic, self._joint_names)
-        found = [form.decode_one(data) for *_, data in heard]
-        rows = [one[1] for one in found if one is not None]
+        found = [self._read(topic, form, data) for *_, data in heard]
+        rows = [one[1] for one in found if not isinstance(one, Refusal)]
         return np.array(rows) if rows else np.empty((0, form.width))
+
+    def _read(self, topic: Topic, form: Layout, data: bytes) -> tuple[int, Values] | Refusal:
+        """Stamp and values of a message, of ours or of anybody's."""
+        return form.decode_one(data) or read_any(topic.kind, data, self._joint_names)
 
     def age(self, topic: Topic) -> float:
         """Time since the newest message of a topic was sent [s]; infinite before the first."""

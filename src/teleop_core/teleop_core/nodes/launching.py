@@ -40,7 +40,7 @@ TWO_ARMS = {
 }
 
 
-_ONCE = (RECORDER_NAME, "slave_sim")
+_ONCE = (RECORDER_NAME, "slave", "slave_sim")
 """Nodes that are not started again: a recording that exists stays as it is, and an arm that broke
 down moves again on purpose only."""
 _RESPAWN_DELAY = 2.0

@@ -40,8 +40,8 @@ _LOOK = 0.5
 _ALONE = 1.0
 """Who has been alone in its domain for this long, all at work, owns it; later ones end [s]."""
 _TRANSPORT = {False: 1.4e-3, True: 0.3e-3}
-"""From a sample of the device to its force and back, in five processes and composed [s], as
-`make bench` measures: two of the three hops from master to slave."""
+"""From a sample of the device to its force and back, in processes of their own and composed [s],
+as `make bench` measures: two of the three hops from master to slave."""
 _NEWS_PERIOD = 5.0  # from line to line about a node that is long in starting [s]
 Crew = dict[str, tuple[str, ...]]
 """Processes that are started together, each with its nodes."""

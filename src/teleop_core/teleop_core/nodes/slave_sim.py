@@ -1,138 +1,19 @@
-"""Node ``slave_sim``: the simulated slave, exactly one step per elapsed millisecond."""
+"""Node ``slave_sim``: the simulated arm, exactly one step per elapsed millisecond."""
 
-import time
-from collections.abc import Callable, Iterable
-
-from teleop_core.bags.messages import Refusal
-from teleop_core.nodes.crtk_slave import CrtkSlave
-from teleop_core.nodes.operation import CommandServices, StopInput
 from teleop_core.nodes.ticking import TickingNode
-from teleop_core.operation import Fault, State, operation_text
-from teleop_core.signals import TICK_NS
-from teleop_core.slave.commands import CommandStatus
-from teleop_core.slave.slave_sim import SlaveSimParameters
-from teleop_core.topics import SLAVE_OPERATION, SLAVE_SERVO_JP
-
-_SERVO = SLAVE_SERVO_JP.name
-
-
-_SELDOM = 10
-"""Turns from one look at clocks and publishers to the next."""
-_CLOCK_STEP_NS = 100_000_000
-"""A clock that moves by more against the monotonic one between two turns was stepped [ns]."""
+from teleop_core.topics import SLAVE_SETPOINT_JS
 
 
 class SlaveSimNode(TickingNode):
-    """Follows the newest ``slave/servo_jp`` while it is enabled and homed; stops when told to.
-
-    The emergency stop is looked at before every tick. Faults that only a node can see, such as a
-    clock that was stepped, are handed to the stage, whose reaction is that of all others.
-    """
-
-    def setup(self, parameters: SlaveSimParameters) -> None:
-        """Make the slave, open its topics, and listen to the emergency stop and to commands."""
-        super().setup(parameters)
-        self._stop, self._commands = StopInput(self), CommandServices(self, self.stage)
-        self._crtk = CrtkSlave(self, self.stage)
-        self._told_state = int(State.DISABLED)
-
-    def teardown(self) -> None:
-        """Close what :meth:`setup` opened."""
-        self._stop.close()
-        self._commands.close()
-        self._crtk.close()
-        super().teardown()
-
-    def start(self) -> None:
-        """Relate the clocks; what they do later is seen against this."""
-        super().start()
-        self._offset_ns, self._turns, self._floods = self.epoch_ns, 0, 0
-        self._seen, self._missed = self.counts, self.counts.missed
-
-    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Take the newest command and the steps of some ticks [ns, monotonic]."""
-        before_ns = int(self.row["slave_setpoint_js_ns"])
-        self._look()
-        super().work(ticks, report)
-        stamp_ns = int(self.row["slave_setpoint_js_ns"])
-        if stamp_ns != before_ns:
-            self.delay.put(time.time_ns() - stamp_ns)
-
-    def advance(self, now_ns: int) -> None:
-        """Take the emergency stop, then make one step, also of many that are to be made up for."""
-        for is_pressed in self._stop.take():
-            with self.lock:
-                self.stage.press(is_pressed=is_pressed, now_ns=now_ns)
-        super().advance(now_ns)
-
-    def _look(self) -> None:
-        """Find the faults that only a node can see."""
-        longest, counts = self.parameters.operation.longest_outage, self.counts
-        # Composed, the ticks of one late wake-up come one by one: only its counts tell of them all.
-        missed = (counts.missed - self._missed) * TICK_NS * 1e-9 if counts is self._seen else 0.0
-        self._seen, self._missed = counts, counts.missed
-        if 0.0 < longest < missed:
-            self._fail(Fault.STALL, missed, longest)
-        self._turns += 1
-        if self._turns % _SELDOM == 0:
-            self._look_around()
-
-    def _look_around(self) -> None:
-        """Find a clock that was stepped, and two publishers of commands."""
-        offset_ns = time.time_ns() - time.monotonic_ns()
-        if abs(offset_ns - self._offset_ns) > _CLOCK_STEP_NS:
-            step = 1e-9 * (offset_ns - self._offset_ns)
-            self._offset_ns = offset_ns
-            self._fail(Fault.CLOCK, abs(step), 1e-9 * _CLOCK_STEP_NS)
-        commands = self.ports.inputs[_SERVO]
-        if any(entry.conflict for entry in commands):
-            self._fail(Fault.PUBLISHERS)
-        floods = sum(entry.refused[Refusal.FLOOD] for entry in commands)
-        if floods > self._floods:
-            self._floods = floods
-            self._fail(Fault.FLOOD)
-
-    def _fail(self, fault: Fault, value: float = 0.0, bound: float = 0.0) -> None:
-        with self.lock:
-            self.stage.fail(fault, value, bound)
-
-    def send_report(self, stamp_ns: int) -> None:
-        """Report the operation where it changes, and log what people want to know."""
-        before = self._reported
-        super().send_report(stamp_ns)
-        if self._reported is not before:
-            self._crtk.note(stamp_ns)
-        values = self.stage.signals[SLAVE_OPERATION.field]
-        state = int(values[0])
-        if state != self._told_state and self.executor is not None:
-            self._told_state = state
-            text = operation_text(self.stage.operation, self.stage.robot.joint_names)
-            # A line in the log takes milliseconds, which the loop has not.
-            self.executor.create_task(self._tell, text, state == State.FAULT)
-
-    def _tell(self, text: str, is_bad: bool) -> None:
-        log = self.get_logger()
-        log.error(text) if is_bad else log.info(text)
+    """Holds the newest ``slave/setpoint_js``; before the first it stands at home."""
 
     def concerns(self) -> list[str]:
-        """A slave that holds still because nothing sound tells it where to go."""
-        status = CommandStatus(int(self.row["command_status"]))
-        if status is CommandStatus.MOVING:
-            is_homing = self.stage.motion.source == "home"
-            return ["moves to where it starts, and follows then"] if is_homing else []
-        values = self.stage.operation
-        if status is CommandStatus.CLOSED or values["fault"] > 0.0:
-            return [operation_text(values, self.stage.robot.joint_names)]
-        servo_jp = self.input(SLAVE_SERVO_JP)
-        if servo_jp.stamp_ns is None:
-            return ["waits for slave/servo_jp and holds"]
-        if status is CommandStatus.STALE:
-            return [f"no slave/servo_jp for {servo_jp.age():.1f} s: holds"]
-        return ["slave/servo_jp jumped: holds"] if status is CommandStatus.REFUSED else []
+        """An arm that nobody leads."""
+        setpoint = self.input(SLAVE_SETPOINT_JS)
+        if setpoint.stamp_ns is None:
+            return ["waits for slave/setpoint_js and stands"]
+        is_silent = setpoint.age() > _SILENCE
+        return [f"no slave/setpoint_js for {setpoint.age():.1f} s: stands"] if is_silent else []
 
-    def values(self) -> dict[str, str]:
-        """State, what moves the arm, how many commands were refused."""
-        text = operation_text(self.stage.operation, self.stage.robot.joint_names)
-        jumped = {"refused.slave/servo_jp.jump": str(self.stage.refused)}
-        lost = {"stop_messages_lost": str(self._stop.lost)}
-        return {**jumped, **lost, "operation": text, **self._crtk.values()}
+
+_SILENCE = 0.5  # s

@@ -22,6 +22,7 @@ class Fault(IntEnum):
     PUBLISHERS = 11
     FLOOD = 12
     STALL = 13
+    FEEDBACK = 14
 
     @property
     def word(self) -> str:
@@ -61,6 +62,7 @@ FAULTS: Mapping[Fault, FaultKind] = {
     Fault.PUBLISHERS: FaultKind(Reaction.PAUSE, "two publishers on a command topic"),
     Fault.FLOOD: FaultKind(Reaction.REPORT, "more messages than anybody needs"),
     Fault.STALL: FaultKind(Reaction.PAUSE, "the slave's own loop stood still", "s"),
+    Fault.FEEDBACK: FaultKind(Reaction.HOLD, "the arm has not said where it is", "s"),
 }
 """What there is, with its reaction; those that a session names as ``reported`` only report."""
 ALWAYS = (Fault.STOP, Fault.HEARTBEAT)

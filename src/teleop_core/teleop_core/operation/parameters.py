@@ -33,6 +33,12 @@ class OperationParameters:
         doc="after a longer silence of commands it is paused and resumes on purpose only; 0: never",
         source="assumed: longer than a node takes to hiccup, shorter than a person to look away",
     )  # fmt: skip
+    longest_silence: float = parameter(
+        2.0, unit="s", lower=0.01, upper=60.0,
+        doc="an arm that has not said for longer where it is has a fault; it holds long before, "
+        "after the command timeout",
+        source="assumed: as the longest outage",
+    )  # fmt: skip
     acceleration_share: float = parameter(
         20.0, lower=1.0, upper=1000.0,
         doc="largest acceleration of setpoints over that of the drives, effort limit over inertia",

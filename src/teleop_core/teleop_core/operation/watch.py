@@ -15,11 +15,12 @@ OPERATION_STATE = [
     *STATE_FIELDS, ("must_brake", "i8"), ("told", "i8"), ("played", "i8"), ("first_ns", "i8"),
     ("heard_ns", "i8"), ("pressed_ns", "i8"), ("left_ns", "i8"), ("is_resting", "i8"),
     ("still_ns", "i8"), ("left_at", "f8", (3,)), ("rest_time", "f8"), ("travel", "f8"),
+    ("sampled_ns", "i8"), ("heard_of_ns", "i8"),
 ]  # fmt: skip
-"""Scalars of a state record; beside them it has ``full_ticks`` (n,)."""
+"""Scalars of a state record; beside them it has ``full_ns`` (n,)."""
 OPERATION_PARAMETERS = [
-    ("brakes", "i8"), ("heartbeat_ns", "i8"), ("outage_ns", "i8"), ("effort_ticks", "i8"),
-    ("pressing_ns", "i8"), ("tip_error", "f8"), ("overspeed", "f8"),
+    ("brakes", "i8"), ("heartbeat_ns", "i8"), ("outage_ns", "i8"), ("effort_ns", "i8"),
+    ("silence_ns", "i8"), ("pressing_ns", "i8"), ("tip_error", "f8"), ("overspeed", "f8"),
     ("reported", "i8", (len(Fault),)), ("event_count", "i8"), ("event", "i8", (MOST_EVENTS,)),
     ("event_ns", "i8", (MOST_EVENTS,)),
 ]  # fmt: skip
@@ -36,6 +37,7 @@ _STOP, _FAILED, _LAPSED = int(Event.STOP), int(Event.FAILED), int(Event.LAPSED)
 _HEARTBEAT, _PRESSED = int(Fault.HEARTBEAT), int(Fault.STOP)
 _TRACKING, _TIP, _EFFORT = int(Fault.TRACKING), int(Fault.TIP), int(Fault.EFFORT)
 _OVERSPEED, _LIMIT = int(Fault.OVERSPEED), int(Fault.JOINT_LIMIT)
+_FEEDBACK = int(Fault.FEEDBACK)
 REST_NS = 50_000_000
 """An arm rests once no joint has moved for so long [ns]: twice as long as a turn of a swinging
 joint, at the bandwidths of 60 to 80 rad/s that drives have, takes."""
@@ -97,8 +99,15 @@ def is_braked(p: Any, s: Any) -> bool:
 
 
 @inner
-def watch_joints(p: Any, s: Any, effort: Array, dt: float) -> None:
-    """Find joints that are too far off, too fast, or at the end of what their drives can give."""
+def watch_joints(p: Any, s: Any, effort: Array, passed_ns: int) -> None:
+    """Find joints that are too far off, too fast, or at the end of what their drives can give.
+
+    Args:
+        p: Parameters.
+        s: State with ``setpoint``, ``measured`` and ``speed`` (n,); written.
+        effort: What the drives gave (n,) [N·m or N].
+        passed_ns: Time since the last time [ns].
+    """
     for i in range(effort.shape[0]):
         off = abs(s.setpoint[i] - s.measured[i])
         if not off <= p.lag[i]:  # NaN is too far as well
@@ -107,9 +116,9 @@ def watch_joints(p: Any, s: Any, effort: Array, dt: float) -> None:
         if not abs(s.speed[i]) <= fast:
             fail(p, s, _OVERSPEED, i, abs(s.speed[i]), fast)
         is_full = abs(effort[i]) >= _FULL * p.effort_limit[i]
-        s.full_ticks[i] = s.full_ticks[i] + 1 if is_full else 0
-        if s.full_ticks[i] > p.effort_ticks:
-            fail(p, s, _EFFORT, i, s.full_ticks[i] * dt, p.effort_ticks * dt)
+        s.full_ns[i] = s.full_ns[i] + passed_ns if is_full else 0
+        if s.full_ns[i] > p.effort_ns:
+            fail(p, s, _EFFORT, i, 1e-9 * s.full_ns[i], 1e-9 * p.effort_ns)
 
 
 @inner
@@ -171,9 +180,24 @@ def find_rest(s: Any, moves: bool, now_ns: int) -> None:
 
 
 @inner
-def tell(s: Any, row: Array) -> None:
+def watch_feedback(p: Any, s: Any, now_ns: int) -> None:
+    """Find an arm that has not said for too long where it is."""
+    silence_ns = now_ns - s.heard_of_ns
+    if silence_ns > p.silence_ns:
+        fail(p, s, _FEEDBACK, -1, 1e-9 * silence_ns, 1e-9 * p.silence_ns)
+
+
+@inner
+def is_blind(p: Any, s: Any, now_ns: int) -> bool:
+    """Whether the arm has not said lately, within the command timeout, where it is."""
+    return bool(now_ns - s.heard_of_ns > p.timeout_ns)
+
+
+@inner
+def tell(p: Any, s: Any, row: Array) -> None:
     """Write the numbers of :data:`~teleop_core.topics.OPERATION`."""
     row[0], row[1], row[2], row[3] = s.state, s.is_homed, s.is_busy, s.is_stopped
     row[4], row[5], row[6], row[7] = s.fault, s.fault_joint, s.fault_value, s.fault_bound
     row[8] = s.rest_time if s.is_resting else 0.0
     row[9] = s.travel if s.is_resting else 0.0
+    row[10] = is_braked(p, s)

@@ -17,7 +17,7 @@ class Placement:
     Attributes:
         robot: Which slave: ``robot`` of the stages that have one.
         geometry: Lengths and options in place of its published ones, ``symbol=value`` each.
-        start: Joints (n,) [rad, m] from which the slave follows: ``slave_sim.start``.
+        start: Joints (n,) [rad, m] from which the slave follows: ``slave.start``.
         axes: The slave's x, y, z as axes of the master: ``motion_scaling.axes``.
         coarse_gain: Slave motion per hand motion in coarse mode.
         fine_gain: The same in fine mode.
@@ -61,12 +61,12 @@ class Placement:
         """
         prefix = f"{arm}/" if arm else ""
         robot: dict[str, Setting] = {}
-        for stage in ("inverse_kinematics", "slave_sim"):
+        for stage in ("inverse_kinematics", "slave", "slave_sim"):
             robot[f"{prefix}{stage}.robot"] = self.robot
             if self.geometry:
                 robot[f"{prefix}{stage}.geometry"] = list(self.geometry)
         return robot | {
-            f"{prefix}slave_sim.start": list(map(float, self.start)),
+            f"{prefix}slave.start": list(map(float, self.start)),
             f"{prefix}motion_scaling.axes": list(self.axes),
             f"{prefix}motion_scaling.coarse_gain": float(self.coarse_gain),
             f"{prefix}motion_scaling.fine_gain": float(self.fine_gain),

@@ -180,7 +180,7 @@ def _changes(
 ) -> list[Layer]:
     layers = []
     if robot is not None:
-        named = {"robot": robot, "geometry": list(geometry), "slave_sim.start": []}
+        named = {"robot": robot, "geometry": list(geometry), "slave.start": []}
         layers = [setting(name, value) for name, value in named.items()]
     layers += [load_file(Path(file)) for file in files]
     layers += [setting(name, value) for name, value in settings.items()]
@@ -220,7 +220,7 @@ def _reach(
 ) -> Reach:
     scaling, solving = made.group("motion_scaling", arm), made.group("inverse_kinematics", arm)
     whole = Walker(path.limited(_WHOLE), scaling, solving)
-    start = made.group("slave_sim", arm).start_of(whole.robot)
+    start = made.group("slave", arm).start_of(whole.robot)
     given = Placement.of(scaling, solving, tuple(start))
     done = 0
 

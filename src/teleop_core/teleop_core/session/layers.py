@@ -63,8 +63,17 @@ RENAMED = {
     "haptic_master.path.": "haptic_master.operator.",
     "motion_scaling.fixture.size": "motion_scaling.fixture.box.size",
     "slave_sim.pid.": "slave_sim.controller.pid.",
-}
+    **{
+        f"slave_sim.{name}": f"slave.{name}"
+        for name in (
+            "operation.", "reference_filter.", "command_timeout", "interpolation", "start",
+            "starts_at_home", "start_speed",
+        )
+    },
+}  # fmt: skip
 """Former names, which recordings and files may still have, or their beginnings."""
+_READER = ("slave/servo_jp@slave_sim=", "slave/servo_jp@slave=")  # of commands, before and now
+_OF_ROBOT = ("robot", "geometry")
 
 Layer = dict[str, dict[str, object]]
 
@@ -146,18 +155,31 @@ def parse_layer(content: object, where: str) -> Layer:
             raise UnknownNameError(f"{where}: stage", key, (SESSION, *STAGES))
         if not isinstance(inner, Mapping) or not isinstance(inner.get("ros__parameters"), Mapping):
             raise TeleopError(f"{where}: {key} must hold ros__parameters with names and values")
-        values = dict(_flat(inner["ros__parameters"]))
-        layer.setdefault(name, {}).update({_current(stage, n): v for n, v in values.items()})
+        arm = name.removesuffix(stage)
+        layer.setdefault(name, {})
+        for own, value in _flat(inner["ros__parameters"]):
+            owner, _, present = _current(f"{stage}.{own}").partition(".")
+            layer.setdefault(arm + owner, {})[present] = value
+    _share_robot(layer)
+    if isinstance(delays := layer.get(SESSION, {}).get("delays"), list | tuple):
+        layer[SESSION]["delays"] = [str(one).replace(*_READER) for one in delays]
     return layer
 
 
-def _current(stage: str, name: str) -> str:
+def _current(full: str) -> str:
     """Present name of a parameter that may be called by a former one."""
-    full = f"{stage}.{name}"
     for old, new in RENAMED.items():
         if full == old or (old.endswith(".") and full.startswith(old)):
-            return (new + full[len(old) :]).partition(".")[2]
-    return name
+            return new + full[len(old) :]
+    return full
+
+
+def _share_robot(layer: Layer) -> None:
+    """Let a slave have the robot of its simulator, where a file knows no slave beside that."""
+    for name in [name for name in layer if name.rpartition("/")[2] == "slave_sim"]:
+        slave = layer.setdefault(name.removesuffix("_sim"), {})
+        if not slave.keys() & set(_OF_ROBOT):
+            slave |= {key: layer[name][key] for key in _OF_ROBOT if key in layer[name]}
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, object]]:

@@ -149,7 +149,7 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
 def _begin_at_home(layer: Layer) -> None:
     """Let slaves of versions that knew no other start begin where they did, at home."""
     for name, values in layer.items():
-        is_old = name.rpartition("/")[2] == "slave_sim" and "start" not in values
+        is_old = name.rpartition("/")[2] == "slave" and "start" not in values
         if is_old and isinstance(robot := values.get("robot"), str):
             geometry = values.get("geometry", ())
             settings = geometry if isinstance(geometry, tuple | list) else ()
@@ -312,7 +312,7 @@ class _Report:
     def write(self, writer: ReportWriter, block: Any) -> None:
         states, stamps = block[self._topic.field], block[f"{self._topic.field}_ns"]
         changed = (states != np.vstack((self._last, states[:-1]))).any(axis=1)
-        described: dict[str, str] = getattr(self._stage, "described", dict)()
+        described = self._stage.described() if self._stage is not None else {}
         for i in np.flatnonzero(changed):
             data = report_of(self._topic, int(stamps[i]), states[i], described)
             writer.write(self._topic, int(block["now_ns"][i]), data)

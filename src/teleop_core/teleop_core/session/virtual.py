@@ -81,7 +81,7 @@ class VirtualTime:
     @property
     def lead(self) -> int:
         """Ticks until all arms can follow, such as for the move to where they start."""
-        return max(int(getattr(stage, "lead", 0)) for stage in self.stages.values())
+        return max(stage.lead for stage in self.stages.values())
 
     @property
     def source(self) -> str:

@@ -22,6 +22,7 @@ class CommandStatus(IntEnum):
     REFUSED = 2  # too far from the one in force to be the same motion: the last one is held
     MOVING = 3  # to a goal, as to where the slave starts, or at a speed: nothing is followed
     CLOSED = 4  # not enabled, or not homed: nothing is followed
+    BLIND = 5  # the arm has not said lately where it is: it holds
 
 
 # Stamps this far ahead of the slave's clock are an error, not a clock that is a little ahead.

@@ -13,11 +13,9 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import IS_COMPILED, bound, records
 from teleop_core.kernels.callables import raise_pending
-from teleop_core.operation.faults import Fault
-from teleop_core.operation.states import State
 from teleop_core.plants import PER_JOINT
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.step import Arm, slave_step
+from teleop_core.slave.simulation import Arm, simulation_step
 
 _TICKS, _LAST = 400, 100
 # After _TICKS no error may be so many times what it was. Laws that learn may let errors grow for a
@@ -34,10 +32,9 @@ _SHORTEST, _LONGEST, _LEFT = 300, 2000, 0.5
 _ROOM = 0.8
 # Where classical Runge-Kutta ends to be stable: -h times a real pole.
 _STABLE = 2.785
-_RIGID = 1e9  # acceleration and speed without a bound
-_LOOP = (*PER_JOINT, "bristle_damping", "gear_damping", "lower", "upper", "effort_limit",
-         "speed_limit", "compensated", "steps", "delay_ticks")  # fmt: skip
-_ARM = ("gains", "dynamics", "model", "geometry", "coupling")
+_LOOP = (*PER_JOINT, "bristle_damping", "gear_damping", "effort_limit", "speed_limit",
+         "compensated", "steps", "delay_ticks")  # fmt: skip
+_ARM = ("gains", "dynamics", "model", "coupling")
 _passed: set[tuple[object, ...]] = set()
 
 
@@ -84,8 +81,9 @@ def loop_key(p: Any, arm: Arm) -> tuple[bytes, ...]:
 
 
 def check_stable(
-    law: Controller, robot: Robot, p: Any, s: Any, arm: Arm, row: Any, dt: float
-) -> None:
+    law: Controller, robot: Robot, p: Any, s: Any, arm: Arm, row: Any, dt: float, *,
+    are_large_tried: bool = True,
+) -> None:  # fmt: skip
     """Refuse a loop in which small errors grow, or that does not come back from large ones.
 
     Small errors: two copies of the arm are held at the present setpoint, one of them with a small
@@ -94,8 +92,7 @@ def check_stable(
 
     Large errors: the setpoint of one joint after the other dashes at the full speed of its drive,
     in bursts and in one run, and stands still at once, which saturates the drive. Within 2 s the
-    error must come below half of the largest one on the way. Where the fault ``tracking`` is told
-    only, as for experiments with bad laws, this is not asked.
+    error must come below half of the largest one on the way.
 
     Args:
         law: The control law.
@@ -105,19 +102,19 @@ def check_stable(
         arm: Its arrays.
         row: Signals.
         dt: Tick [s].
+        are_large_tried: Whether large errors must come back, too.
 
     Raises:
         ParameterError: An error grows, or does not come back.
         Exception: What a law in plain Python raises.
     """
-    is_large_told_only = bool(p["reported"][Fault.TRACKING])
-    place = arm.q.tobytes()
-    tried = (law.control, robot.kernels, dt, place, is_large_told_only, *loop_key(p, arm))
+    place = (robot.geometry_row.tobytes(), arm.q.tobytes())
+    tried = (law.control, robot.kernels, dt, *place, are_large_tried, *loop_key(p, arm))
     if tried in _passed:
         return
     _check_small(law.name, p, s, arm, row, dt)
-    if IS_COMPILED and not is_large_told_only:  # in plain Python dashes take seconds
-        _check_large(law.name, p, s, arm, row, dt)
+    if IS_COMPILED and are_large_tried:  # in plain Python dashes take seconds
+        _check_large(law.name, robot, p, s, arm, row, dt)
     _passed.add(tried)
 
 
@@ -139,12 +136,11 @@ def _check_small(name: str, p: Any, s: Any, arm: Arm, row: Any, dt: float) -> No
 def _held(p: Any, s: Any, arm: Arm, row: Any, dt: float, by: Array) -> Array:
     """Positions (N, n) in the last ticks of an arm that is held ``by`` (n,) off its setpoint."""
     p, s, arm, row = _copies(p, s, arm, row)
-    s["state"] = State.PAUSED
     for field in ("encoder_step", "effort_step"):
         p[field] *= _FINE
     p["coulomb"], p["wander"] = 0.0, 0.0
     arm.q[:] += by
-    found, step = np.empty((_LAST, len(arm.q))), bound(slave_step, p, s, arm, row, dt)
+    found, step = np.empty((_LAST, len(arm.q))), bound(simulation_step, p, s, arm, row, dt)
     for k in range(_TICKS):
         row["now_ns"] += round(dt * 1e9)
         step()
@@ -153,9 +149,11 @@ def _held(p: Any, s: Any, arm: Arm, row: Any, dt: float, by: Array) -> Array:
     return found
 
 
-def _check_large(name: str, p: Any, s: Any, arm: Arm, row: Any, dt: float) -> None:
+def _check_large(
+    name: str, robot: Robot, p: Any, s: Any, arm: Arm, row: Any, dt: float
+) -> None:  # fmt: skip
     for joint in range(len(arm.q)):
-        left = _left(p, s, arm, row, dt, joint)
+        left = _left(robot, p, s, arm, row, dt, joint)
         if not left <= _LEFT:  # NaN is left as well
             needed = (
                 f"such that the arm comes back: {_LONGEST * dt:g} s after a stop from full speed "
@@ -185,27 +183,23 @@ def dash(lower: float, upper: float, start: float, speed: float, dt: float) -> A
     return start + side * share * speed * dt * np.cumsum(pace)
 
 
-def _left(p: Any, s: Any, arm: Arm, row: Any, dt: float, joint: int) -> float:
+def _left(robot: Robot, p: Any, s: Any, arm: Arm, row: Any, dt: float, joint: int) -> float:
     """Share of a joint's largest error that is left in rest after its setpoint has dashed."""
     p, s, arm, row = _copies(p, s, arm, row)
-    s["state"], s["is_homed"], s["seen_ns"] = State.ENABLED, 1, 0
-    p["is_filtered"] = p["interpolation"] = 0
-    p["acceleration"], p["tool_speed"], p["tool_acceleration"] = _RIGID, _RIGID, _RIGID
-    command, step = row["slave_servo_jp"], bound(slave_step, p, s, arm, row, dt)
-    command[:] = s["setpoint"]
+    setpoint, step = row["slave_setpoint_js"], bound(simulation_step, p, s, arm, row, dt)
 
     def largest(places: Array) -> float:
         found = 0.0
         for place in places:
             row["now_ns"] += round(dt * 1e9)
-            command[joint], row["slave_servo_jp_ns"] = place, row["now_ns"]
+            setpoint[joint] = place
             step()
             raise_pending()
             found = max(found, abs(float(arm.setpoint[joint] - arm.q[joint])))
         return found if np.isfinite(arm.q[joint]) else np.nan
 
     path = dash(
-        p["lower"][joint], p["upper"][joint], s["setpoint"][joint], p["speed_limit"][joint], dt
+        robot.lower[joint], robot.upper[joint], setpoint[joint], p["speed_limit"][joint], dt
     )
     most = largest(path)
     for rest in range(_LAST, _LONGEST + 1, _LAST):
@@ -216,12 +210,9 @@ def _left(p: Any, s: Any, arm: Arm, row: Any, dt: float, joint: int) -> float:
 
 
 def _copies(p: Any, s: Any, arm: Arm, row: Any) -> tuple[Any, Any, Arm, Any]:
-    """Copies of an arm that stands still, whose faults are told only."""
+    """Copies of an arm."""
     p, s, row = (_copy(record) for record in (p, s, row))
     arm = Arm(*(np.array(part) if isinstance(part, np.ndarray) else part for part in arm))
-    p["brakes"], p["event_count"], p["heartbeat_ns"], p["reported"] = 0, 0, 0, 1
-    for field in ("is_busy", "is_homing", "must_plan", "motion", "must_brake"):
-        s[field] = 0
     return p, s, arm, row
 
 

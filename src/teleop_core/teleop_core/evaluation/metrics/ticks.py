@@ -11,6 +11,7 @@ from teleop_core.evaluation.windows import Window
 from teleop_core.topics import SLAVE_MEASURED_CP
 
 GROUP = "counts"
+_FORMER = "slave_sim"  # which counted the ticks before the slave had a server
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,8 @@ class TicksMetric(Metric):
 
     def values(self) -> Ticks:
         """Ticks of the whole recording."""
-        own = self._nodes.values().get(self._slave, {})
+        nodes = self._nodes.values()
+        own = nodes.get(self._slave) or nodes.get(_FORMER) or {}
         gaps = self._stamps.of[SLAVE_MEASURED_CP.name].gaps()
         return Ticks(own.get("ticks", self._samples), own.get("late"), own.get("missed", gaps))
 

@@ -3,7 +3,7 @@
 from teleop_core.evaluation.accumulators import Moments, Spread
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
-from teleop_core.evaluation.pairing import same_tick
+from teleop_core.evaluation.pairing import same_stamp
 from teleop_core.evaluation.pose_errors import pose_errors
 from teleop_core.evaluation.rows import Row, error_rows
 from teleop_core.evaluation.tracking import TRACKED, rows_of, tracked
@@ -33,7 +33,7 @@ class TrueErrorMetric(Metric):
         found, true = tracked(window), window.around(SLAVE_TRUE_CP)
         if not len(true):
             return
-        tips = rows_of(true, same_tick(found.log_ns, true.log_ns))
+        tips = rows_of(true, same_stamp(found.stamp_ns, true.stamp_ns))
         self._error.add(pose_errors(tips, found.setpoints).position_mm)
 
     def values(self) -> Spread:

@@ -1,0 +1,50 @@
+"""Break a session in a way of your own: an exercise of the drill, in one file.
+
+Run it here, or have the command know it: ``teleop --parts examples/own_exercise.py drill shaken``.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+from teleop_core.drill import Cure, Exercise, Motion, Rig, hand, register_exercise
+from teleop_core.operation import State
+
+
+def shake(rig: Rig) -> None:
+    """Let the hand's samples scatter by 2 mm for a second."""
+    rig.mark()  # the fault begins
+    rig.distort(hand.scattered(0.002))
+    rig.wait(1.0)
+
+
+def steady(rig: Rig) -> None:
+    """Take it back."""
+    rig.distort(hand.faithful)
+
+
+SHAKEN = register_exercise(
+    Exercise(
+        name="shaken",
+        text="hand trembles by 2 mm",
+        inject=shake,
+        undo=steady,
+        motion=Motion.GOES_ON,
+        states=(State.ENABLED,),
+        cures=(Cure.NOTHING,),
+    )
+)
+
+
+def main() -> int:
+    """Do it in a session of its own; 0 if the arm did what was expected."""
+    from teleop_core.nodes.drill import drill  # needs ROS
+
+    with tempfile.TemporaryDirectory() as folder:
+        (outcome,) = drill([SHAKEN], Path(folder) / "drill", print)
+    print(f"went {1e3 * outcome.measured('path_m').value:.0f} mm, {outcome.state_text}")
+    return len(outcome.failures())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

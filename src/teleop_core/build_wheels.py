@@ -1,0 +1,118 @@
+"""Build wheels of teleop_core: a pure one, and one with compiled kernels for this system's x86-64.
+
+``make wheel`` runs it. The second wheel serves one version of Python on any x86-64 processor that
+has one of the tiers; pip takes the pure one elsewhere, and kernels are compiled when they are
+first needed.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from teleop_core.kernels.shipped import FOLDER, TIERS
+
+HERE = Path(__file__).resolve().parent
+PLATFORM = "manylinux_2_28_x86_64"  # as numba's own
+TAG = f"cp{sys.version_info[0]}{sys.version_info[1]}"
+OURS = ("config", "launch", "resource", "teleop_core", "package.xml", "setup.cfg", "setup.py")
+COMPILE = "import sys; from teleop_core.cli import main; sys.exit(main(['compile', '--all']))"
+RUN = """
+import hashlib
+from teleop_core import api
+from teleop_core.controllers import CONTROLLERS
+from teleop_core.kernels.progress import compiled_count
+from teleop_core.robots import ROBOTS
+from teleop_core.session.virtual import VirtualTime
+
+sums = hashlib.sha256()
+parts = [*({"robot": name} for name in ROBOTS), *({"controller": name} for name in CONTROLLERS)]
+for part in parts:
+    sums.update(VirtualTime(api.configuration("coarse_box", **part)).run(3000).tobytes())
+print(compiled_count(), sums.hexdigest())
+"""
+
+
+def main() -> None:
+    """Build both wheels from a copy of the sources."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path, help="folder of the wheels")
+    out = parser.parse_args().out
+    with tempfile.TemporaryDirectory() as folder:
+        tree = copied(Path(folder) / "tree")
+        build(tree, out)
+        for tier in TIERS:
+            compile_kernels(tree, tier)
+        check(tree)
+        build(tree, out, f"--plat-name={PLATFORM}", f"--python-tag={TAG}")
+
+
+def copied(tree: Path) -> Path:
+    """Sources, and nothing that was made of them."""
+    skipped = shutil.ignore_patterns("__pycache__", FOLDER.name)
+    tree.mkdir()
+    for name in OURS:
+        source = HERE / name
+        if source.is_dir():
+            shutil.copytree(source, tree / name, ignore=skipped)
+        else:
+            shutil.copy(source, tree / name)
+    return tree
+
+
+def build(tree: Path, out: Path, *options: str) -> None:
+    """Build one wheel."""
+    settings = [f"--config-settings=--build-option={option}" for option in options]
+    pip = (sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "wheel")
+    subprocess.run(
+        [*pip, "--use-pep517", "--no-deps", "--wheel-dir", str(out), *settings, str(tree)],
+        check=True,
+    )
+
+
+def compile_kernels(tree: Path, tier: str, script: str = COMPILE) -> None:
+    """Compile kernels for a tier, and move them to where the package looks.
+
+    Args:
+        tree: Sources.
+        tier: One of ``TIERS``.
+        script: Python source of what needs the kernels.
+    """
+    print(f"{tier}: {run(tree, tier, script).strip()}", flush=True)
+    package = tree / "teleop_core"
+    for file in package.rglob("__pycache__/*.nb?"):
+        inside = file.parents[1].relative_to(package)
+        place = package / "kernels" / FOLDER.name / tier / inside
+        place.mkdir(parents=True, exist_ok=True)
+        file.rename(place / file.name)
+
+
+def run(tree: Path, tier: str | None, script: str) -> str:
+    """What a Python script prints; its kernels are for a tier, or for this processor if None."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    kept["PYTHONPATH"] = str(tree)
+    if tier is not None:
+        kept |= {"NUMBA_CPU_NAME": tier, "NUMBA_CPU_FEATURES": ""}
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(
+        command, env=kept, cwd=tree, check=True, stdout=subprocess.PIPE, text=True
+    )
+    return done.stdout
+
+
+def check(tree: Path) -> None:
+    """Run every robot and law on each tier: nothing may be compiled, and no bit may differ."""
+    found = {tier: run(tree, tier, RUN).split() for tier in TIERS}
+    compiled = {tier: count for tier, (count, _) in found.items() if count != "0"}
+    if compiled:
+        sys.exit(f"kernels that were not kept: {compiled}")
+    if len({digest for _, digest in found.values()}) != 1:
+        sys.exit(f"sessions differ between tiers: {found}")
+    print("same bits on every tier")
+
+
+if __name__ == "__main__":
+    main()

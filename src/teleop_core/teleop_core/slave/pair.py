@@ -1,0 +1,92 @@
+"""Pair: a server and its simulated arm as one, for moves of a slave alone."""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+from teleop_core.kernels import kernel
+from teleop_core.signals import DT, assign
+from teleop_core.slave.simulation import simulation_step
+from teleop_core.slave.slave import SLAVE, Slave, SlaveParameters
+from teleop_core.slave.slave_sim import SLAVE_SIM, SlaveSim, SlaveSimParameters
+from teleop_core.slave.step import slave_step
+from teleop_core.stage import RunningStage, Stage
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmParameters(SlaveParameters, SlaveSimParameters):
+    """Parameters of a server and of its simulated arm."""
+
+    @staticmethod
+    def of(server: SlaveParameters, simulated: SlaveSimParameters) -> "ArmParameters":
+        """Those of two groups, which must name the same robot."""
+        groups = (simulated, server)
+        return ArmParameters(**{f.name: getattr(g, f.name) for g in groups for f in fields(g)})
+
+
+@kernel
+def arm_step(server: Any, simulated: Any, row: Any, dt: float) -> None:
+    """One tick of both on one row of signals.
+
+    Args:
+        server: Arguments of :func:`~teleop_core.slave.step.slave_step`.
+        simulated: Arguments of :func:`~teleop_core.slave.simulation.simulation_step`.
+        row: Signals of both; what is measured is of the last tick for the server.
+        dt: Tick [s].
+    """
+    slave_step(server[0], server[1], server[2], row, dt)
+    simulation_step(simulated[0], simulated[1], simulated[2], row, dt)
+    row.slave_measured_js_ns = row.now_ns
+
+
+class SimulatedArm(RunningStage):
+    """A server and its simulated arm, stepped together without a graph.
+
+    Args:
+        parameters: Of both.
+        dt: Tick [s].
+
+    Attributes:
+        server: The server; its signals are those of the pair.
+        simulated: The simulated arm, likewise.
+
+    Raises:
+        ParameterError: As of :class:`~teleop_core.slave.slave.Slave` and
+            :class:`~teleop_core.slave.slave_sim.SlaveSim`.
+    """
+
+    def __init__(self, parameters: ArmParameters, dt: float = DT) -> None:
+        self.server, self.simulated = Slave(parameters, dt), SlaveSim(parameters, dt)
+        self.robot = self.server.robot
+        super().__init__(_PAIR, self.robot.n, dt)
+        for stage in (self.server, self.simulated):
+            stage.signals = self.signals
+        self.kernel, self.arguments = arm_step, (self.server.arguments, self.simulated.arguments)
+        self._begin = self.signals.copy()
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to home, at rest, with no command in force."""
+        assign(self.signals, self._begin)
+        for stage in (self.server, self.simulated):
+            stage.reset()
+
+    def retune(self, parameters: ArmParameters) -> None:
+        """Take new parameters from the next tick on; raises as the two stages do."""
+        self.simulated.retune(parameters)
+        self.server.retune(parameters)
+
+    @property
+    def lead(self) -> int:
+        """Ticks of the move from home to where the slave starts; nothing is followed before."""
+        return self.server.lead
+
+
+_PAIR = Stage(
+    "arm",
+    ArmParameters,
+    reads=SLAVE.reads,
+    writes=(*SLAVE.writes, *SLAVE_SIM.writes),
+    late=SLAVE.late,
+    notes=SLAVE.notes,
+    make=SimulatedArm,
+)

@@ -1,0 +1,319 @@
+"""Slave: the arm's server, which says where the arm may go; drives, or their simulator, obey.
+
+It holds states, emergency stop, limits, faults, motion commands and the reference filter of any
+arm. Where the arm is, it is told.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from teleop_core.errors import ParameterError
+from teleop_core.geometry import Array, pose_from_transform
+from teleop_core.kernels import kernel, pointer, records
+from teleop_core.operation import (
+    Answer,
+    Event,
+    Fault,
+    OperationParameters,
+    State,
+    command_event,
+)
+from teleop_core.operation.states import answer_text, change
+from teleop_core.operation.watch import fail
+from teleop_core.parameters import parameter
+from teleop_core.portable import length
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.kinematics import FK
+from teleop_core.robots.parameters import RobotParameters
+from teleop_core.robots.robot import Robot
+from teleop_core.signals import DT, assign
+from teleop_core.slave.motion import MotionCommands
+from teleop_core.slave.simulation import SPEED_LAG
+from teleop_core.slave.step import ArmModel, slave_records, slave_step
+from teleop_core.slave.trajectory import shortest_move_time
+from teleop_core.stage import RunningStage, Stage
+from teleop_core.topics import (
+    NO_COMMAND_NS,
+    OPERATION,
+    SLAVE_MEASURED_CP,
+    SLAVE_MEASURED_JS,
+    SLAVE_OPERATION,
+    SLAVE_SERVO_JP,
+    SLAVE_SETPOINT_CP,
+    SLAVE_SETPOINT_JS,
+)
+
+_TIMES = {
+    "heartbeat": "heartbeat_ns", "longest_outage": "outage_ns", "longest_silence": "silence_ns",
+    "effort_time": "effort_ns", "pressing_time": "pressing_ns",
+}  # fmt: skip
+_STOP, _PRESSED = int(Event.STOP), int(Fault.STOP)
+_FILTER_SOURCE = "published: Vongbunyong 2008, eq. 6.2.8"
+_NEAR = 1e-3  # rad or m, beside an encoder step: who is farther from home is elsewhere
+INTERPOLATIONS = ("none", "linear", "minimum_jerk")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceFilterParameters:
+    """First-order lag on every joint reference; at rest its output is its input."""
+
+    is_on: bool = parameter(True, doc="whether references pass the filter")
+    gain: float = parameter(
+        0.1, lower=0.0, upper=1.0, doc="gain for fast motion", source=_FILTER_SOURCE
+    )
+    zero: float = parameter(
+        100.0, unit="rad/s", lower=0.0, upper=1000.0, doc="zero", source=_FILTER_SOURCE
+    )
+    pole: float = parameter(
+        10.0, unit="rad/s", lower=0.01, upper=1000.0, doc="pole", source=_FILTER_SOURCE
+    )
+
+    def __post_init__(self) -> None:
+        if not math.isclose(self.gain * self.zero, self.pole, rel_tol=1e-9):
+            needed = f"such that gain ({self.gain}) * zero = pole ({self.pole})"
+            raise ParameterError("reference_filter.zero", self.zero, needed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlaveParameters(RobotParameters):
+    """Parameters of :class:`Slave`."""
+
+    command_timeout: float = parameter(
+        0.1, unit="s", lower=0.002, upper=5.0,
+        doc="the last reference is held when no command came for longer than this",
+    )  # fmt: skip
+    start: tuple[float, ...] = parameter(
+        (), unit="rad or m", fixed=True,
+        doc="joints to which the slave moves from home before it follows; empty: the robot's start",
+    )  # fmt: skip
+    starts_at_home: bool = parameter(
+        False, fixed=True, doc="whether it starts where it is, at home, if no start is given"
+    )
+    start_speed: float = parameter(
+        0.5, lower=0.01, upper=1.0, fixed=True, doc="share of the speed limits used on that move"
+    )
+    interpolation: str = parameter(
+        "linear", choices=INTERPOLATIONS,
+        doc="way between commands that come slower than the ticks, which takes one period of them",
+    )  # fmt: skip
+    reference_filter: ReferenceFilterParameters = field(default_factory=ReferenceFilterParameters)
+    operation: OperationParameters = field(default_factory=OperationParameters)
+
+    def start_of(self, robot: Robot) -> Array:
+        """Joints (n,) from which a robot follows [rad or m]."""
+        if self.start:
+            return np.array(self.start, dtype=np.float64)
+        return robot.home.copy() if self.starts_at_home else robot.start.copy()
+
+
+class Slave(RunningStage):
+    """Stage that leads an arm: from references and commands to setpoints, through all that it may.
+
+    It takes the arm to be at home at first; one that says that it is elsewhere begins there. Once
+    enabled it moves the arm smoothly to where it starts, and follows then.
+
+    Raises:
+        ParameterError: The robot has no drives, or its start is not one.
+    """
+
+    def __init__(self, parameters: SlaveParameters, dt: float = DT) -> None:
+        self.robot = load_robot_set(parameters.robot, parameters.geometry)
+        if self.robot.drives is None:
+            raise ParameterError("slave.robot", parameters.robot, "a robot with drives")
+        n = self.robot.n
+        super().__init__(SLAVE, n, dt)
+        self.parameters, self.state = slave_records(n)
+        self.arm = ArmModel(
+            fk=self.robot.fk_pointer,
+            jacobian=pointer(self.robot.kernels.jacobian, FK),
+            geometry=self.robot.geometry_row.copy(),
+            setpoint=np.zeros(n), joints=np.zeros(n), effort=np.zeros(n), T=np.zeros((4, 4)),
+            speeds=np.zeros(n), is_free=np.zeros(n), twist=np.zeros(6), J=np.zeros((6, n)),
+            A=np.zeros((6, 6)), b=np.zeros(6),
+        )  # fmt: skip
+        self.kernel, self.arguments = slave_step, (self.parameters, self.state, self.arm)
+        self.motion = MotionCommands(self)
+        self._take_start(parameters)
+        self._take_script(parameters.operation)
+        self.retune(parameters)
+        self.reset()
+        self._load_commands()
+
+    def reset(self) -> None:
+        """Back to home, with no command in force."""
+        s, home = self.state, self.robot.home
+        assign(s, 0)
+        for name in ("command", "filtered", "setpoint", "target", "move_from", "measured"):
+            s[name] = home
+        self._begin_operation()
+        row, transform = self.signals, np.empty((4, 4))
+        row["slave_setpoint_js"] = home
+        row["slave_setpoint_js_ns"] = row["slave_setpoint_cp_ns"] = s["command_stamp_ns"]
+        self.robot.kernels.fk(home.copy(), self.arm.geometry, transform)
+        pose_from_transform(transform, row["slave_setpoint_cp"])
+
+    def retune(self, parameters: SlaveParameters) -> None:
+        """Take new parameters from the next tick on."""
+        robot, p, drives = self.robot, self.parameters, self.robot.drives
+        assert drives is not None
+        p["lower"], p["upper"] = robot.lower, robot.upper
+        p["effort_limit"], p["speed_limit"] = drives.effort_limit, drives.speed_limit
+        p["near"] = _NEAR + drives.encoder_step
+        lag = parameters.reference_filter
+        p["is_filtered"], p["filter_gain"] = lag.is_on, lag.gain
+        p["filter_zero"], p["filter_pole"] = lag.zero, lag.pole
+        p["timeout_ns"] = round(parameters.command_timeout * 1e9)
+        p["interpolation"] = INTERPOLATIONS.index(parameters.interpolation)
+        p["start_speed"] = parameters.start_speed
+        self._take_operation(parameters.operation)
+
+    def _take_start(self, parameters: SlaveParameters) -> None:
+        """Plan the move from home to where the slave starts.
+
+        Raises:
+            ParameterError: The start is not of the robot's joints, or outside their limits.
+        """
+        robot, p = self.robot, self.parameters
+        assert robot.drives is not None
+        start = parameters.start_of(robot)
+        if start.shape != robot.home.shape:
+            raise ParameterError("slave.start", parameters.start, f"{robot.n} joints, or empty")
+        if not ((robot.lower <= start) & (start <= robot.upper)).all():
+            limits = f"{robot.lower.tolist()} to {robot.upper.tolist()}"
+            needed = f"inside the limits, {limits}"
+            raise ParameterError("slave.start", parameters.start, needed)
+        speed = robot.drives.speed_limit * parameters.start_speed
+        time = shortest_move_time(robot.home, start, speed)
+        p["start"], self._start_ticks = start, math.ceil(time / self.dt)
+
+    @property
+    def lead(self) -> int:
+        """Ticks of the move from home to where the slave starts; nothing is followed before."""
+        return self._start_ticks
+
+    # -- operation -------------------------------------------------------------------------------
+
+    def _load_commands(self) -> None:
+        """Compile what commands and faults call: no stop waits for a compiler."""
+        spare = records(self.state.dtype)[0]
+        _request(self.parameters, spare, int(Event.STOP))
+        _fail(self.parameters, spare, int(Fault.STALL), 0.0, 0.0)
+
+    def _begin_operation(self) -> None:
+        """Enabled and on the way to where it starts, or disabled and not homed."""
+        s = self.state
+        s["command_stamp_ns"], s["fault_joint"] = NO_COMMAND_NS, -1
+        s["move_to"], s["move_ticks"] = self.parameters["start"], self._start_ticks
+        if self._starts_enabled:
+            s["state"] = State.ENABLED
+            s["is_homed"] = self._start_ticks == 0
+            s["is_busy"] = s["is_homing"] = self._start_ticks > 0
+
+    def _take_script(self, given: OperationParameters) -> None:
+        """Write the commands that come by themselves."""
+        self._starts_enabled, script = given.starts_enabled, given.script()
+        self.parameters["event_count"] = len(script)
+        for index, (seconds, event) in enumerate(script):
+            self.parameters["event"][index] = event
+            self.parameters["event_ns"][index] = round(seconds * 1e9)
+
+    def _take_operation(self, given: OperationParameters) -> None:
+        """Write bounds of motion and of faults; those that nobody gave follow from the drives."""
+        robot, p, drives = self.robot, self.parameters, self.robot.drives
+        assert drives is not None
+        p["braking"] = drives.effort_limit / drives.inertia
+        p["acceleration"] = p["braking"] * given.acceleration_share
+        reach = length(robot.jacobian(robot.home)[:3].T)
+        p["tool_speed"] = given.tool_speed or np.max(reach * drives.speed_limit)
+        p["tool_acceleration"] = given.tool_acceleration or np.max(reach * p["acceleration"])
+        p["lag"] = drives.speed_limit * given.longest_lag
+        p["tip_error"] = given.tip_error or p["tool_speed"] * given.longest_lag
+        p["overspeed"] = given.overspeed
+        p["rest_speed"] = 0.01 * drives.speed_limit + drives.encoder_step / SPEED_LAG
+        for name, field_ns in _TIMES.items():
+            p[field_ns] = round(getattr(given, name) * 1e9)
+        p["brakes"] = given.standstill == "brake"
+        p["reported"] = [fault.word in given.reported for fault in Fault]
+
+    def request(self, event: Event | str) -> tuple[Answer, str]:
+        """Take a command such as ``"enable"`` between two ticks.
+
+        Args:
+            event: The command, one of :data:`~teleop_core.operation.states.COMMANDS`.
+
+        Returns:
+            What became of it, and the same in words.
+
+        Raises:
+            UnknownNameError: There is no such command.
+        """
+        asked = command_event(event) if isinstance(event, str) else event
+        before = State(int(self.state["state"]))
+        answer = Answer(_request(self.parameters, self.state, int(asked)))
+        return answer, answer_text(asked, answer, before)
+
+    def press(self, *, is_pressed: bool, now_ns: int) -> None:
+        """Take a message of the stop button: pressed, or not; either way it is alive.
+
+        Args:
+            is_pressed: Whether it is.
+            now_ns: Time [ns].
+        """
+        self.state["is_pressed"], self.state["heard_ns"] = is_pressed, now_ns
+        if is_pressed:
+            self.request(Event.STOP)
+
+    def fail(self, fault: Fault, value: float = 0.0, bound: float = 0.0) -> None:
+        """Take note of a fault that was found outside, as two publishers of commands.
+
+        Args:
+            fault: What was found; it does what :data:`~teleop_core.operation.FAULTS` says.
+            value: What was found, in the fault's unit.
+            bound: What it must not exceed.
+        """
+        _fail(self.parameters, self.state, int(fault), value, bound)
+
+    @property
+    def operation(self) -> dict[str, float]:
+        """Numbers of ``slave/operation`` by name, of the last tick."""
+        return dict(zip(OPERATION, self.signals["slave_operation"].tolist(), strict=True))
+
+    def described(self) -> dict[str, str]:
+        """Names of the joints, by which the report of the operation calls them."""
+        return {"joints": " ".join(self.robot.joint_names)}
+
+    @property
+    def refused(self) -> int:
+        """Commands refused so far because they were jumps."""
+        return int(self.state["refused"])
+
+
+@kernel
+def _request(p: Any, s: Any, event: int) -> int:
+    """Take a command; of a stop the fault is told."""
+    if event == _STOP:
+        was = s.is_stopped
+        fail(p, s, _PRESSED, -1, 0.0, 0.0)
+        return 1 if was else 0
+    return change(s, event)
+
+
+@kernel
+def _fail(p: Any, s: Any, fault: int, value: float, bound: float) -> None:
+    """Take note of a fault."""
+    fail(p, s, fault, -1, value, bound)
+
+
+SLAVE = Stage(
+    "slave",
+    SlaveParameters,
+    reads=(SLAVE_SERVO_JP, SLAVE_MEASURED_JS),
+    writes=(SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_OPERATION),
+    late=(SLAVE_MEASURED_JS,),
+    notes=(("command_status", "i8"),),
+    make=Slave,
+    node="teleop_core.nodes.slave:SlaveNode",
+)

@@ -1,0 +1,25 @@
+"""Runs of the examples, as a user runs them."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+
+
+def run(name: str, folder: Path, **env: str) -> str:
+    """What an example prints; run in a folder of its own, in which it must leave nothing."""
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / f"{name}.py")], cwd=folder, capture_output=True, text=True,
+        timeout=300, check=False, env=os.environ | env,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert not list(folder.iterdir())
+    return done.stdout
+
+
+def numbers(pattern: str, text: str) -> list[float]:
+    """Every number that a pattern finds."""
+    return [float(found) for found in re.findall(pattern, text)]

@@ -1,0 +1,64 @@
+"""Examples that need real nodes beside them; the others are in tests/scenario."""
+
+import subprocess
+import sys
+
+import pytest
+
+from example_runs import EXAMPLES, numbers, run
+from teleop_core.nodes.children import environment, free_domain
+from teleop_core.nodes.operator import Operator
+from teleop_core.operation import State
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+
+
+def test_plain_ros_node_leads_the_slave_in_place_of_the_simulated_master(tmp_path):
+    env = environment() | {"ROS_DOMAIN_ID": free_domain()}
+    nodes = [
+        subprocess.Popen([sys.executable, "-m", "teleop_core.nodes", name], env=env)
+        for name in ("motion_scaling", "inverse_kinematics", "slave", "slave_sim")
+    ]
+    try:
+        text = run("ros_device", tmp_path, **env)
+    finally:
+        for node in nodes:
+            node.terminate()
+        codes = [node.wait(60) for node in nodes]
+    assert codes == [0, 0, 0, 0]
+    assert 18.0 < numbers(r"slave: ([\d.]+) mm", text)[0] < 20.5
+    forces, samples = (numbers(pattern, text)[0] for pattern in (r"(\d+) forces", r"(\d+) samples"))
+    assert samples == 2000
+    assert forces > 0.5 * samples
+
+
+@pytest.mark.alone
+def test_a_session_is_broken_in_a_way_of_ones_own(tmp_path):
+    text = run("own_exercise", tmp_path)
+    assert "\u2713 shaken: ENABLED" in text
+    assert numbers(r"went (\d+) mm", text)[0] > 50.0
+
+
+DRIVES = {
+    "simulated": ["-m", "teleop_core.nodes", "slave_sim"],
+    "foreign": [str(EXAMPLES / "foreign_slave.py")],
+}
+
+
+@pytest.mark.parametrize("drives", DRIVES)
+def test_a_crtk_client_moves_the_tip_and_comes_back_whatever_the_drives(tmp_path, drives):
+    pytest.importorskip("crtk_msgs")
+    env = environment() | {"ROS_DOMAIN_ID": free_domain()}
+    commands = (["-m", "teleop_core.nodes", "slave"], DRIVES[drives])
+    nodes = [subprocess.Popen([sys.executable, *command], env=env) for command in commands]
+    try:
+        text = run("crtk_client", tmp_path, **env)
+        with Operator(int(env["ROS_DOMAIN_ID"]), patience=30.0) as operator:
+            assert operator.stop()[""].values["state"] == State.FAULT
+    finally:
+        for node in nodes:
+            node.terminate()
+        codes = [node.wait(60) for node in nodes]
+    assert codes == [0, 0]
+    assert "done" in text
+    assert text.splitlines()[-1] == "back"

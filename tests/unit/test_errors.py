@@ -1,0 +1,37 @@
+"""Errors: they come whole out of the processes in which they were raised."""
+
+import pickle
+
+import pytest
+
+from teleop_core.errors import (
+    ClosureError,
+    KernelError,
+    ParameterError,
+    PartError,
+    RecordingError,
+    SessionError,
+    ShapeError,
+    TeleopError,
+    UnknownNameError,
+)
+
+RAISED = (
+    TeleopError("no"),
+    ParameterError("gain", -1.0, "at least 0"),
+    UnknownNameError("robot", "nobot", ("rcrt1", "mma")),
+    ClosureError("q", [0.0], "closed", 1e-3),
+    PartError("stage", "mine", "a Stage"),
+    KernelError("mine.py:3", "no such name"),
+    ShapeError("q", (6,), (5,)),
+    RecordingError("bags/one", "is empty"),
+    SessionError("first\nsecond"),
+)
+
+
+@pytest.mark.parametrize("error", RAISED, ids=lambda error: type(error).__name__)
+def test_an_error_of_another_process_is_the_same(error):
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    assert vars(again) == vars(error)

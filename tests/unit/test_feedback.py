@@ -1,0 +1,181 @@
+"""Feedback: the arm's server leads an arm that tells it where it is, and no other."""
+
+import numpy as np
+import pytest
+
+from teleop_core.operation import Fault, State
+from teleop_core.parameters import build
+from teleop_core.robots import load_robot
+from teleop_core.signals import DT, TICK_NS
+from teleop_core.slave.commands import CommandStatus
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.slave import Slave, SlaveParameters
+
+ARM = load_robot("rcrt1")
+N = ARM.n
+LIMIT = ARM.drives.speed_limit
+BRAKING = ARM.drives.effort_limit / ARM.drives.inertia
+SLOW = 0.2 * LIMIT
+"""Speed at which commands lead the joints away from their limits."""
+
+
+class Led:
+    """A server whose arm is wherever the test says, at rest where its setpoint is by default."""
+
+    def __init__(self, **values):
+        given = {"starts_at_home": True, "reference_filter.is_on": False} | values
+        self.slave = Slave(build(SlaveParameters, given))
+        self.row, self.ns, self.commanded = self.slave.signals, 0, ARM.home.copy()
+
+    def tick(self, measured=None, *, speaks=True, follows=False, effort=0.0):
+        """One tick; the arm says before it where it is, and a command comes if it is to follow."""
+        self.ns += TICK_NS
+        row = self.row
+        if speaks:
+            at = row["slave_setpoint_js"] if measured is None else measured
+            row["slave_measured_js"][:N] = at
+            row["slave_measured_js"][2 * N :] = effort
+            row["slave_measured_js_ns"] = self.ns
+        if follows:
+            self.commanded -= SLOW * DT
+            row["slave_servo_jp"], row["slave_servo_jp_ns"] = self.commanded, self.ns
+        row["now_ns"] = self.ns
+        self.slave.step()
+        return row["slave_setpoint_js"].copy()
+
+    @property
+    def state(self):
+        return State(int(self.slave.operation["state"]))
+
+    @property
+    def status(self):
+        return CommandStatus(int(self.row["command_status"]))
+
+
+def following(**values):
+    led = Led(**values)
+    for _ in range(300):
+        led.tick(follows=True)
+    assert led.status is CommandStatus.FRESH
+    return led
+
+
+def test_an_arm_that_says_no_more_where_it_is_holds_after_the_command_timeout():
+    led = following()
+    setpoints = [led.tick(speaks=False, follows=True) for _ in range(300)]
+    steps = np.abs(np.diff(setpoints, axis=0))
+    assert (steps[:95] > 0.0).any(axis=1).all()  # a hiccup stops nothing
+    needed = int(np.ceil((SLOW / BRAKING).max() / DT)) + 2
+    assert not steps[100 + needed :].any()
+    slower = np.diff(steps[100 : 100 + needed], axis=0)
+    assert (slower >= -BRAKING * DT**2 * (1.0 + 1e-6)).all()
+    assert (led.state, led.status) == (State.ENABLED, CommandStatus.BLIND)
+
+
+def test_it_goes_on_by_itself_once_it_speaks_again_before_that_is_a_fault():
+    led = following()
+    held = [led.tick(speaks=False, follows=True) for _ in range(300)][-1]
+    for _ in range(100):
+        led.tick(held, follows=True)
+    moved = [led.tick(follows=True) for _ in range(300)]
+    assert led.state is State.ENABLED
+    assert led.status is CommandStatus.FRESH
+    assert (moved[-1] < held).all()
+    assert (np.abs(np.diff(moved, axis=0)) <= LIMIT * DT * (1.0 + 1e-9)).all()
+
+
+def test_a_longer_silence_of_the_arm_is_a_fault_whose_setpoint_stands_still():
+    led = following(**{"operation.longest_silence": 0.5})
+    for _ in range(500):
+        led.tick(speaks=False, follows=True)
+    assert led.state is State.ENABLED
+    still = led.tick(speaks=False, follows=True)
+    assert led.state is State.FAULT
+    assert Fault(int(led.slave.operation["fault"])) is Fault.FEEDBACK
+    assert led.slave.operation["fault_bound"] == 0.5
+    assert np.array_equal(led.tick(follows=True), still)
+
+
+def test_a_move_that_the_arm_did_not_see_goes_on_to_its_goal_once_it_speaks_again():
+    led = Led()
+    goal = ARM.home - 0.02
+    led.tick()
+    led.slave.motion.move(goal)
+    for _ in range(20):
+        led.tick()
+    held = [led.tick(speaks=False) for _ in range(400)][-1]
+    assert led.slave.operation["is_busy"] == 1.0
+    assert not np.allclose(held, goal, atol=1e-4)
+    for _ in range(3000):
+        last = led.tick()
+    assert led.slave.operation["is_busy"] == 0.0
+    assert np.array_equal(last, goal)
+
+
+def test_an_arm_that_stands_elsewhere_is_led_from_there_and_homes():
+    led, there = Led(), ARM.home - np.array([0.3, 0.2, 0.05, 0.4, 0.3, 0.2])
+    way = [led.tick(there)]
+    assert np.allclose(way[0], there, rtol=0, atol=1e-6)  # a tick on its way already
+    assert led.slave.operation["is_homed"] == 0.0
+    while led.slave.operation["is_busy"]:
+        way.append(led.tick())
+    assert np.array_equal(way[-1], ARM.home)
+    assert led.slave.operation["is_homed"] == 1.0
+    steps = np.abs(np.diff(way, axis=0))
+    assert (steps <= LIMIT * DT * (1.0 + 1e-9)).all()
+
+
+def test_an_arm_that_is_at_home_but_for_its_encoders_begins_there():
+    led = Led()
+    led.tick(ARM.home + 0.5 * ARM.drives.encoder_step)
+    assert np.array_equal(led.row["slave_setpoint_js"], ARM.home)
+    assert led.slave.operation["is_homed"] == 1.0
+
+
+@pytest.mark.parametrize("every", [1, 10])
+def test_a_full_drive_is_a_fault_after_its_time_however_often_the_arm_speaks(every):
+    led = Led(**{"operation.effort_time": 0.2})
+    full = np.where(np.arange(N) == 1, ARM.drives.effort_limit, 0.0)
+    led.tick()
+    ticks = 0
+    while led.state is State.ENABLED:
+        ticks += 1
+        led.tick(speaks=ticks % every == 0, effort=full)
+        assert ticks < 400
+    assert Fault(int(led.slave.operation["fault"])) is Fault.EFFORT
+    assert ticks == pytest.approx(200, abs=2 * every + 2)
+
+
+def test_a_full_drive_after_a_gap_is_no_fault_for_the_gap():
+    led = Led()
+    full = np.where(np.arange(N) == 1, ARM.drives.effort_limit, 0.0)
+    led.tick()
+    for _ in range(1500):
+        led.tick(speaks=False)
+    for _ in range(50):
+        led.tick(effort=full)
+    assert led.state is State.ENABLED
+    assert led.slave.operation["is_braked"] == 0.0
+
+
+def test_simulated_drives_are_off_while_the_server_lets_brakes_hold_the_arm():
+    parameters = build(ArmParameters, {"starts_at_home": True, "operation.standstill": "brake"})
+    arm = SimulatedArm(parameters)
+    row = arm.signals
+
+    def efforts():
+        row["now_ns"] += TICK_NS
+        arm.step()
+        return row["slave_measured_js"][2 * N :].copy()
+
+    assert all(efforts().any() for _ in range(5))
+    arm.server.request("stop")
+    told = [efforts() for _ in range(5)]
+    assert row["slave_operation"][-1] == 1.0
+    assert not np.any(told)
+    arm.simulated.arm.dq[:] = 0.5 * LIMIT
+    before = arm.simulated.arm.q.copy()
+    for _ in range(200):
+        efforts()
+    needed = 0.5 * (0.5 * LIMIT) ** 2 / BRAKING + LIMIT * DT
+    assert (np.abs(arm.simulated.arm.q - before) <= needed).all()
