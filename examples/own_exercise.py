@@ -12,9 +12,12 @@ from teleop_core.operation import State
 
 
 def shake(rig: Rig) -> None:
-    """Let the hand's samples scatter by 2 mm for a second."""
+    """Let the hand's samples scatter by 0.3 mm for a second.
+
+    Much more is no tremor: what no hand can do is held, and each hold lets go of some way.
+    """
     rig.mark()  # the fault begins
-    rig.distort(hand.scattered(0.002))
+    rig.distort(hand.scattered(0.0003))
     rig.wait(1.0)
 
 
@@ -26,7 +29,7 @@ def steady(rig: Rig) -> None:
 SHAKEN = register_exercise(
     Exercise(
         name="shaken",
-        text="hand trembles by 2 mm",
+        text="hand trembles by 0.3 mm",
         inject=shake,
         undo=steady,
         motion=Motion.GOES_ON,

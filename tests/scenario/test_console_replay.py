@@ -68,8 +68,10 @@ def test_replay_plays_pauses_and_steps(page):
     page.until(f"Math.abs({SHOWN} - {held}) < 0.011")
     page.value("document.activeElement.blur()")
     page.key("p")
+    page.shows("Pause")
     page.until(f"{SHOWN} > {held + 0.3}")
     page.key("p")
+    page.until("!document.body.innerText.includes('Pause')")  # or the time is written over
 
 
 def test_recording_cannot_be_driven_from_the_page(page):

@@ -63,9 +63,6 @@ class ReplayControls:
     def draw(self) -> None:
         """Show what the time is now."""
         link = self._link
-        label = "Pause" if link.is_playing else "Play"
-        if self._play.label != label:
-            self._play.label = label
         if abs(link.time - self._drawn) >= _STEP:
             self._drawn = link.time
             self._slider.value = round(link.time, 3)  # type: ignore[misc]  # viser sets by hand
@@ -74,3 +71,6 @@ class ReplayControls:
             text += f"; one of {link.thinning} samples"
         if text != self._text:
             self._text = self._told.content = text
+        label = "Pause" if link.is_playing else "Play"
+        if self._play.label != label:  # last: what is held shows its time already
+            self._play.label = label
