@@ -57,8 +57,10 @@ def _roomy(function: Callable[..., Any]) -> Callable[..., Any]:
     """Function whose frame is so large that all it calls finds room beside it.
 
     CPython keeps frames in chunks of 16 KiB. A deep compiler crosses the end of a chunk thousands
-    of times, each time with a system call: a quarter of its time. A large frame gets a large
-    chunk, the rest of which serves the frames after it.
+    of times, each time with a system call. A large frame gets a large chunk, the rest of which
+    serves the frames after it. Measured on Python 3.11 without a cache, as the mean of three: the
+    kernels of rcrt1 and mma take 3.9 s of processor time with it and 4.4 s without, of which 0.17 s
+    and 0.79 s in the system.
     """
     function.__code__ = function.__code__.replace(co_stacksize=70_000)  # 560 KB of 1 MiB
     return function
