@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from teleop_core.errors import RecordingError
 from teleop_core.exchange.gathering import Gathered, bridge
 from teleop_core.exchange.options import ImportOptions
-from teleop_core.exchange.orientation import continuous, from_matrices, products
+from teleop_core.exchange.orientation import continuous
 from teleop_core.exchange.times import SECOND_NS, Stamps, gaps, ordered
-from teleop_core.geometry import Array
+from teleop_core.geometry import Array, quaternion_from_rotation, quaternion_products
 from teleop_core.portable import product
 
 ROWS = 20_000
@@ -164,7 +164,9 @@ class Motion:
     def _turned(self, quaternions: Array) -> Array:
         """Attitudes (n, 4) in the master's axes; a mirror turns those of the body as well."""
         if self._options.handedness == "right":
-            return products(from_matrices(self._turn[None])[0], quaternions)
+            turn = np.empty(4)
+            quaternion_from_rotation(self._turn, turn)
+            return quaternion_products(turn, quaternions)
         # A turn of the file about an axis is the opposite turn about the mirrored axis.
         return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], self._turn.T)))
 
