@@ -10,7 +10,6 @@ from teleop_core.geometry import Array, checked_array, rotation, transform
 from teleop_core.portable import product
 from teleop_core.robots import dh_kernels
 from teleop_core.robots.dh_drives import drives_of
-from teleop_core.robots.drives import independent_axes
 from teleop_core.robots.kinematics import DIRECTIONS, Kernels
 from teleop_core.robots.robot import Robot
 
@@ -117,7 +116,6 @@ class DhTable:
                 ik_all=dh_kernels.ik_all,
             ),
             drives=drives,
-            dynamics=independent_axes(drives.inertia),
             task_mask=tuple(direction in self.task for direction in DIRECTIONS),
         )
 

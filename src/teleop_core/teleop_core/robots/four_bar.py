@@ -20,7 +20,7 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import bounded, turned, wrapped
-from teleop_core.robots.drives import geared_motors, independent_axes
+from teleop_core.robots.drives import geared_motors
 from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar
 from teleop_core.robots.kinematics import (
     REACHED,
@@ -283,14 +283,8 @@ def make(**geometry: float | str) -> Robot:
         home=np.array([0.5 * (lower + upper)]),
         geometry=row,
         kernels=Kernels(
-            fk=fk,
-            jacobian=jacobian,
-            ik=ik,
-            ik_all=ik_all,
-            assemble=assemble,
-            assemblies=assemblies,
+            fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=drives,
-        dynamics=independent_axes(drives.inertia),
         task_mask=(True, True, False, False, False, False),
     )

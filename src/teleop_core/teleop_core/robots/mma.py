@@ -23,7 +23,7 @@ import numpy as np
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.geometry import Array
 from teleop_core.portable import product
-from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import Kernels
 from teleop_core.robots.mma_balance import ShoulderSpring, shoulder_load
 from teleop_core.robots.mma_forward import GEOMETRY, MODEL_A, fk, jacobian
@@ -76,12 +76,11 @@ def make(model: str = "C", **geometry: float) -> Robot:
         joint_names=JOINTS,
         lower=HOME - math.pi,
         upper=HOME + math.pi,
-        home=HOME.copy(),
-        start=START.copy() if row == GEOMETRY else None,
+        home=HOME,
+        start=START if row == GEOMETRY else None,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,
-        dynamics=independent_axes(DRIVES.inertia),
     )
 
 

@@ -16,7 +16,7 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 from teleop_core.robots.branches import bounded, turned
-from teleop_core.robots.drives import geared_motors, independent_axes
+from teleop_core.robots.drives import geared_motors
 from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.robot import Robot, geometry_of
 
@@ -90,6 +90,5 @@ def make(**geometry: float | str) -> Robot:
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=drives,
-        dynamics=independent_axes(drives.inertia),
         task_mask=(True, True, False, False, False, False),
     )

@@ -15,7 +15,7 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import hold, is_allowed, move_cost, turn, wrapped
-from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.robot import Robot, geometry_of
 
@@ -208,11 +208,10 @@ def make(**geometry: float | str) -> Robot:
         name="planar_3r",
         joint_names=JOINTS,
         lower=-UPPER,
-        upper=UPPER.copy(),
-        home=HOME.copy(),
+        upper=UPPER,
+        home=HOME,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,
-        dynamics=independent_axes(DRIVES.inertia),
         task_mask=(True, True, False, False, False, True),
     )

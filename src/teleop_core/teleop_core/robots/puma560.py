@@ -26,7 +26,7 @@ from teleop_core.robots.branches import (
     turned,
     wrapped,
 )
-from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.robot import Robot, geometry_of
 
@@ -336,12 +336,11 @@ def make(**geometry: float | str) -> Robot:
     return Robot(
         name="puma560",
         joint_names=JOINTS,
-        lower=LOWER.copy(),
-        upper=UPPER.copy(),
-        home=HOME.copy(),
-        start=START.copy() if row == GEOMETRY else None,
+        lower=LOWER,
+        upper=UPPER,
+        home=HOME,
+        start=START if row == GEOMETRY else None,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,
-        dynamics=independent_axes(DRIVES.inertia),
     )

@@ -27,7 +27,7 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import slowed
-from teleop_core.robots.drives import electric_cylinders, independent_axes
+from teleop_core.robots.drives import electric_cylinders
 from teleop_core.robots.kinematics import (
     REACHED,
     SEARCH,
@@ -189,14 +189,8 @@ def make(**geometry: float | str) -> Robot:
         home=home,
         geometry=row,
         kernels=Kernels(
-            fk=fk,
-            jacobian=jacobian,
-            ik=ik,
-            ik_all=ik_all,
-            assemble=assemble,
-            assemblies=assemblies,
+            fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=drives,
-        dynamics=independent_axes(drives.inertia),
         task_mask=(False, False, True, True, True, False),
     )

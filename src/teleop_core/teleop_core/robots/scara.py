@@ -15,7 +15,7 @@ from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
 from teleop_core.robots.branches import hold, is_allowed, move_cost, turn, wrapped
-from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.planar_3r import (
     NEAR,
@@ -165,12 +165,11 @@ def make(**geometry: float | str) -> Robot:
     return Robot(
         name="scara",
         joint_names=JOINTS,
-        lower=LOWER.copy(),
-        upper=UPPER.copy(),
-        home=HOME.copy(),
+        lower=LOWER,
+        upper=UPPER,
+        home=HOME,
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=DRIVES,
-        dynamics=independent_axes(DRIVES.inertia),
         task_mask=(True, True, True, False, False, True),
     )

@@ -362,18 +362,12 @@ def make(*, heading: str = "fixed", **geometry: float | str) -> Robot:
         lower=lower,
         upper=upper,
         home=np.concatenate((HOME_JOINTS, legs)),
-        start=START.copy() if is_published else None,
+        start=START if is_published else None,
         geometry=row,
         kernels=Kernels(
-            fk=fk,
-            jacobian=jacobian,
-            ik=ik,
-            ik_all=ik_all,
-            assemble=assemble,
-            assemblies=assemblies,
+            fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=scara_stewart_drives.DRIVES,
-        dynamics=scara_stewart_drives.DYNAMICS,
     )
 
 

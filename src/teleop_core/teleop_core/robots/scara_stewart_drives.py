@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.drives import ENTRIES, Drives
 
 # Two joints of a small SCARA with their links, a vertical slide, six electric cylinders; the slide
 # and the tool are balanced.
@@ -17,4 +17,3 @@ DRIVES = Drives(
     bandwidth=np.array([60.0, 60.0, 60.0, *[80.0] * 6]),
     assumed=ENTRIES,
 )
-DYNAMICS = independent_axes(DRIVES.inertia)

@@ -30,7 +30,7 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.portable import length
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.damped import is_near_singular
-from teleop_core.robots.drives import electric_cylinders, independent_axes
+from teleop_core.robots.drives import electric_cylinders
 from teleop_core.robots.kinematics import (
     REACHED,
     SEARCH,
@@ -313,13 +313,7 @@ def make(**geometry: float | str) -> Robot:
         home=lengths,
         geometry=row,
         kernels=Kernels(
-            fk=fk,
-            jacobian=jacobian,
-            ik=ik,
-            ik_all=ik_all,
-            assemble=assemble,
-            assemblies=assemblies,
+            fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble, assemblies=assemblies
         ),
         drives=drives,
-        dynamics=independent_axes(drives.inertia),
     )

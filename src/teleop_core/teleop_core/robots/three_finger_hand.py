@@ -18,7 +18,7 @@ import numpy as np
 from teleop_core.errors import ParameterError
 from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
-from teleop_core.robots.drives import finger_motors, independent_axes
+from teleop_core.robots.drives import finger_motors
 from teleop_core.robots.hand_fingers import Triple, finger_branch, finger_joints
 from teleop_core.robots.hand_grasp import (
     FINGERS,
@@ -187,5 +187,4 @@ def make(**geometry: float | str) -> Robot:
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all, assemble=assemble),
         drives=drives,
-        dynamics=independent_axes(drives.inertia),
     )
