@@ -10,15 +10,21 @@ export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
 .PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format bench bench-setup endurance fuzz drill-mutants flaky clean
 
+# Python compiles a module when it is first imported: most of them never are.
+INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check \
+    -c constraints.txt --config-settings editable_mode=compat
+
 setup: $(VENV)/.installed
 
-# Python compiles a module when it is first imported: most of them never are.
-$(VENV)/.installed: constraints.txt src/teleop_core/setup.py
+$(VENV)/.installed: constraints.txt $(wildcard src/*/setup.py)
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check \
-	    -c constraints.txt --config-settings editable_mode=compat \
-	    -e 'src/teleop_core[ros,console,test]'
+	$(INSTALL) -e 'src/teleop_core[ros,console]' -e src/teleop_lab -e src/teleop_drill
 	$(BIN)/teleop compile
+	touch $@
+
+# What tests, checks and benchmarks need besides.
+$(VENV)/.tested: $(VENV)/.installed
+	$(INSTALL) -e 'src/teleop_core[test]'
 	touch $@
 
 # A wheel for every processor, and one with compiled kernels for x86-64 and the venv's Python.
@@ -40,13 +46,13 @@ demo: setup
 	@echo "$(CURDIR)/$(OUT)/demo/report.html"
 	@echo "to see it and be the hand: $(BIN)/teleop console"
 
-lint: setup
+lint: $(VENV)/.tested
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache --no-logo
 
-format: setup
+format: $(VENV)/.tested
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
@@ -66,7 +72,7 @@ test: lint crtk_msgs
 	exit $$code
 
 # Those that take longer than five seconds each; CI runs both.
-test-slow: setup crtk_msgs
+test-slow: $(VENV)/.tested crtk_msgs
 	@code=0; set -x; \
 	$(CORE) -m "slow and not ros and not soak" || code=1; \
 	$(LIVE) -m "ros and slow and not alone and not soak" || code=1; \
@@ -74,12 +80,12 @@ test-slow: setup crtk_msgs
 	exit $$code
 
 # Long tests whose law a shorter one tests in CI with another case; a quarter of an hour.
-soak: setup crtk_msgs
+soak: $(VENV)/.tested crtk_msgs
 	$(ALONE) -m soak
 
 # Broken files, texts and messages, other ones each time; an hour. The tests have a short form of it.
 FUZZ_CASES ?= 1000000
-fuzz: setup
+fuzz: $(VENV)/.tested
 	@mkdir -p $(OUT) && rm -f $(OUT)/fuzz_cases.txt
 	TELEOP_FUZZ_CASES=$(FUZZ_CASES) TELEOP_FUZZ_COUNTS=$(CURDIR)/$(OUT)/fuzz_cases.txt \
 	    $(BIN)/pytest -q -n 2 tests/fuzz
@@ -87,12 +93,11 @@ fuzz: setup
 	    $(OUT)/fuzz_cases.txt
 
 # Of kernels, run as plain Python: compiled code leaves no trace.
-coverage: setup
+coverage: $(VENV)/.tested
 	$(BIN)/python tests/kernel_coverage.py
 
-bench-setup: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	    -c constraints.txt -e 'src/teleop_core[bench]'
+bench-setup: $(VENV)/.tested
+	$(INSTALL) -e 'src/teleop_core[bench]'
 
 bench: bench-setup
 	$(BIN)/python benchmarks/session.py
@@ -101,7 +106,7 @@ bench: bench-setup
 
 # Starts and ends of live sessions under load, COUNT of each kind; about a quarter of an hour.
 COUNT ?= 100
-endurance: setup
+endurance: $(VENV)/.tested
 	$(BIN)/python benchmarks/endurance.py --count $(COUNT)
 
 # Copies of the package with one safety broken each: the drill must find every one, in both forms,
@@ -111,7 +116,7 @@ drill-mutants: setup
 
 # Live tests twenty times beside busy processes, and how often each failed; about three hours.
 # FLAKY names tests, how often and how much else there is to do: FLAKY="--count 5 tests/ros/test_ends.py".
-flaky: setup
+flaky: $(VENV)/.tested
 	$(BIN)/python tests/flaky.py $(FLAKY)
 
 clean:

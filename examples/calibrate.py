@@ -6,8 +6,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 
-from teleop_core.calibration import appendix_e, calibrate, read_measured, simulate
 from teleop_core.robots import Robot, load_robot, robot_from_table
+from teleop_lab.calibration import appendix_e, calibrate, read_measured, simulate
 
 
 def table_of_poses(path: Path, drawn: Robot, built: Robot) -> None:

@@ -1,8 +1,8 @@
 """Repeat what a source did, and add an experiment of your own: another controller on its plant."""
 
-import teleop_core as tc
-from teleop_core import experiments
-from teleop_core.experiments import Bench, Findings, Row, factor
+import teleop_lab as lab
+from teleop_lab import experiments
+from teleop_lab.experiments import Bench, Findings, Row, factor
 
 
 def measure(bench: Bench) -> Findings:
@@ -31,10 +31,10 @@ def main() -> None:
     row = outcome.row("tip, all axes")
     print(f"{row.quantity}: published {row.published} {row.unit}, predicted {row.predicted:.3f}")
     print(f"{outcome.agreeing} of {outcome.judged} agree")
-    mine = tc.Experiment(
+    mine = lab.Experiment(
         "pd", "PD on the plant of the source", "Vongbunyong 2008, table 8.2", measure
     )
-    tc.register_experiment("pd", mine, replace=True)
+    lab.register_experiment("pd", mine, replace=True)
     print(experiments.run("pd", seed=2))
 
 

@@ -7,8 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from teleop_core.drill import Cure, Exercise, Motion, Rig, hand, register_exercise
 from teleop_core.operation import State
+from teleop_drill import Cure, Exercise, Motion, Rig, hand, register_exercise
 
 
 def shake(rig: Rig) -> None:
@@ -41,7 +41,7 @@ SHAKEN = register_exercise(
 
 def main() -> int:
     """Do it in a session of its own; 0 if the arm did what was expected."""
-    from teleop_core.nodes.drill import drill  # needs ROS
+    from teleop_drill.nodes.drill import drill  # needs ROS
 
     with tempfile.TemporaryDirectory() as folder:
         (outcome,) = drill([SHAKEN], Path(folder) / "drill", print)

@@ -4,6 +4,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import teleop_core as tc
+import teleop_lab as lab
 
 FREE = ("coulomb.theta1", "coulomb.theta2", "bias.theta1", "weight.m2b_L0b")
 PUBLISHED = {"coarse_box": 0.338, "fine_box": 0.293}  # Vongbunyong 2008, table 8.2, RMS [mm]
@@ -11,7 +12,7 @@ PUBLISHED = {"coarse_box": 0.338, "fine_box": 0.293}  # Vongbunyong 2008, table 
 
 def main() -> None:
     """Fit to tables 7.1-7.6, predict table 8.2, and try another control law on the same plant."""
-    found = tc.fit_plant(free=FREE)  # rows of joints at rest; a CSV file of yours as well
+    found = lab.fit_plant(free=FREE)  # rows of joints at rest; a CSV file of yours as well
     for number in found.numbers:
         print(f"{number.name} = {number.value:.3g} ({number.low:.3g} to {number.high:.3g})")
 

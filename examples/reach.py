@@ -1,6 +1,7 @@
 """Ask what a slave can follow of a hand that moves and turns far, and let it follow."""
 
 import teleop_core as tc
+import teleop_lab as lab
 
 
 def main() -> None:
@@ -14,7 +15,7 @@ def main() -> None:
         operator__period=6.0,
         reach_force__is_on=False,  # the hand is not to be held back
     )
-    reach = tc.reach(hand)
+    reach = lab.reach(hand)
     print(reach)
     for name, settings in (("as given", {}), ("proposed", reach.settings())):
         told = tc.replay(hand, settings=settings)["slave/reach"]

@@ -199,8 +199,8 @@ def _put(data: bytes, file: Path) -> None:
 
 def drilled(mutant: Mutant, rows: Sequence[str], *, is_composed: bool) -> dict[str, list[str]]:
     """What the drill finds wrong with a mutant, by row."""
-    from teleop_core.drill import chosen
-    from teleop_core.nodes.drill import drill
+    from teleop_drill.drill import chosen
+    from teleop_drill.nodes.drill import drill
 
     os.environ["PYTHONPATH"] = str(tree(mutant))
     with tempfile.TemporaryDirectory(prefix="mutant_") as folder:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
+VERSION = "0.6.0"  # released together with teleop_lab and teleop_drill
 NODES = (
     "haptic_master",
     "motion_scaling",
@@ -23,7 +24,7 @@ def files(folder: str, pattern: str) -> tuple[str, list[str]]:
 
 setup(
     name="teleop_core",
-    version="0.6.0",
+    version=VERSION,
     description="Master-slave teleoperation stack for ROS 2 Jazzy",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_core", "teleop_core.*"]),
@@ -34,7 +35,6 @@ setup(
             "exchange/*.pyi",
             "console/page.js",
             "evaluation/report/*",
-            "fitting/*.csv",
             "kernels/compiled/**/*.nb?",
             "nodes/profiles/*.xml",
         ]

@@ -22,10 +22,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
 from live_process import wait_until
-from teleop_core.conformance import Verdict
 from teleop_core.nodes.children import free_domain
-from teleop_core.nodes.conformance import examine, left_behind
-from teleop_core.nodes.conformance_arm import Arm
+from teleop_drill.conformance import Verdict
+from teleop_drill.nodes.conformance import examine, left_behind
+from teleop_drill.nodes.conformance_arm import Arm
 
 crtk = pytest.importorskip("crtk_msgs.msg")
 pytestmark = pytest.mark.ros

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from mutants import ROOT
-from teleop_core.drill import SHORT
+from teleop_drill.drill import SHORT
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
 LIMITS = 1.0 + 1e-9

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from teleop_core.experiments.bench import Bench
-from teleop_core.experiments.controllers import GOAL_UM, LAWS, compared, tracking_of
 from teleop_core.robots import load_robot
 from teleop_core.topics import NO_COMMAND_NS
+from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.controllers import GOAL_UM, LAWS, compared, tracking_of
 
 BETTER = ("computed_torque", "disturbance_observer", "friction_compensation", "adaptive")
 SHORT = 16.0

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 import teleop_core
+import teleop_drill
+import teleop_lab
 from teleop_core.api import configuration
 from teleop_core.cli import _parser
 from teleop_core.session.configuration import parse_setting
@@ -131,9 +133,9 @@ def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(tm
 
 
 def test_version_is_the_same_wherever_it_stands():
-    tree = ET.parse(ROOT / "src/teleop_core/package.xml")
-    setup = text_of("src/teleop_core/setup.py")
     version = teleop_core.__version__
-    assert tree.findtext("version") == version
-    assert f'version="{version}"' in setup
+    assert version == teleop_lab.__version__ == teleop_drill.__version__
+    for package in ("teleop_core", "teleop_lab", "teleop_drill"):
+        assert ET.parse(ROOT / f"src/{package}/package.xml").findtext("version") == version
+        assert f'VERSION = "{version}"' in text_of(f"src/{package}/setup.py")
     assert f"## {version}" in text_of("CHANGELOG.md")

@@ -16,11 +16,11 @@ from teleop_core.session.virtual import VirtualTime
 
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 PUBLIC = {
-    "teleop_core.calibration", "teleop_core.operation", "teleop_core.console.app",
+    "teleop_lab", "teleop_lab.calibration", "teleop_core.operation", "teleop_core.console.app",
     "teleop_core.console.recorded", "teleop_core.console.server",
     "teleop_core", "teleop_core.evaluation", "teleop_core.operators", "teleop_core.fixtures",
     "teleop_core.controllers", "teleop_core.robots", "teleop_core.topics",
-    "teleop_core.drill", "teleop_core.experiments", "numpy",
+    "teleop_drill", "teleop_lab.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",
 }  # fmt: skip
 ROS_EXAMPLES = {"crtk_client", "foreign_slave", "own_exercise", "ros_device"}
@@ -33,7 +33,7 @@ ROS = {
     "rclpy.signals",
     "geometry_msgs.msg",
     "sensor_msgs.msg",
-    "teleop_core.nodes.drill",
+    "teleop_drill.nodes.drill",
 }
 PARTS = [name for name in NAMES if name.startswith("own_")]
 

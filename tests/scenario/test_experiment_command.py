@@ -10,8 +10,8 @@ import sys
 import pytest
 
 from headless import Headless
-from teleop_core import experiments
-from teleop_core.experiments.page import experiments_page
+from teleop_lab import experiments
+from teleop_lab.experiments.page import experiments_page
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 COMPILING = "compiling kernels"

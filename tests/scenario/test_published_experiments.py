@@ -5,8 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.fitting.table import PUBLISHED as PUBLISHED_RESTS
-from teleop_core.fitting.table import read_rests
 from teleop_core.geometry import roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
@@ -16,6 +14,8 @@ from teleop_core.signals import STATE, TICK_NS
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.trajectory import shortest_move_time
 from teleop_core.topics import NO_COMMAND_NS, SLAVE_MEASURED_CP, SLAVE_REACH, STREAMS
+from teleop_lab.fitting.table import PUBLISHED as PUBLISHED_RESTS
+from teleop_lab.fitting.table import read_rests
 
 ARM = load_robot("rcrt1")
 DEGREE, MM = math.pi / 180.0, 1e-3

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+import teleop_lab as lab
 from people import PEOPLE, moves, person, recorded, saved
 from teleop_core.topics import Limit
 
@@ -90,7 +91,7 @@ def picked(axes: tuple[str, ...]) -> np.ndarray:
 @pytest.mark.parametrize("name", PEOPLE)
 def test_a_proposal_is_followed_by_the_session_as_it_says(name, robot):
     hand = person(name, SECONDS)
-    reach = tc.reach(hand, robot=robot)
+    reach = lab.reach(hand, robot=robot)
     assert reach.proposed.share >= reach.goal == 0.99
     session = tc.replay(hand, robot=robot, settings=reach.settings())
     assert abs(followed(session) - reach.proposed.share) <= AGREE
@@ -102,7 +103,7 @@ def test_a_proposal_is_followed_by_the_session_as_it_says(name, robot):
 @pytest.mark.parametrize("name", PEOPLE)
 def test_a_session_as_given_follows_as_little_as_it_says(name, robot):
     hand = person(name, SECONDS, seed=3)
-    reach = tc.reach(hand, robot=robot, share=1e-3)  # nothing is to be proposed
+    reach = lab.reach(hand, robot=robot, share=1e-3)  # nothing is to be proposed
     assert reach.given.share < 0.995
     session = tc.replay(hand, robot=robot)
     assert abs(followed(session) - reach.given.share) <= AGREE
@@ -114,7 +115,7 @@ def test_a_session_as_given_follows_as_little_as_it_says(name, robot):
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_share_in_place_is_that_of_poses_which_pinocchio_finds_reached(robot):
     stamps, poses = moves(PEOPLE["da_vinci_36"], SECONDS, seed=5)
-    reach = tc.reach(
+    reach = lab.reach(
         recorded(stamps, poses),
         robot=robot,
         share=1e-3,
@@ -136,7 +137,7 @@ def test_a_hand_in_the_clutch_moves_nothing():
     stamps, poses = moves(PEOPLE["pen"], 4.0)
     pressed = np.zeros((len(stamps), 3))
     pressed[500:1800, 0] = 1.0
-    walked = tc.reach(recorded(stamps, poses, pressed), robot="puma560", share=1e-3).given.session
+    walked = lab.reach(recorded(stamps, poses, pressed), robot="puma560", share=1e-3).given.session
     held = walked.asked[500:1801]
     np.testing.assert_allclose(held, np.broadcast_to(held[0], held.shape), atol=ROUNDING)
     assert np.ptp(walked.asked[1801:, :3], axis=0).max() > 0.01
@@ -147,7 +148,7 @@ def test_fine_mode_takes_the_fine_gain():
     poses[:, 3:] = poses[0, 3:]
     pressed = np.zeros((len(stamps), 3))
     pressed[:50, 2] = 1.0  # the first sample has no edge before it
-    reach = tc.reach(recorded(stamps, poses, pressed), robot="puma560", share=1e-3)
+    reach = lab.reach(recorded(stamps, poses, pressed), robot="puma560", share=1e-3)
     walked, axes = reach.given.in_place, ((2, -1.0), (0, -1.0), (1, 1.0))
     moved = np.stack([sign * (poses[:, axis] - poses[0, axis]) for axis, sign in axes], axis=1)
     np.testing.assert_allclose(
@@ -157,7 +158,7 @@ def test_fine_mode_takes_the_fine_gain():
 
 def test_the_tool_turns_about_the_axes_of_the_hand_but_for_the_misfit():
     stamps, poses = moves(PEOPLE["da_vinci_36"], 12.0, seed=2)
-    reach = tc.reach(recorded(stamps, poses), robot="puma560")
+    reach = lab.reach(recorded(stamps, poses), robot="puma560")
     placement, axes = reach.proposed.placement, picked(reach.proposed.placement.axes)
     attitude = tips("puma560", np.array([placement.start]))[1]
     hand = Rotation.from_quat(poses[:, [4, 5, 6, 3]])
@@ -172,14 +173,14 @@ def test_the_tool_turns_about_the_axes_of_the_hand_but_for_the_misfit():
 
 def test_a_hand_at_rest_is_followed_where_it_is():
     stamps, poses = moves(PEOPLE["da_vinci_30"], 5.0)
-    reach = tc.reach(recorded(stamps, np.repeat(poses[:1], len(poses), axis=0)), robot="rcrt1")
+    reach = lab.reach(recorded(stamps, np.repeat(poses[:1], len(poses), axis=0)), robot="rcrt1")
     assert reach.given.share == 1.0
     assert reach.is_given
     assert "nothing to change" in str(reach)
 
 
 def test_a_proposal_keeps_to_limits_and_gains():
-    reach = tc.reach(person("motion_capture", SECONDS), robot="rcrt1")
+    reach = lab.reach(person("motion_capture", SECONDS), robot="rcrt1")
     placement, arm = reach.proposed.placement, tc.load_robot("rcrt1")
     assert ((arm.lower <= placement.start) & (placement.start <= arm.upper)).all()
     assert 0.0 < placement.coarse_gain < 1.0
@@ -189,7 +190,7 @@ def test_a_proposal_keeps_to_limits_and_gains():
 
 
 def test_the_same_question_has_the_same_answer():
-    first, second = (tc.reach(person("da_vinci_36", 12.0), robot="rcrt1") for _ in range(2))
+    first, second = (lab.reach(person("da_vinci_36", 12.0), robot="rcrt1") for _ in range(2))
     assert first.settings() == second.settings()
     assert first.given.share == second.given.share
     assert first.proposed.share == second.proposed.share
@@ -197,14 +198,14 @@ def test_the_same_question_has_the_same_answer():
 
 def test_a_lower_goal_is_never_paid_with_a_lower_gain():
     hand = person("da_vinci_36", 12.0)
-    high, low = (tc.reach(hand, robot="rcrt1", share=s).proposed for s in (0.99, 0.9))
+    high, low = (lab.reach(hand, robot="rcrt1", share=s).proposed for s in (0.99, 0.9))
     assert low.share >= 0.9
     larger = (low.placement.rotation_gain, low.placement.coarse_gain)
     assert larger >= (high.placement.rotation_gain, high.placement.coarse_gain)
 
 
 def test_a_scenario_is_run_first():
-    reach = tc.reach("coarse_box", texts=["teleop.duration=8.0"])
+    reach = lab.reach("coarse_box", texts=["teleop.duration=8.0"])
     assert abs(reach.path.time[-1] - 8.0) < 0.01 + 5.0  # with the way to the start
     assert reach.given.share > 0.99
 
@@ -216,16 +217,16 @@ def test_a_table_of_others_is_taken_as_it_is(tmp_path):
     file = tmp_path / "hand.csv"
     table.to_csv(file, index=False)
     with pytest.warns(UserWarning, match=r"hand\.csv: x, y, z"):
-        from_file = tc.reach(file, robot="rcrt1", share=1e-3).given
-    direct = tc.reach(recorded(stamps, poses), robot="rcrt1", share=1e-3).given
+        from_file = lab.reach(file, robot="rcrt1", share=1e-3).given
+    direct = lab.reach(recorded(stamps, poses), robot="rcrt1", share=1e-3).given
     assert abs(from_file.share - direct.share) <= AGREE
 
 
 def test_unknown_sources_are_told_with_the_alternatives():
     with pytest.raises(tc.UnknownNameError, match="coarse_box"):
-        tc.reach("coarse_bax")
+        lab.reach("coarse_bax")
     with pytest.raises(tc.ParameterError, match=r"share is 1\.5"):
-        tc.reach(person("pen", 1.0), share=1.5)
+        lab.reach(person("pen", 1.0), share=1.5)
 
 
 @pytest.mark.slow
@@ -269,6 +270,6 @@ def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop):
 
 
 def test_axes_stay_where_a_camera_is_fixed():
-    reach = tc.reach(person("motion_capture", 12.0), robot="rcrt1", keeps_axes=True)
+    reach = lab.reach(person("motion_capture", 12.0), robot="rcrt1", keeps_axes=True)
     assert reach.proposed.placement.axes == reach.given.placement.axes
     assert reach.proposed.share >= 0.99

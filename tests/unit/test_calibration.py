@@ -9,7 +9,10 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from teleop_core.calibration import (
+from teleop_core.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
+from teleop_core.robots import dh_kernels, load_robot, robot_from_table
+from teleop_core.robots.chains import true_chain
+from teleop_lab.calibration import (
     CalibrationError,
     LinkErrors,
     Measured,
@@ -19,15 +22,12 @@ from teleop_core.calibration import (
     read_measured,
     simulate,
 )
-from teleop_core.calibration.accuracy import of_points, spread
-from teleop_core.calibration.identify import identify, residuals, slopes
-from teleop_core.calibration.model import Frame, aligned
-from teleop_core.calibration.poses import optimal_poses, random_poses
-from teleop_core.calibration.report import correction_file
-from teleop_core.calibration.simulate import ruled, tracked, true_errors
-from teleop_core.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
-from teleop_core.robots import dh_kernels, load_robot, robot_from_table
-from teleop_core.robots.chains import true_chain
+from teleop_lab.calibration.accuracy import of_points, spread
+from teleop_lab.calibration.identify import identify, residuals, slopes
+from teleop_lab.calibration.model import Frame, aligned
+from teleop_lab.calibration.poses import optimal_poses, random_poses
+from teleop_lab.calibration.report import correction_file
+from teleop_lab.calibration.simulate import ruled, tracked, true_errors
 
 CHAINS = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")
 RCRT1 = load_robot("rcrt1")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from teleop_core.conformance.agreement import LATEST, Trail, adds_up, follows, obeys
 from teleop_core.robots import load_robot
+from teleop_drill.conformance.agreement import LATEST, Trail, adds_up, follows, obeys
 
 TIMES = np.arange(0.0, 3.0, 1e-3)
 WAY = 0.01

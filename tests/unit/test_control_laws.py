@@ -10,13 +10,13 @@ from teleop_core.controllers.adaptive import _FRICTION, _INERTIA, _LOAD, _VISCOU
 from teleop_core.controllers.computed_torque import COMPUTED_TORQUE, computed_torque_control
 from teleop_core.controllers.motion import known_friction
 from teleop_core.errors import ParameterError, PartError
-from teleop_core.experiments.joint_steps import answer_to_steps
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.signals import TICK_NS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_core.slave.slave_sim import ControllerParameters, PlantParameters
+from teleop_lab.experiments.joint_steps import answer_to_steps
 
 LAWS = ("friction_compensation", "computed_torque", "adaptive", "disturbance_observer")
 ARM = load_robot("rcrt1")

@@ -10,16 +10,16 @@ from mutants import MUTANTS, changed
 from teleop_core import api
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
-from teleop_core.drill import EXERCISES, SHORT, Cure, Motion, Outcome, chosen, hand, measure
-from teleop_core.drill.hand import Sample
-from teleop_core.drill.judging import Measured, Seen, judge
-from teleop_core.drill.numbers import Numbers, Scheduling
-from teleop_core.drill.recordings import check_recording, missing
-from teleop_core.drill.table import drill_table, markdown, rows, summary
 from teleop_core.errors import UnknownNameError
 from teleop_core.operation import Fault, State
 from teleop_core.robots import load_robot
 from teleop_core.topics import SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
+from teleop_drill.drill import EXERCISES, SHORT, Cure, Motion, Outcome, chosen, hand, measure
+from teleop_drill.drill.hand import Sample
+from teleop_drill.drill.judging import Measured, Seen, judge
+from teleop_drill.drill.numbers import Numbers, Scheduling
+from teleop_drill.drill.recordings import check_recording, missing
+from teleop_drill.drill.table import drill_table, markdown, rows, summary
 
 MS = 1_000_000
 DT = 1e-3

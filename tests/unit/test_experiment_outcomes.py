@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from teleop_core.errors import ParameterError, UnknownNameError
 from teleop_core.evaluation.figure import Figure
-from teleop_core.experiments import (
+from teleop_lab.experiments import (
     EXACT,
     Experiment,
     Outcome,
@@ -19,8 +19,8 @@ from teleop_core.experiments import (
     factor,
     percent,
 )
-from teleop_core.experiments.page import experiments_page
-from teleop_core.experiments.table import numbers, summary, text
+from teleop_lab.experiments.page import experiments_page
+from teleop_lab.experiments.table import numbers, summary, text
 
 positive = st.floats(1e-6, 1e6)
 finite = st.floats(-1e9, 1e9)
@@ -156,7 +156,7 @@ def test_page_escapes_what_others_wrote_and_asks_nobody():
 
 def test_experiment_that_returns_something_else_is_named():
     from teleop_core.errors import PartError
-    from teleop_core.experiments import Bench
+    from teleop_lab.experiments import Bench
 
     wrong = Experiment("mine", "mine", "me", lambda bench: None)
     with pytest.raises(PartError, match="mine"):

@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 from scipy.signal import dlti, dstep
 
-from teleop_core import experiments
 from teleop_core.errors import ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.experiments import Bench, Experiment, Findings, Row
-from teleop_core.experiments.accuracy import (
+from teleop_core.operators.tour import tour
+from teleop_core.recording import Stream
+from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
+from teleop_lab import experiments
+from teleop_lab.experiments import Bench, Experiment, Findings, Row
+from teleop_lab.experiments.accuracy import (
     AXES,
     DESIRED_MM,
     as_read,
@@ -16,14 +20,10 @@ from teleop_core.experiments.accuracy import (
     published_errors,
     readings,
 )
-from teleop_core.experiments.drawing import box_edges
-from teleop_core.experiments.points24 import visits_of
-from teleop_core.experiments.reference_filter import gain_at, step_response
-from teleop_core.experiments.responses import response
-from teleop_core.operators.tour import tour
-from teleop_core.recording import Stream
-from teleop_core.robots import load_robot
-from teleop_core.session.configuration import configure
+from teleop_lab.experiments.drawing import box_edges
+from teleop_lab.experiments.points24 import visits_of
+from teleop_lab.experiments.reference_filter import gain_at, step_response
+from teleop_lab.experiments.responses import response
 
 # Experiments of formulas alone, each with what its source is known to have misprinted.
 MISPRINTS = {
@@ -129,7 +129,7 @@ def test_bench_of_the_same_seed_gives_the_same_bits():
 
 
 def test_streams_of_an_old_session_come_back_with_the_same_bits(monkeypatch):
-    monkeypatch.setattr("teleop_core.experiments.bench._WHOLE", 1)
+    monkeypatch.setattr("teleop_lab.experiments.bench._WHOLE", 1)
     bench = Bench()
     old = bench.session("coarse_box", settings=SHORT)
     before = old["slave/measured_cp"]

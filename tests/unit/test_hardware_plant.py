@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from teleop_core.errors import ParameterError, PartError, ShapeError, UnknownNameError
-from teleop_core.fitting.rests import Mover
 from teleop_core.parameters import MARKS, build, parameter, specs
 from teleop_core.plants import PLANTS, Plant, register_plant
 from teleop_core.plants.hardware import FAULTS, HARDWARE, faults_of
@@ -17,6 +16,7 @@ from teleop_core.session.configuration import configure
 from teleop_core.signals import TICK_NS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave_sim import SlaveSim
+from teleop_lab.fitting.rests import Mover
 
 ARM = load_robot("rcrt1")
 TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])

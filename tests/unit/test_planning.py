@@ -8,17 +8,18 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+import teleop_lab as lab
 from people import PEOPLE, moves, recorded
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.mapping.inverse_kinematics import InverseKinematicsParameters
 from teleop_core.mapping.parameters import MotionScalingParameters
-from teleop_core.planning.aim import Aim
-from teleop_core.planning.asked import STRETCHES, AskedPath, asked_path
-from teleop_core.planning.placement import Placement
-from teleop_core.planning.turns import turns
-from teleop_core.planning.walk import Walker
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.room import room, roomy_postures
+from teleop_lab.planning.aim import Aim
+from teleop_lab.planning.asked import STRETCHES, AskedPath, asked_path
+from teleop_lab.planning.placement import Placement
+from teleop_lab.planning.turns import turns
+from teleop_lab.planning.walk import Walker
 
 START = tuple(tc.load_robot("puma560").start.tolist())
 PUMA = RobotParameters(robot="puma560")
@@ -100,7 +101,7 @@ def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path):
 
 
 def test_a_placement_that_needs_no_change_is_written_too(tmp_path):
-    found = tc.reach(tc.run("fine_box", duration=2.0), share=0.01)
+    found = lab.reach(tc.run("fine_box", duration=2.0), share=0.01)
     assert found.is_given
     file = tmp_path / "reach.yaml"
     file.write_text(found.parameter_file())

@@ -27,8 +27,6 @@ from .exchange import (
     export_recording as export_recording,
     import_recording as import_recording,
 )
-from .experiments import Experiment as Experiment, register_experiment as register_experiment
-from .fitting import FitError as FitError, FitResult as FitResult, fit_plant as fit_plant
 from .fixtures import Fixture as Fixture, register_fixture as register_fixture
 from .graph import Graph as Graph, build_graph as build_graph
 from .kernels import kernel as kernel
@@ -39,7 +37,6 @@ from .operators import (
 )
 from .operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
 from .parameters import NoParameters as NoParameters, parameter as parameter
-from .planning.reach import Reach as Reach, reach as reach
 from .plants import Physics as Physics, Plant as Plant, register_plant as register_plant
 from .recording import Recording as Recording, Stream as Stream, open_recording as open_recording
 from .robots import (

@@ -11,19 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.commands import (
-    calibrate,
-    compiling,
-    conformance,
-    console,
-    devices,
-    drill,
-    exchange,
-    experiment,
-    fit,
-    operate,
-    reach,
-)
+from teleop_core.commands import compiling, console, devices, exchange, installed, operate
 from teleop_core.commands.arguments import (
     command,
     configured,
@@ -66,7 +54,7 @@ def main(arguments: list[str] | None = None) -> int:
         from argcomplete import autocomplete
 
         autocomplete(_parser())
-    parsed = _parser().parse_args(arguments)
+    parsed = _parsed(sys.argv[1:] if arguments is None else arguments)
     warnings.showwarning = _note  # type: ignore[assignment]
     try:
         _take_parts([*parsed.parts, *parsed.more_parts])
@@ -100,8 +88,39 @@ def _take_parts(files: list[Path]) -> None:
     load_own_parts(files)
 
 
+def _parsed(words: list[str]) -> argparse.Namespace:
+    """Arguments of a command; installed packages are asked only if it is none of the core."""
+    parser, commands = _core()
+    name = _command_of(words)
+    if name not in commands.choices:
+        _parser()
+    if name is not None and name not in commands.choices and (text := installed.advice(name)):
+        parser.exit(FAILED, f"{parser.prog} {name}: {text}\n")
+    return parser.parse_args(words)
+
+
+def _command_of(words: list[str]) -> str | None:
+    """First word that is neither an option nor the value of one."""
+    following = iter(words)
+    for word in following:
+        if word == "--parts":
+            next(following, None)
+        elif not word.startswith("-"):
+            return word
+    return None
+
+
 @cache
 def _parser() -> argparse.ArgumentParser:
+    """Parser of all commands, those of installed packages too."""
+    parser, commands = _core()
+    installed.add(commands)
+    return parser
+
+
+@cache
+def _core() -> tuple[argparse.ArgumentParser, Any]:
+    """Parser of the commands of this package, and what more of them are added to."""
     parser = _Parser(
         prog="teleop",
         description="Master-slave teleoperation: simulate, record, replay and score sessions.",
@@ -118,18 +137,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for add in (_add_sim, _add_live, _add_replay, _add_play, _add_evaluate, _add_lookups):
         add(commands)
-    exchange.add(commands)
-    reach.add(commands)
-    calibrate.add(commands)
-    experiment.add(commands)
-    fit.add(commands)
-    drill.add(commands)
-    operate.add(commands)
-    conformance.add(commands)
-    console.add(commands)
-    devices.add(commands)
-    compiling.add(commands)
-    return parser
+    for module in (exchange, operate, console, devices, compiling):
+        module.add(commands)
+    return parser, commands
 
 
 def _add_sim(commands: Any) -> None:

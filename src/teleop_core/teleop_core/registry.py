@@ -26,11 +26,12 @@ class Registry(Generic[Part]):
 
     Args:
         kind: What a part is, in the singular, for messages: "fixture".
-        kinds: The plural; the entry-point group is ``teleop_core.<kinds>``.
-        builtin: Names to places ``module:attribute`` in this package.
+        kinds: The plural; the entry-point group is ``<package>.<kinds>``.
+        builtin: Names to places ``module:attribute`` in the package.
         check: Raises :class:`~teleop_core.errors.PartError` for what is no such part, else returns
             it.
-        trial: Tries a part that is not of this package, and raises as ``check`` does.
+        trial: Tries a part that is not of the package, and raises as ``check`` does.
+        package: Whose registry it is.
     """
 
     def __init__(
@@ -40,8 +41,10 @@ class Registry(Generic[Part]):
         builtin: Mapping[str, str],
         check: Callable[[str, object], Part],
         trial: Callable[[Part], None] | None = None,
+        *,
+        package: str = "teleop_core",
     ) -> None:
-        self.kind, self.kinds, self.group = kind, kinds, f"teleop_core.{kinds}"
+        self.kind, self.kinds, self.group = kind, kinds, f"{package}.{kinds}"
         self._builtin, self._check, self._trial = dict(builtin), check, trial
         self._parts: dict[str, Part] = {}
         self._own: set[str] = set()
@@ -115,7 +118,8 @@ class Registry(Generic[Part]):
             found: dict[str, EntryPoint] = {}
             for entry in entry_points(group=self.group):
                 if entry.name in self._builtin or entry.name in found:
-                    other = found[entry.name].value if entry.name in found else "teleop_core"
+                    package = self.group.partition(".")[0]
+                    other = found[entry.name].value if entry.name in found else package
                     raise PartError(
                         self.kind, entry.name, f"named once; {entry.value} and {other} both use it"
                     )

@@ -82,8 +82,12 @@ def done(out: Path, what: str) -> str:
     return f"{out}: {what}; next: teleop evaluate {out}"
 
 
-def ros_module(module: str) -> Any:
+def ros_module(module: str, package: str = "teleop_core.nodes") -> Any:
     """Module of the nodes, which are the only part that needs ROS.
+
+    Args:
+        module: Its name in the package.
+        package: Where it is.
 
     Raises:
         TeleopError: ROS is missing.
@@ -91,9 +95,9 @@ def ros_module(module: str) -> Any:
     from importlib import import_module
 
     try:
-        return import_module(f"teleop_core.nodes.{module}")
+        return import_module(f"{package}.{module}")
     except ModuleNotFoundError as error:
-        if (error.name or "").startswith("teleop_core"):
+        if (error.name or "").startswith("teleop_"):
             raise
         raise TeleopError(
             f"needs ROS 2 ({error.name} is missing): pip install 'teleop_core[ros]' or source ROS"

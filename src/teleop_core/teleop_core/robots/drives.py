@@ -105,7 +105,7 @@ class Dynamics:
         compensated: Axes (n,) whose gravity the published controller feeds forward.
         links: Inertias of the links behind those numbers, for models that have such; () for none.
         unknown: Names of numbers that the source does not state, to their places in the row; the
-            real arm may differ in them (:mod:`teleop_core.fitting`).
+            real arm may differ in them (:mod:`teleop_lab.fitting`).
 
     Raises:
         ShapeError: ``parameters`` are not a vector.

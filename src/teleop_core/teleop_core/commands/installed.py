@@ -1,0 +1,38 @@
+"""Commands of installed packages, which ``teleop`` finds through an entry-point group.
+
+A package adds a command by a function that adds its parser, as ``add`` of the modules here does::
+
+    [project.entry-points."teleop_core.commands"]
+    polish = "my_package.commands.polish:add"
+"""
+
+import sys
+from importlib.metadata import entry_points
+from typing import Any
+
+from teleop_core.texts import one_line
+
+GROUP = "teleop_core.commands"
+RELEASED_TOGETHER = {
+    **dict.fromkeys(("calibrate", "experiment", "fit", "reach"), "teleop_lab"),
+    **dict.fromkeys(("conformance", "drill"), "teleop_drill"),
+}
+"""Commands of the other distributions of this project, each with its distribution."""
+
+
+def add(commands: Any) -> None:
+    """Add the parsers of installed commands; one that cannot be loaded is named and left out."""
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+        if entry.name in commands.choices:
+            continue
+        try:
+            entry.load()(commands)
+        except Exception as error:  # whatever a foreign module raises, one line names it
+            reason = one_line(f"{type(error).__name__}: {error}")
+            print(f"note: no command {entry.name}, from {entry.value}: {reason}", file=sys.stderr)
+
+
+def advice(name: str) -> str | None:
+    """What to install for a command of this project that is not there; None for any other word."""
+    distribution = RELEASED_TOGETHER.get(name)
+    return distribution and f"install {distribution}, which has this command"

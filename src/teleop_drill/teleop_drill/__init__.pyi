@@ -1,0 +1,16 @@
+from . import conformance as conformance
+from .drill import (
+    EXERCISES as EXERCISES,
+    SHORT as SHORT,
+    Cure as Cure,
+    Exercise as Exercise,
+    Master as Master,
+    Motion as Motion,
+    Outcome as Outcome,
+    Rig as Rig,
+    chosen as chosen,
+    hand as hand,
+    register_exercise as register_exercise,
+)
+
+__version__: str

@@ -1,0 +1,93 @@
+"""``teleop conformance``: test any CRTK arm, row by row."""
+
+import argparse
+import sys
+from typing import Any
+
+from teleop_core.commands.arguments import command, ros_module
+from teleop_core.errors import SessionError
+
+_EPILOG = """\
+tests an arm, ours or any other, against CRTK (Collaborative Robotics Toolkit): which topics there
+are, their types, rates, stamps and numbers, and whether it does what a stock client tells it.
+  teleop conformance slave --read-only     look, touch nothing
+  teleop conformance /PSM1                 asks before it moves anything
+  teleop conformance slave --yes --json    for programs
+It pauses and resumes the arm, moves one joint by 0.01 rad (or 10 mm) and the tip by 3 mm, at most
+0.02 rad/s and 6 mm/s where it chooses the speed, and goes back each time. Whatever it measures
+must follow what it was told, in time and in place; its speeds must add up to its way. Efforts,
+forces and free are never tried. Stop whoever else commands the arm, and keep a hand at the
+emergency stop.
+verdicts: ok; absent, which is allowed; not tried, with the reason; noted, works but look at it;
+FAILED. The exit code is 1 if a row FAILED.
+"""
+_QUESTION = "move {}? one joint by 0.01 rad, its tip by 3 mm, each back again; pause, resume [y/N] "
+
+
+def add(commands: Any) -> None:
+    """Add the command's parser."""
+    text = "test a CRTK arm, row by row: topics, stamps, states, small motions"
+    parser = command(commands, "conformance", _run, text)
+    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser.add_argument("namespace", help="where its topics are, such as slave, or /PSM1")
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument("--read-only", action="store_true", help="command nothing")
+    choice.add_argument("--yes", action="store_true", help="move it without asking")
+    parser.add_argument("--json", action="store_true", help="print JSON in place of the table")
+    parser.add_argument(
+        "--domain", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)"
+    )
+    parser.add_argument(
+        "--robot", metavar="NAME",
+        help="what it is, one of `teleop robots` or a Denavit-Hartenberg table: its forward "
+        "kinematics are held against measured_cp",
+    )  # fmt: skip
+    parser.add_argument(
+        "--wait", type=float, default=5.0, metavar="S",
+        help="seconds in which the arm must be there (default: 5)",
+    )  # fmt: skip
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from rich.console import Console
+
+    from teleop_core.robots import load_robot
+    from teleop_drill.conformance import Verdict, findings_json, findings_table
+
+    ros_module("conformance", "teleop_drill.nodes")
+    from teleop_core.nodes.children import environment
+    from teleop_drill.nodes.conformance import examine, left_behind
+    from teleop_drill.nodes.conformance_arm import Arm
+
+    robot = None if arguments.robot is None else load_robot(arguments.robot)
+    environment()
+    with Arm(arguments.namespace, arguments.domain) as arm:
+        if not arm.is_there(arguments.wait):
+            where = f"{arm.namespace}/… within {arguments.wait:g} s"
+            hint = "is it on this ROS domain? `ros2 topic list`, or another --domain"
+            raise SessionError(f"no CRTK topic at {where}; {hint}")
+        may_move = not arguments.read_only and (arguments.yes or _agreed(arm.namespace))
+        progress = Console(stderr=True)
+        try:
+            with progress.status("looking") as status:
+                findings = examine(arm, may_move=may_move, report=status.update, robot=robot)
+        except KeyboardInterrupt:
+            left = left_behind(arm, may_move=may_move)
+            print(f"teleop conformance: interrupted; {left}", file=sys.stderr)
+            return 130
+    if arguments.json:
+        print(findings_json(arm.namespace, findings))
+    else:
+        Console().print(findings_table(arm.namespace, findings))
+    failed = sum(finding.verdict is Verdict.FAILED for finding in findings)
+    if not arguments.json:
+        there = sum(finding.verdict is not Verdict.ABSENT for finding in findings)
+        print(f"{there} of {len(findings)} rows are there, {failed} failed")
+    return 1 if failed else 0
+
+
+def _agreed(namespace: str) -> bool:
+    """Whether the user lets it move; without a terminal nobody can."""
+    if not sys.stdin.isatty():
+        raise SessionError("needs an answer: --yes to move the arm, or --read-only")
+    return input(_QUESTION.format(namespace)).strip().lower() in {"y", "yes"}

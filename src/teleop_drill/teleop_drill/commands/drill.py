@@ -1,0 +1,115 @@
+"""``teleop drill``: break a running session in all ways that are known, measure what it does."""
+
+import argparse
+import json
+import shlex
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from teleop_core.commands.arguments import command, ros_module, setting_arguments
+from teleop_core.errors import ParameterError, RecordingError
+
+if TYPE_CHECKING:
+    from teleop_drill.drill import Exercise, Outcome
+
+_EPILOG = """\
+without a name all faults are injected, which takes minutes:
+  teleop drill --list                      what there is
+  teleop drill stop_topic kill_motion_scaling
+  teleop drill --short                     five faults, less than a minute
+  teleop drill --composed --json drill.json
+  teleop drill --drives "python examples/foreign_slave.py"    drives of your own
+  teleop drill --set real_time.priority=50  on a machine that others keep busy
+it starts sessions of its own, simulated, on a ROS domain of their own, kills and stops processes of
+these sessions alone, and keeps the machine's cores busy for seconds. Exit code 0: all as expected.
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command's parser."""
+    text = "break a running session in all known ways, and measure what the arm does"
+    parser = command(commands, "drill", _run, text)
+    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser.add_argument("names", nargs="*", metavar="NAME", help="faults (default: all)")
+    parser.add_argument("--composed", action="store_true", help="all nodes in one process")
+    parser.add_argument("--short", action="store_true", help="the most telling five faults")
+    parser.add_argument("--list", action="store_true", dest="is_list", help="list the faults")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table as Markdown")
+    parser.add_argument(
+        "--drives", metavar="COMMAND", type=shlex.split, default=(),
+        help="command of drives that the slave leads in place of the simulated ones",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="keep the recordings here; must not exist"
+    )
+    setting_arguments(parser)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from teleop_core.evaluation.command import check_place
+    from teleop_drill.drill import SHORT, chosen
+
+    names = (*arguments.names, *(SHORT if arguments.short else ()))
+    exercises = chosen(names, is_composed=arguments.composed)
+    if arguments.is_list:
+        for one in exercises:
+            print(f"{one.name:24} {one.text}")
+        return 0
+    if arguments.drives and arguments.composed:
+        raise ParameterError("--drives", shlex.join(arguments.drives), "without --composed")
+    for file in (arguments.json, arguments.markdown):
+        if file is not None:
+            check_place(file)
+    if arguments.out is not None and arguments.out.exists():
+        raise RecordingError(arguments.out, "exists already; choose another --out")
+    outcomes = _outcomes(exercises, arguments)
+    _write(outcomes, arguments)
+    code = _show(outcomes)
+    if len(outcomes) < len(exercises):
+        print(f"{len(exercises) - len(outcomes)} were not done")
+        return 1
+    return code
+
+
+def _outcomes(exercises: "tuple[Exercise, ...]", arguments: argparse.Namespace) -> "list[Outcome]":
+    from rich.console import Console
+
+    console, out = Console(), arguments.out
+    with ExitStack() as end:
+        folder = out or Path(end.enter_context(tempfile.TemporaryDirectory(prefix="drill_")))
+        return ros_module("drill", "teleop_drill.nodes").drill(  # type: ignore[no-any-return]
+            exercises, folder,
+            lambda line: console.print(line, highlight=False, markup=False, soft_wrap=True),
+            is_composed=arguments.composed, files=arguments.config, texts=arguments.settings,
+            drives=arguments.drives,
+        )  # fmt: skip
+
+
+def _write(outcomes: "list[Outcome]", arguments: argparse.Namespace) -> None:
+    from teleop_core import __version__
+    from teleop_core.evaluation.command import write_whole
+    from teleop_drill.drill.table import markdown
+
+    if arguments.json is not None:
+        found = [outcome.to_json() for outcome in outcomes]
+        whole = {"version": __version__, "is_composed": arguments.composed, "faults": found}
+        text = json.dumps(whole, indent=2, allow_nan=False, ensure_ascii=False)
+        write_whole(arguments.json, text + "\n")
+    if arguments.markdown is not None:
+        write_whole(arguments.markdown, markdown(outcomes))
+
+
+def _show(outcomes: "list[Outcome]") -> int:
+    from rich.console import Console
+
+    from teleop_drill.drill.table import drill_table, summary
+
+    console = Console()
+    wide = console if console.is_terminal else Console(width=170)
+    wide.print(drill_table(outcomes))
+    for line in summary(outcomes):
+        print(line)
+    return 1 if any(outcome.failures() for outcome in outcomes) else 0

@@ -1,0 +1,45 @@
+"""Table: findings as people and as programs read them."""
+
+import json
+from collections.abc import Iterable
+
+from rich.markup import escape
+from rich.table import Table
+
+from teleop_core.texts import one_line
+from teleop_drill.conformance.rows import Finding, Verdict
+
+_STYLES = {
+    Verdict.OK: "green", Verdict.ABSENT: "dim", Verdict.SKIPPED: "yellow",
+    Verdict.NOTED: "yellow", Verdict.FAILED: "bold red",
+}  # fmt: skip
+
+
+def findings_table(namespace: str, findings: Iterable[Finding]) -> Table:
+    """Table of findings, a row for each."""
+    table = Table(title=f"CRTK: {escape(namespace)}", title_justify="left")
+    for name in ("topic", "needed", "found", "verdict", "note"):
+        table.add_column(name)
+    for finding in findings:
+        style = _STYLES[finding.verdict]
+        needed = "required" if finding.row.is_required else "optional"
+        verdict = f"[{style}]{finding.verdict.value}[/]"
+        found, note = (escape(one_line(text)) for text in (finding.found, finding.note))
+        table.add_row(finding.row.name, needed, found, verdict, note)
+    return table
+
+
+def findings_json(namespace: str, findings: Iterable[Finding]) -> str:
+    """The same as JSON: ``{"namespace": ..., "rows": [{"topic": ..., "verdict": ...}, ...]}``."""
+    rows = [
+        {
+            "topic": finding.row.name,
+            "type": finding.row.ros_type,
+            "required": finding.row.is_required,
+            "verdict": finding.verdict.name.lower(),
+            "found": finding.found,
+            "note": finding.note,
+        }
+        for finding in findings
+    ]
+    return json.dumps({"namespace": namespace, "rows": rows}, indent=2)

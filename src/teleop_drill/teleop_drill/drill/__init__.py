@@ -1,0 +1,57 @@
+"""Drill: breaks a running session in all ways that are known, and measures what the arm does."""
+
+from teleop_core.errors import PartError, UnknownNameError
+from teleop_core.registry import Registry
+from teleop_drill.drill.exercise import Cure, Exercise, Master, Motion, Rig
+from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.processes import PROCESSES
+from teleop_drill.drill.samples import SAMPLES
+from teleop_drill.drill.stops import STOPS
+
+__all__ = [
+    "EXERCISES", "SHORT", "Cure", "Exercise", "Master", "Motion", "Outcome", "Rig", "chosen",
+    "register_exercise",
+]  # fmt: skip
+
+EXERCISES = (*STOPS, *PROCESSES, *SAMPLES)
+"""Built-in ones; some once for each way of running."""
+SHORT = ("stop_topic", "kill_motion_scaling", "teleport", "second_commander", "kill_bystander")
+"""What is enough to see that nothing is badly wrong."""
+
+
+def _checked(name: str, part: object) -> Exercise:
+    if not isinstance(part, Exercise):
+        raise PartError("exercise", name, f"an Exercise, not a {type(part).__name__}")
+    if part.name != name or any(one.name == name for one in EXERCISES):
+        raise PartError("exercise", name, "registered under its own name, which must be free")
+    return part
+
+
+FURTHER: Registry[Exercise] = Registry(
+    "exercise", "exercises", {}, _checked, package="teleop_drill"
+)
+"""Those of installed packages and of the program."""
+
+
+def register_exercise(exercise: Exercise, *, replace: bool = False) -> Exercise:
+    """Add an exercise under its name for the rest of the program; see :meth:`Registry.add`."""
+    return FURTHER.add(exercise.name, exercise, replace=replace)
+
+
+def chosen(names: tuple[str, ...], *, is_composed: bool) -> tuple[Exercise, ...]:
+    """Exercises of a way of running, in the order of the table, further ones last.
+
+    Args:
+        names: Which; none for all.
+        is_composed: Whether all nodes share one process.
+
+    Raises:
+        UnknownNameError: One is not there in this way of running.
+    """
+    further = map(FURTHER.find, FURTHER)
+    fitting = [one for one in (*EXERCISES, *further) if is_composed in one.ways]
+    for name in names:
+        if name not in {one.name for one in fitting}:
+            way = "composed" if is_composed else "a process for each node"
+            raise UnknownNameError(f"fault ({way})", name, [one.name for one in fitting])
+    return tuple(one for one in fitting if not names or one.name in names)

@@ -1,0 +1,215 @@
+"""Exercise: one fault of a drill, what is expected of the arm, and how it recovers."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from teleop_core.geometry import Array
+from teleop_core.operation import Fault, State
+from teleop_core.topics import Topic
+from teleop_drill.drill.hand import SPEED, Distortion
+from teleop_drill.drill.numbers import Numbers
+
+
+class Master(Enum):
+    """Who moves the hand."""
+
+    DEVICE = "the simulated device of the session, a stage like all others"
+    DRILL = "the drill itself, which publishes what a device would"
+
+
+class Motion(Enum):
+    """What the arm does under a fault."""
+
+    RESTS = "it comes to rest by itself"
+    HOLDS = "it goes to the last sound command, and stays there as if clutched"
+    LED = "it goes where the drill's own commands lead it"
+    GOES_ON = "it goes on, within what the hand asks for"
+
+
+class Cure(Enum):
+    """What it takes to move again."""
+
+    NOTHING = "by itself"
+    RESUME = "resume"
+    RESET = "reset + enable"
+    RESTART = "restart"
+
+
+class Rig(Protocol):
+    """The session under drill, and what can be done to it."""
+
+    @property
+    def is_composed(self) -> bool:
+        """Whether all nodes share one process."""
+        ...
+
+    def mark(self) -> None:
+        """The fault begins now; without a word it is when :attr:`Exercise.inject` is called."""
+
+    def note(self, text: str) -> None:
+        """Say something that belongs beside the state."""
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass [s]."""
+
+    def kill(self, node: str) -> None:
+        """Kill a node's process, as the kernel does when memory is short."""
+
+    def freeze(
+        self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None
+    ) -> None:
+        """Stop a node's process for a time [s], do something, then let it go on."""
+
+    def limit_files(self, node: str, room: int | None) -> None:
+        """Let files of a node's process grow by so many bytes only; None: as they like."""
+
+    def hog(self, seconds: float) -> None:
+        """Keep all cores busy for a time [s]."""
+
+    def start_bystander(self) -> None:
+        """Start a ROS process of others that listens to all streams; it listens on return."""
+
+    def kill_bystander(self) -> None:
+        """Kill it."""
+
+    def distort(self, distortion: Distortion) -> None:
+        """Let something become of the hand's samples on the way."""
+
+    def mute_buttons(self, *, is_mute: bool) -> None:
+        """Send no buttons, or send them again."""
+
+    def publish(self, topic: Topic, stamp_ns: int, values: Array) -> None:
+        """Send one message as another publisher of the topic would."""
+
+    def publish_bytes(self, topic: Topic, data: bytes) -> None:
+        """Send bytes that are no message as another publisher of the topic would."""
+
+    def leave(self, topic: Topic) -> None:
+        """Close that other publisher."""
+
+    def setpoint(self) -> Array:
+        """Newest joint setpoint (n,) of the slave [rad or m]."""
+
+    def way_to_limit(self) -> Array:
+        """Way (n,) of one joint, that which moves the tip least, to its nearer limit [rad or m]."""
+
+    def drive(self, speeds: Array, seconds: float) -> None:
+        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
+
+    def now_ns(self) -> int:
+        """Time [ns]."""
+
+    def press(self, *, is_pressed: bool) -> None:
+        """Send a message of the stop button."""
+
+    def command(self, name: str) -> bool:
+        """Ask the slave for something by service; whether it was done."""
+
+    def commands(self, *names: str) -> list[bool]:
+        """As :meth:`command`, some at once, without waiting for the answers in between."""
+
+    def set(self, node: str, name: str, value: object) -> bool:
+        """Set a parameter of a running node; whether it was taken."""
+
+    def control(self, word: int, offset_ns: int = 0) -> None:
+        """Say what the drill's own stage does, and by how much all clocks are off [ns]."""
+
+
+Time = Callable[[Numbers], float]
+"""A time [s] that follows from the numbers of the session."""
+
+
+def command_timeout(numbers: Numbers) -> float:
+    """Of commands that fail: the last one is in force for so long."""
+    return numbers.command_timeout
+
+
+def at_once(numbers: Numbers) -> float:
+    """Of what the slave itself is told: it looks in every tick."""
+    return numbers.tick
+
+
+def outage(numbers: Numbers) -> float:
+    """Of a stream that fell silent: until the arm is PAUSED."""
+    return numbers.longest_outage
+
+
+def silence(numbers: Numbers) -> float:
+    """Of an arm that says no more where it is: until that is a fault."""
+    return numbers.longest_silence
+
+
+def unheard(numbers: Numbers) -> float:
+    """Of an arm that says no more where it is: the command timeout, then it brakes."""
+    braking = max(numbers.speed_limit / numbers.braking)
+    return numbers.command_timeout + float(braking)
+
+
+def never(_: Numbers) -> float:
+    """No time at all."""
+    return 0.0
+
+
+def after(seconds: float) -> Time:
+    """A time that the exercise itself makes up [s]."""
+    return lambda _: seconds
+
+
+def nothing(_: Rig) -> None:
+    """Do nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exercise:
+    """One fault.
+
+    Attributes:
+        name: By which it is asked for.
+        text: What is done.
+        inject: Does it; returns when it is done, or is over.
+        undo: Takes back what lasts.
+        motion: What the arm does meanwhile.
+        states: Operating states that may follow; None among them: the slave is gone.
+        faults: Faults that may be told; empty: any or none.
+        cures: What it may take to move again.
+        master: Who moves the hand.
+        allowed: Time for which it may go on as it moves [s], before it has to brake.
+        stands: Time for which an arm that goes on may stand still all the same [s].
+        gap: Time for which commands may be missing that the arm makes up for [s].
+        told: Time after which ``slave/operation`` tells the state or the fault [s]; None: never.
+        warns: Whether a node must warn of it in ``diagnostics``.
+        hand_speed: Largest speed of the hand, or of what leads the tip in its place [m/s].
+        tool_speed: Largest speed of the tip's setpoint that the exercise sets [m/s].
+        lost: How much of the recording it may cost [s].
+        watch: Time for which it is watched after the injection [s].
+        ways: Which ways of running it makes sense in: True for composed.
+        cuts_recording: Whether its recorder cannot close it.
+        breaks_simulator: Whether it needs the simulated arm, which it breaks.
+        repeats: How often it is done; the worst of all is told.
+    """
+
+    name: str
+    text: str
+    inject: Callable[[Rig], None]
+    undo: Callable[[Rig], None] = nothing
+    motion: Motion = Motion.RESTS
+    states: tuple[State | None, ...] = (State.ENABLED,)
+    faults: tuple[Fault, ...] = ()
+    cures: tuple[Cure, ...] = (Cure.NOTHING,)
+    master: Master = Master.DRILL
+    allowed: Time = command_timeout
+    stands: Time = never
+    gap: Time = never
+    told: Time | None = None
+    warns: bool = False
+    hand_speed: float = SPEED
+    tool_speed: float = math.inf
+    lost: float = 0.0
+    watch: float = 0.5
+    ways: tuple[bool, ...] = (False, True)
+    cuts_recording: bool = False
+    breaks_simulator: bool = False
+    repeats: int = 1

@@ -1,0 +1,259 @@
+"""Judging: what was measured of a fault beside what a session's own numbers allow."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.operation import State
+from teleop_drill.drill import measure
+from teleop_drill.drill.exercise import Exercise, Motion
+from teleop_drill.drill.hand import RADIUS
+from teleop_drill.drill.measure import Trace
+from teleop_drill.drill.numbers import OVERSHOOT, WARNED, Numbers, Scheduling
+
+_ROUNDING = 1e-9
+_HOPS = 4
+"""Topics from the hand to the setpoint."""
+_FULL = 0.9
+"""Share of the possible deceleration with which a setpoint must brake."""
+_LEAST = 0.8
+"""Share of the hand's way that an arm that goes on must go."""
+_SLOW = 0.05
+"""Share of the hand's speed below which the tip is at rest."""
+_CALM = 10.0
+"""Times :attr:`Numbers.coast` after which the loop has settled to that share: its answer to a
+setpoint that stops, of speed :math:`(1 + x - x^2) e^{-x}`, is below it from x = 6.6 on."""
+_SETTLED = 5.0  # time constants after which a filter has done what it does
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One number that was measured, and its bounds.
+
+    Attributes:
+        name: Name in files, with its unit at the end: ``"travel_m"``.
+        text: What is wrong if it is outside: ``"the tip moved {0:.1f} mm, at most {1:.1f}"``.
+        value: The number in SI units; NaN if it could not be measured, which is no fault.
+        most: Largest that is allowed.
+        least: Smallest that is allowed.
+        scale: Units of the text in one SI unit.
+    """
+
+    name: str
+    text: str
+    value: float
+    most: float = math.inf
+    least: float = -math.inf
+    scale: float = 1e3
+
+    @property
+    def failure(self) -> str:
+        """What is wrong, in words; empty if it is within its bounds."""
+        if not (self.value > self.most or self.value < self.least):
+            return ""
+        bound = self.most if self.value > self.most else self.least
+        return self.text.format(self.scale * self.value, self.scale * bound)
+
+    def to_json(self) -> dict[str, float | None]:
+        """Value and bounds, in SI units; None for what there is not."""
+        numbers = {"value": self.value, "most": self.most, "least": self.least}
+        return {k: round(v, 9) if math.isfinite(v) else None for k, v in numbers.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What an independent tap has heard of one fault.
+
+    Attributes:
+        begin_ns: When the fault began [ns].
+        end_ns: When it was taken back [ns].
+        setpoint_js: Joint setpoints.
+        measured_js: Joints that the slave measures: position, speed, effort.
+        true_cp: Where the tip is, which the plant knows.
+        told_ns: When ``slave/operation`` first told a state or a fault [ns]; None if it did not.
+        warned_ns: When a node first warned of something new [ns]; None if none did.
+        scheduling: How late this machine woke the drill meanwhile.
+        deaf: For how long the slave's process stood still [s].
+    """
+
+    begin_ns: int
+    end_ns: int
+    setpoint_js: Trace
+    measured_js: Trace
+    true_cp: Trace
+    told_ns: int | None
+    warned_ns: int | None
+    scheduling: Scheduling
+    deaf: float = 0.0
+
+    def since(self, time_ns: int | None) -> float:
+        """Time from the fault to a moment [s]; infinite to one that never came."""
+        return math.inf if time_ns is None else 1e-9 * (time_ns - self.begin_ns)
+
+
+def judge(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+    """All that was measured of one fault, each with its bounds."""
+    yield from _always(exercise, seen, numbers)
+    yield from _told(exercise, seen, numbers)
+    if exercise.motion in {Motion.RESTS, Motion.HOLDS}:
+        yield from _stops(exercise, seen, numbers)
+    elif exercise.motion is Motion.GOES_ON:
+        yield from _goes_on(exercise, seen, numbers)
+    else:
+        yield _speed(exercise, seen, numbers)
+
+
+def late(seen: Seen, numbers: Numbers) -> float:
+    """What the way of a message and the machine may add to any time [s].
+
+    A tick for each topic on the way, and twice what the drill's own thread was woken too late: once
+    where a message is sent, once where it is taken.
+    """
+    return _HOPS * numbers.tick + 2.0 * seen.scheduling.worst
+
+
+def _always(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+    """Limits that hold whatever happens."""
+    robot, setpoints = numbers.robot, seen.setpoint_js
+    ratio = measure.step_ratio(setpoints, numbers.speed_limit, numbers.tick)
+    text = "a joint step of {0:.3f} times the drive's limit"
+    yield Measured("step_ratio", text, ratio, 1.0 + _ROUNDING, scale=1.0)
+    yield _tool(exercise, seen, numbers)
+    outside = measure.beyond(setpoints.values, robot.lower, robot.upper)
+    text = "a setpoint {0:.2g} rad or m beyond its joint's limit"
+    yield Measured("beyond_limit", text, outside, _ROUNDING, scale=1.0)
+    measured = measure.tips(robot.fk, seen.measured_js, robot.n)
+    text = "measured_js and the true tip tell ways {0:.2f} mm apart, at most {1:.2f}"
+    way = measure.travel(seen.true_cp, seen.begin_ns, seen.end_ns)
+    most = measure.RESOLUTION + 0.1 * (0.0 if math.isnan(way) else way)
+    yield Measured("apart_m", text, measure.apart(measured, seen.true_cp), most)
+    # Who falls silent hides what the arm does; the slave holds an arm that is silent for longer.
+    text = "the tip or the joints fell silent {0:.0f} ms before the setpoints, at most {1:.0f}"
+    silence = max(measure.silence(one, setpoints) for one in (seen.true_cp, seen.measured_js))
+    yield Measured("silent_s", text, silence, numbers.command_timeout + late(seen, numbers))
+
+
+def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
+    """Steps of the tip's setpoint against the speed of the tool.
+
+    Joints are slowed down in proportion, which is exact for the tip up to their step [rad].
+    """
+    since_ns = seen.begin_ns + round(1e9 * late(seen, numbers))
+    chosen = seen.setpoint_js.within(since_ns, seen.end_ns)
+    places = measure.tips(numbers.robot.fk, chosen, numbers.robot.n)
+    limit = min(exercise.tool_speed, numbers.tool_speed)
+    ratio = measure.way_ratio(places, limit, numbers.tick)
+    text = "a step of the tip's setpoint of {0:.3f} times the tool speed"
+    most = 1.0 + float(np.max(numbers.speed_limit)) * numbers.tick
+    return Measured("tool_ratio", text, ratio, most, scale=1.0)
+
+
+def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+    """Who said so, and when."""
+    if exercise.told is not None:
+        most = seen.deaf + exercise.told(numbers) + late(seen, numbers)
+        text = "slave/operation told after {0:.0f} ms, at most {1:.0f}"
+        yield Measured("told_s", text, seen.since(seen.told_ns), most)
+    if exercise.warns:
+        most = exercise.allowed(numbers) + WARNED + late(seen, numbers)
+        text = "diagnostics warned after {0:.0f} ms, at most {1:.0f}"
+        yield Measured("warned_s", text, seen.since(seen.warned_ns), most)
+
+
+def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+    """The way to rest, its speed, and what follows: rest, or a tip that is held."""
+    going = exercise.allowed(numbers) + late(seen, numbers)
+    yield _travel_to_rest(exercise, seen, numbers, going)
+    yield _speed(exercise, seen, numbers)
+    if exercise.motion is Motion.HOLDS:
+        yield _held(exercise, seen, numbers)
+        return
+    if None not in exercise.states:  # of an arm that is gone there is nothing to hear
+        yield from _rests(exercise, seen, numbers, going)
+    text = "a joint braked with {0:.2f} of what its drive can do, at least {1:.2f}"
+    stopping = seen.setpoint_js.within(0, seen.end_ns)
+    share = measure.ramp(stopping, numbers.braking, numbers.tick)
+    yield Measured("braking_share", text, share, least=_FULL, scale=1.0)
+
+
+def _travel_to_rest(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> Measured:
+    """Way to rest: it may go on for a time [s], brake, and come up to its setpoint."""
+    begin_ns, setpoints, robot = seen.begin_ns, seen.setpoint_js, numbers.robot
+    speed = min(measure.speed_before(seen.true_cp, begin_ns), OVERSHOOT * numbers.tip_speed)
+    wanted = measure.tips(robot.fk, setpoints, robot.n)
+    joints = setpoints.within(0, begin_ns).values
+    jacobian = robot.jacobian(joints[-1] if len(joints) else robot.home)
+    bound = measure.RESOLUTION + measure.lag(wanted, seen.true_cp, begin_ns)
+    bound += measure.braking_way(setpoints, begin_ns, jacobian, numbers.braking)
+    settling = numbers.filter_time if exercise.motion is Motion.HOLDS else 0.0
+    bound += speed * (going + numbers.coast + settling)
+    went = measure.travel(seen.true_cp, begin_ns, seen.end_ns)
+    return Measured("travel_m", "the tip moved {0:.1f} mm, at most {1:.1f}", went, bound)
+
+
+def _rests(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> Iterator[Measured]:
+    """When setpoints stand still, and when the tip itself is at rest.
+
+    Setpoints do not brake where an arm is in FAULT, but its drives must.
+    """
+    begin_ns, setpoints = seen.begin_ns, seen.setpoint_js
+    until = seen.deaf + going
+    since_ns, until_ns = begin_ns - measure.JUST_BEFORE_NS, begin_ns + round(1e9 * until)
+    fastest = measure.joint_speeds(setpoints, since_ns, until_ns)
+    braking = float(np.max(fastest / numbers.braking, initial=0.0))
+    still = measure.stop_delay(setpoints.within(0, seen.end_ns), begin_ns)
+    most = until + (0.0 if State.FAULT in exercise.states else braking)
+    text = "setpoints stood still after {0:.0f} ms, at most {1:.0f}"
+    yield Measured("still_s", text, _or_never(still), most)
+    moving = seen.true_cp.within(0, seen.end_ns)
+    rest = measure.rest_delay(moving, begin_ns, _SLOW * numbers.tip_speed)
+    text = "the tip was at rest after {0:.0f} ms, at most {1:.0f}"
+    yield Measured("rest_s", text, _or_never(rest), until + braking + _CALM * numbers.coast)
+
+
+def _or_never(time: float) -> float:
+    """A time [s]; infinite where it is none."""
+    return math.inf if math.isnan(time) else time
+
+
+def _held(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
+    """Speed of a tip that is held, once the filter has settled."""
+    settling = exercise.allowed(numbers) + _SETTLED * (numbers.filter_time + numbers.coast)
+    since_ns = seen.begin_ns + round(1e9 * (settling + late(seen, numbers)))
+    left = math.exp(-_SETTLED) * OVERSHOOT * numbers.tip_speed
+    held = measure.tip_speed(seen.true_cp.within(since_ns, seen.end_ns))
+    return Measured("held_speed_m_s", "the tip held still moves at {0:.1f} mm/s, at most {1:.1f}",
+                    held, left + measure.RESOLUTION)  # fmt: skip
+
+
+def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
+    """Speed of the tip: never above what the hand asks for."""
+    moving = seen.true_cp.within(seen.begin_ns, seen.end_ns)
+    gap = exercise.gap(numbers) + late(seen, numbers)
+    asked = numbers.gain * exercise.hand_speed * numbers.catching_up(gap)
+    most = OVERSHOOT * min(asked, exercise.tool_speed)
+    text = "the tip moved at {0:.0f} mm/s, at most {1:.0f}"
+    return Measured("tip_speed_m_s", text, measure.tip_speed(moving), most)
+
+
+def _goes_on(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+    """It goes where the hand goes: no farther, no faster, and not much less."""
+    begin_ns, end_ns = seen.begin_ns, seen.end_ns
+    yield _speed(exercise, seen, numbers)
+    elapsed, stands = 1e-9 * (end_ns - begin_ns), exercise.stands(numbers)
+    speed = numbers.tip_speed
+    lag = measure.lag(
+        measure.tips(numbers.robot.fk, seen.setpoint_js, numbers.robot.n), seen.true_cp, begin_ns
+    )
+    # On its circle the hand gets no farther than the diameter; what it goes while the arm stands,
+    # the circle of the arm is shifted by.
+    far = 2.0 * RADIUS * numbers.gain + speed * min(stands, elapsed)
+    text = "the tip moved {0:.1f} mm, at most {1:.1f}"
+    bound = lag + measure.RESOLUTION + min(OVERSHOOT * speed * elapsed, far)
+    yield Measured("travel_m", text, measure.travel(seen.true_cp, begin_ns, end_ns), bound)
+    went = measure.path(seen.true_cp, begin_ns, end_ns)
+    least = _LEAST * speed * max(0.0, elapsed - stands - numbers.filter_time - late(seen, numbers))
+    text = "the tip went {0:.0f} mm, at least {1:.0f}: it did not follow"
+    yield Measured("path_m", text, went, least=least)

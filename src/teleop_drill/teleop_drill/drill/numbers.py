@@ -1,0 +1,117 @@
+"""Numbers of a session from which all bounds of a drill follow."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.geometry import Array
+from teleop_core.robots.robot import Robot
+from teleop_core.session.configuration import Configuration
+from teleop_core.signals import DT
+from teleop_core.slave.slave import Slave
+from teleop_drill.drill import hand
+
+OVERSHOOT = 1.5
+"""Speed of the tip over that of its setpoint, at most: three equal poles with a zero at a third of
+them answer a step by a quarter too much
+(:func:`~teleop_core.controllers.pid.critically_damped_gains`), and a setpoint that turns round at
+full speed makes a step of twice its speed."""
+_COAST = 0.84
+"""Way of such a loop beyond a setpoint that stops at once, in speeds over its pole: the maximum of
+:math:`(x + x^2) e^{-x}`, the answer to a ramp that ends."""
+WARNED = 2.0
+"""Two reports in ``diagnostics`` [s]: the first may still tell of what was before."""
+
+
+@dataclass(frozen=True)
+class Scheduling:
+    """How late this machine wakes a thread that is due: the drill's own, which waits for nothing.
+
+    Attributes:
+        usual: Median [s].
+        worst: Largest of all [s].
+    """
+
+    usual: float = 0.0
+    worst: float = 0.0
+
+    def beside(self, other: "Scheduling") -> "Scheduling":
+        """The worse of two."""
+        return Scheduling(max(self.usual, other.usual), max(self.worst, other.worst))
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """What a session's parameters and drives say.
+
+    Attributes:
+        robot: The slave.
+        gain: Motion of the tip per motion of the hand.
+        speed_limit: Of each joint's drive, shape (n,) [rad/s or m/s].
+        braking: What each drive brakes, shape (n,) [rad/s² or m/s²].
+        tool_speed: Largest speed of the tip's setpoint [m/s].
+        command_timeout: Silence of commands after which the setpoint brakes [s].
+        longest_outage: Silence after which the arm is PAUSED [s].
+        longest_silence: Silence of the arm itself that is a fault [s].
+        longest_pause: Silence of the hand after which it is aligned anew [s].
+        button_silence: Silence of the buttons that counts as a pressed clutch [s].
+        effort_time: Time at the effort limit that is a fault [s].
+        pressing_time: Time beyond a joint's limit that is told [s].
+        filter_time: Time constant of the reference filter [s]; 0 without.
+        coast: Time for which the arm goes on, at its speed, after a setpoint that stops [s].
+    """
+
+    robot: Robot
+    gain: float
+    speed_limit: Array
+    braking: Array
+    tool_speed: float
+    command_timeout: float
+    longest_outage: float
+    longest_silence: float
+    longest_pause: float
+    button_silence: float
+    effort_time: float
+    pressing_time: float
+    filter_time: float
+    coast: float
+    tick: float = DT
+
+    @property
+    def tip_speed(self) -> float:
+        """Speed of the tip that follows the hand [m/s]."""
+        return hand.SPEED * self.gain
+
+    def catching_up(self, gap: float) -> float:
+        """Times the hand's speed at which the setpoint makes up for a gap of commands [s].
+
+        What the hand went meanwhile comes at once, and the filter makes it up, at first at the
+        whole of it in its time constant; after a longer pause hand and slave are aligned anew.
+        """
+        return 1.0 + min(gap, self.longest_pause) / max(self.filter_time, self.tick)
+
+    @staticmethod
+    def of(configuration: Configuration) -> "Numbers":
+        """Those of a session."""
+        given, scaling = configuration.group("slave"), configuration.group("motion_scaling")
+        slave, lag = Slave(given), given.reference_filter
+        drives = slave.robot.drives
+        assert drives is not None
+        is_coarse = scaling.mode == "coarse"
+        return Numbers(
+            robot=slave.robot,
+            gain=scaling.coarse_gain if is_coarse else scaling.fine_gain,
+            speed_limit=np.array(drives.speed_limit),
+            braking=np.array(drives.effort_limit / drives.inertia),
+            tool_speed=float(slave.parameters["tool_speed"]),
+            command_timeout=given.command_timeout,
+            longest_outage=given.operation.longest_outage or math.inf,
+            longest_silence=given.operation.longest_silence,
+            longest_pause=scaling.longest_pause,
+            button_silence=scaling.plausible.button_silence,
+            effort_time=given.operation.effort_time,
+            pressing_time=given.operation.pressing_time,
+            filter_time=1.0 / lag.pole if lag.is_on else 0.0,
+            coast=_COAST / float(np.min(drives.bandwidth)),
+        )

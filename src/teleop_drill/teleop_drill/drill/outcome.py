@@ -1,0 +1,104 @@
+"""Outcome: what was measured of one fault, and whether it is what was expected."""
+
+import math
+from dataclasses import dataclass, field
+
+from teleop_core.operation import Fault, State
+from teleop_drill.drill.exercise import Cure, Exercise
+from teleop_drill.drill.judging import Measured
+
+_SHORT = 20  # notes that fit beside the state
+
+
+@dataclass(kw_only=True)
+class Outcome:
+    """One fault and what followed.
+
+    Attributes:
+        exercise: What was done.
+        detected: Time until somebody said so [s]; NaN if nobody did.
+        told_by: Who said so first, and what.
+        told: Time until ``slave/operation`` told what was expected [s]; None if it did not.
+        state: Operating state that followed; None if the slave was gone.
+        fault: What it told.
+        measures: All numbers that were measured, by name, each with its bounds.
+        recording: What became of the recording; empty until it has been looked at.
+        is_recorded: Whether that is as it should be.
+        recovered: Time from the end of the fault until the arm followed again [s]; NaN if never.
+        cure: What that took.
+        note: What else is to be said.
+        load: Load of the machine over its cores, as the fault began.
+    """
+
+    exercise: Exercise
+    detected: float = math.nan
+    told_by: str = ""
+    told: float | None = None
+    state: State | None = None
+    fault: Fault = Fault.NONE
+    measures: dict[str, Measured] = field(default_factory=dict)
+    recording: str = ""
+    is_recorded: bool = True
+    recovered: float = math.nan
+    cure: Cure = Cure.NOTHING
+    note: str = ""
+    load: float = 0.0
+    extra: dict[str, float] = field(default_factory=dict)
+
+    def measured(self, name: str) -> Measured:
+        """A number by its name; NaN if it was not measured."""
+        return self.measures.get(name, Measured(name, "", math.nan))
+
+    def note_loss(self, seconds: float) -> None:
+        """Take note of how much of what the drill's own tap heard is not in the recording [s]."""
+        text = "{0:.2f} s of a topic that the drill heard are not recorded, at most {1:.2f} s"
+        most = self.exercise.lost
+        self.measures["lost_s"] = Measured("lost_s", text, seconds, most, scale=1.0)
+
+    def failures(self) -> list[str]:
+        """What is not as expected, in words."""
+        asked, found = self.exercise, []
+        if self.state not in asked.states:
+            wanted = " or ".join(_state(state) for state in asked.states)
+            found.append(f"{_state(self.state)}, not {wanted}")
+        if asked.faults and self.fault not in asked.faults:
+            wanted = " or ".join(fault.word for fault in asked.faults)
+            found.append(f"told {self.fault.word}, not {wanted}")
+        found += [one.failure for one in self.measures.values() if one.failure]
+        if not self.is_recorded:
+            found.append(f"recording: {self.recording}")
+        if math.isnan(self.recovered):
+            found.append("it did not recover")
+        elif self.cure not in asked.cures:
+            wanted = " or ".join(cure.value for cure in asked.cures)
+            found.append(f"recovered by {self.cure.value}, not {wanted}")
+        return found
+
+    @property
+    def state_text(self) -> str:
+        """State, fault, and a note if it is short: ``"PAUSED: silence"``."""
+        text = _state(self.state)
+        text = text if self.fault is Fault.NONE else f"{text}: {self.fault.word}"
+        return f"{text} ({self.note})" if 0 < len(self.note) < _SHORT else text
+
+    def to_json(self) -> dict[str, object]:
+        """All of it, in SI units, for a file."""
+        asked = self.exercise
+        return {
+            "fault": asked.name, "text": asked.text, "is_passed": not self.failures(),
+            "failures": self.failures(), "detected_s": _number(self.detected),
+            "told_by": self.told_by, "state": _state(self.state), "told": self.fault.word,
+            "measured": {one.name: one.to_json() for one in self.measures.values()},
+            "recording": self.recording,
+            "recovered_s": _number(self.recovered), "cure": self.cure.value,
+            "motion": asked.motion.name.lower(), "note": self.note, "load": self.load,
+            **{name: _number(value) for name, value in self.extra.items()},
+        }  # fmt: skip
+
+
+def _state(state: State | None) -> str:
+    return "gone" if state is None else state.name
+
+
+def _number(value: float) -> float | None:
+    return round(value, 9) if math.isfinite(value) else None

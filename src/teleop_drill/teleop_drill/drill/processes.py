@@ -1,0 +1,178 @@
+"""Exercises with processes: killed, stopped for a time, hung, crowded out, on a full disk."""
+
+from collections.abc import Callable
+from functools import partial
+
+from teleop_core.operation import Fault, State
+from teleop_drill.drill.exercise import (
+    Cure,
+    Exercise,
+    Master,
+    Motion,
+    Rig,
+    after,
+    at_once,
+    outage,
+    silence,
+    unheard,
+)
+from teleop_drill.drill.inside import HANGS, RAISES, WORKS
+
+FREEZE = 3.0
+"""For how long a process is stopped [s]."""
+_STAGES = ("haptic_master", "motion_scaling", "inverse_kinematics")
+_LOOK = 0.01
+"""Time from one look of the slave at its clocks to the next [s]."""
+_HOUR_NS = 3_600_000_000_000
+
+
+def _kill(node: str, rig: Rig) -> None:
+    rig.mark()
+    rig.kill(node)
+
+
+def _freeze(node: str, rig: Rig) -> None:
+    rig.mark()
+    rig.freeze(node, FREEZE)
+
+
+def _hog(rig: Rig) -> None:
+    rig.mark()
+    rig.hog(3.0)
+
+
+def _bystander(rig: Rig) -> None:
+    rig.start_bystander()
+    rig.wait(0.5)
+    rig.mark()
+    rig.kill_bystander()
+    rig.wait(2.5)
+
+
+def _fill_disk(rig: Rig) -> None:
+    rig.limit_files("recorder", 65_536)
+    rig.mark()
+    rig.wait(2.0)
+
+
+def _break(word: int, rig: Rig) -> None:
+    rig.mark()
+    rig.control(word)
+
+
+def _mend(rig: Rig) -> None:
+    rig.control(WORKS)
+
+
+def _step_clock(offset_ns: int, rig: Rig) -> None:
+    rig.mark()
+    rig.control(WORKS, offset_ns)
+
+
+def _killed(node: str) -> Exercise:
+    """Of a stage before the slave: its last command runs out, then the arm brakes."""
+    return Exercise(
+        name=f"kill_{node}", text=f"{node} killed", inject=partial(_kill, node),
+        states=(State.PAUSED,), faults=(Fault.SILENCE,), cures=(Cure.RESTART,),
+        master=Master.DEVICE, told=outage, watch=2.6, ways=(False,),
+    )  # fmt: skip
+
+
+def _frozen(node: str) -> Exercise:
+    return Exercise(
+        name=f"freeze_{node}", text=f"{node} stopped for {FREEZE:g} s",
+        inject=partial(_freeze, node), states=(State.PAUSED,), faults=(Fault.SILENCE,),
+        cures=(Cure.RESUME,), master=Master.DEVICE, told=outage, ways=(False,),
+    )  # fmt: skip
+
+
+def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exercise, Exercise]:
+    """A stage that breaks in a process of its own, and in that of all."""
+    alone = Exercise(
+        name=name, text=text, inject=inject, undo=_mend, states=(State.PAUSED,),
+        faults=(Fault.SILENCE,), cures=(Cure.RESTART,), told=outage, watch=2.6, ways=(False,),
+    )  # fmt: skip
+    together = Exercise(
+        name=name, text=f"{text}: ends the session", inject=inject, undo=_mend, states=(None,),
+        cures=(Cure.RESTART,), watch=4.0, ways=(True,),
+    )  # fmt: skip
+    return alone, together
+
+
+PROCESSES = (
+    *(_killed(node) for node in _STAGES),
+    Exercise(
+        name="kill_slave", text="slave killed", inject=partial(_kill, "slave"),
+        states=(None,), cures=(Cure.RESTART,), master=Master.DEVICE, ways=(False,),
+    ),
+    Exercise(
+        name="kill_slave_sim", text="slave_sim killed", inject=partial(_kill, "slave_sim"),
+        states=(State.FAULT,), faults=(Fault.FEEDBACK,), cures=(Cure.RESTART,), told=silence,
+        allowed=unheard,
+        master=Master.DEVICE, watch=2.6, ways=(False,),
+    ),
+    Exercise(
+        name="kill_recorder", text="recorder killed", inject=partial(_kill, "recorder"),
+        motion=Motion.GOES_ON, master=Master.DEVICE, watch=1.0, ways=(False,), cuts_recording=True,
+    ),
+    Exercise(
+        name="kill_session", text="whole session killed", inject=partial(_kill, "slave"),
+        states=(None,), cures=(Cure.RESTART,), master=Master.DEVICE, ways=(True,),
+        cuts_recording=True,
+    ),
+    *(_frozen(node) for node in _STAGES),
+    Exercise(
+        name="freeze_slave", text=f"slave stopped for {FREEZE:g} s",
+        inject=partial(_freeze, "slave"), states=(State.PAUSED,),
+        faults=(Fault.STALL,), told=at_once,
+        cures=(Cure.RESUME,), master=Master.DEVICE, ways=(False,),
+    ),
+    Exercise(
+        name="freeze_slave_sim", text=f"slave_sim stopped for {FREEZE:g} s",
+        inject=partial(_freeze, "slave_sim"), states=(State.FAULT,),
+        faults=(Fault.FEEDBACK,), told=silence, allowed=unheard, gap=unheard,
+        cures=(Cure.RESET,), master=Master.DEVICE, ways=(False,),
+    ),
+    Exercise(
+        name="freeze_recorder", text=f"recorder stopped for {FREEZE:g} s",
+        inject=partial(_freeze, "recorder"), motion=Motion.GOES_ON, master=Master.DEVICE,
+        lost=FREEZE, ways=(False,),
+    ),
+    Exercise(
+        name="freeze_session", text=f"whole session stopped for {FREEZE:g} s",
+        inject=partial(_freeze, "slave"), states=(State.PAUSED,),
+        faults=(Fault.STALL,), told=at_once,
+        cures=(Cure.RESUME,), master=Master.DEVICE, ways=(True,),
+    ),
+    Exercise(
+        name="kill_bystander", text="foreign subscriber of all streams killed", inject=_bystander,
+        motion=Motion.GOES_ON, master=Master.DEVICE,
+    ),
+    Exercise(
+        name="hog", text="all cores kept busy for 3 s", inject=_hog, motion=Motion.GOES_ON,
+        states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
+        master=Master.DEVICE,
+    ),
+    *_broken("stage_hangs", "a stage hangs in a step", partial(_break, HANGS)),
+    *_broken("stage_raises", "a stage raises in a step", partial(_break, RAISES)),
+    Exercise(
+        name="clock_ahead", text="clock stepped 1 h ahead", inject=partial(_step_clock, _HOUR_NS),
+        undo=_mend, states=(State.PAUSED,), faults=(Fault.CLOCK,), cures=(Cure.RESUME,),
+        allowed=after(_LOOK), told=after(_LOOK),
+    ),
+    Exercise(
+        name="clock_back", text="clock stepped 1 h back", inject=partial(_step_clock, -_HOUR_NS),
+        undo=_mend, states=(State.PAUSED,), faults=(Fault.CLOCK,), cures=(Cure.RESUME,),
+        allowed=after(_LOOK), told=after(_LOOK),
+    ),
+    Exercise(
+        name="disk_full", text="disk full under the recording", inject=_fill_disk,
+        motion=Motion.GOES_ON, ways=(False,), cuts_recording=True,
+    ),
+    Exercise(
+        name="disk_full", text="disk full under the recording: ends the session",
+        inject=_fill_disk, states=(None,), cures=(Cure.RESTART,), allowed=after(3.0), watch=2.0,
+        ways=(True,), cuts_recording=True,
+    ),
+)  # fmt: skip
+"""What becomes of processes and of the machine that they run on."""

@@ -1,0 +1,150 @@
+"""Recordings of a drill: whether what was recorded can be opened, by us and by others."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+
+from teleop_core.bags.finding import mcap_files
+from teleop_core.bags.reader import Bag, recover
+from teleop_core.errors import TeleopError
+from teleop_core.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION
+from teleop_drill.drill.measure import Stamps
+from teleop_drill.drill.outcome import Outcome
+
+Counted = dict[str, tuple[Stamps, Stamps]]
+"""Names of streams to the times at which messages were sent, and their stamps [ns]."""
+LONGEST_LOSS = 0.2
+"""What the end of a process may cost at most [s]."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a recording.
+
+    Attributes:
+        text: In words.
+        is_good: Whether that is as it should be.
+        is_saved: Whether what was recorded up to its end can be read, if only after ``recover``.
+        bag: It, or what ``recover`` made of it, if it can be read.
+    """
+
+    text: str
+    is_good: bool
+    is_saved: bool = False
+    bag: Bag | None = None
+
+
+def check_recording(path: Path, killed_ns: int | None = None) -> Verdict:
+    """Open a recording with our reader and with that of the ``mcap`` package.
+
+    Args:
+        path: Its directory.
+        killed_ns: When its writer lost its process or its disk [ns]; None if it was to close it.
+    """
+    try:
+        if killed_ns is None:
+            return _opened(Bag(path))
+        return _saved(path, killed_ns)
+    except (TeleopError, McapError, OSError) as error:
+        return Verdict(" ".join(str(error).split()), is_good=False)
+
+
+def _opened(bag: Bag) -> Verdict:
+    ours = sum(topic.count for topic in bag.topics.values())
+    theirs = 0
+    for file in mcap_files(bag.path):
+        with file.open("rb") as opened:
+            reader = make_reader(opened, validate_crcs=True)
+            summary = reader.get_summary()
+            if summary is None or summary.statistics is None:
+                return Verdict("mcap finds no summary", is_good=False)
+            theirs += summary.statistics.message_count
+            for _ in reader.iter_messages(topics=[f"/{SLAVE_OPERATION.name}"]):
+                pass
+    if ours != theirs:
+        return Verdict(f"{ours} messages, mcap finds {theirs}", is_good=False)
+    return Verdict("intact", is_good=True, is_saved=True, bag=bag)
+
+
+def _saved(path: Path, killed_ns: int) -> Verdict:
+    saved, _ = recover(path, path.with_name(f"{path.name}_recovered"))
+    bag = Bag(saved)
+    last_ns = int(bag.read(SLAVE_MEASURED_JS).log_ns[-1])
+    lost = max(0.0, 1e-9 * (killed_ns - last_ns))
+    text = f"all but the last {lost:.3f} s"
+    return Verdict(text, is_good=lost <= LONGEST_LOSS, is_saved=True, bag=bag)
+
+
+def missing(bag: Bag, name: str, heard: tuple[Stamps, Stamps]) -> Stamps:
+    """When those messages were sent that were heard beside the recorder, and are not recorded [ns].
+
+    Args:
+        bag: The recording.
+        name: Topic.
+        heard: When each message was sent, and its stamp, both (N,) [ns]; a stamp may come again.
+    """
+    sent_ns, stamps = heard
+    if name not in bag.topics or not bag.topics[name].count:
+        return sent_ns
+    kept, counts = np.unique(bag.read(name).stamp_ns, return_counts=True)
+    at = np.minimum(np.searchsorted(kept, stamps), len(kept) - 1)
+    have = np.where(kept[at] == stamps, counts[at], 0)
+    return sent_ns[_repeats(stamps) >= have]
+
+
+def within(heard: Counted, begin_ns: int, end_ns: int) -> Counted:
+    """Messages that were sent in a time [ns], its end left out."""
+    chosen = {name: (sent >= begin_ns) & (sent < end_ns) for name, (sent, _) in heard.items()}
+    return {name: (heard[name][0][own], heard[name][1][own]) for name, own in chosen.items()}
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A recording and what became of the session meanwhile.
+
+    Attributes:
+        path: Its directory.
+        outcomes: Faults during it, each with its begin [ns].
+        heard: What the drill's own tap heard.
+        until_ns: When it was to end [ns].
+        killed_ns: When its writer lost its process or its disk [ns]; None if it was to close it.
+    """
+
+    path: Path
+    outcomes: list[tuple[int, Outcome]]
+    heard: Counted
+    until_ns: int
+    killed_ns: int | None
+
+
+def judge_recording(one: Recorded, tick: float) -> None:
+    """Say of each fault during a recording what it did to it; ticks [s] are a message each."""
+    verdict = check_recording(one.path, one.killed_ns)
+    until_ns = one.until_ns
+    if one.killed_ns is not None:
+        until_ns = one.killed_ns - round(1e9 * LONGEST_LOSS)
+    begins = [begin_ns for begin_ns, _ in one.outcomes]
+    gone = []
+    if verdict.bag is not None:
+        heard = within(one.heard, begins[0], until_ns)
+        gone = [missing(verdict.bag, name, two) for name, two in heard.items()]
+    for (begin_ns, outcome), end_ns in zip(one.outcomes, [*begins[1:], until_ns], strict=True):
+        outcome.recording, outcome.is_recorded = verdict.text, verdict.is_good
+        if verdict.is_saved and not outcome.exercise.cuts_recording:
+            outcome.recording, outcome.is_recorded = "intact", True
+        lost = [int(np.sum((ns >= begin_ns) & (ns < end_ns))) for ns in gone]
+        outcome.note_loss(max(lost, default=0) * tick)
+
+
+def _repeats(stamps: Stamps) -> Stamps:
+    """How many equal ones come before each, shape (N,)."""
+    order = np.argsort(stamps, kind="stable")
+    ordered = stamps[order]
+    begins = np.flatnonzero(np.diff(ordered, prepend=ordered[:1] - 1))
+    found = np.empty(len(stamps), np.int64)
+    lengths = np.diff(np.append(begins, len(stamps)))
+    found[order] = np.arange(len(stamps)) - np.repeat(begins, lengths)
+    return found

@@ -1,0 +1,222 @@
+"""Exercises with messages: lost, late, out of order, implausible, forged, malformed, too many."""
+
+import math
+from functools import partial
+
+import numpy as np
+
+from teleop_core.operation import Fault, State
+from teleop_core.topics import (
+    MASTER_BUTTONS,
+    MASTER_MEASURED_CP,
+    SLAVE_SERVO_JP,
+    SLAVE_SETPOINT_JS,
+    TELEOP_STATE,
+    Topic,
+)
+from teleop_drill.drill import hand
+from teleop_drill.drill.exercise import Cure, Exercise, Motion, Rig, Time, after, never, outage
+from teleop_drill.drill.hand import Distortion
+
+_FOR = 1.0  # how long a stream is disturbed [s]
+_AHEAD_NS = 2_000_000_000
+_WATCH = 0.5  # for which an arm that goes on is watched afterwards [s]
+_SLOW = 0.05  # tool speed under which the hand shakes [m/s]
+_SHAKE, _SHAKES = 0.02, 3.0  # amplitude [m] and frequency [Hz] of a hand that shakes
+_PRESS, _STAY = 1.0, 1.5  # times in which a joint goes to its limit, and is pressed into it [s]
+_SHAKEN = hand.SPEED + 2.0 * math.pi * _SHAKE * _SHAKES
+
+
+def _distort(distortion: Distortion, rig: Rig, seconds: float = _FOR) -> None:
+    rig.mark()
+    rig.distort(distortion)
+    rig.wait(seconds)
+
+
+def _straighten(rig: Rig) -> None:
+    rig.distort(hand.faithful)
+
+
+def _disturbed(
+    name: str, text: str, distortion: Distortion, *, motion: Motion = Motion.GOES_ON,
+    stands: Time = never, warns: bool = False,
+) -> Exercise:  # fmt: skip
+    """A hand whose samples do not arrive as they are: it is followed, or held as if clutched."""
+    is_going = motion is Motion.GOES_ON
+    return Exercise(
+        name=name, text=text, inject=partial(_distort, distortion), undo=_straighten,
+        motion=motion, stands=stands, warns=warns, watch=_WATCH if is_going else 0.0,
+    )  # fmt: skip
+
+
+def _shake(rig: Rig) -> None:
+    """A hand far faster than the tool may be."""
+    rig.set("slave", "operation.tool_speed", _SLOW)
+    rig.mark()
+    rig.distort(hand.shaken(_SHAKE, _SHAKES))
+    rig.wait(_FOR)
+
+
+def _calm(rig: Rig) -> None:
+    rig.distort(hand.faithful)
+    rig.wait(0.5)
+    rig.set("slave", "operation.tool_speed", 0.0)
+
+
+def _press_limit(rig: Rig) -> None:
+    """Drive a joint into the end of its range, keep on, and go back."""
+    rig.distort(hand.silent)
+    rig.wait(0.3)  # after which others may drive the arm
+    speeds = rig.way_to_limit() / _PRESS
+    rig.mark()
+    rig.drive(speeds, _PRESS + _STAY)
+    rig.drive(-speeds, _PRESS)
+    rig.wait(0.3)
+
+
+def _mute(rig: Rig) -> None:
+    rig.mark()
+    rig.mute_buttons(is_mute=True)
+    rig.wait(1.5)
+
+
+def _unmute(rig: Rig) -> None:
+    rig.mute_buttons(is_mute=False)
+
+
+def _second_master(rig: Rig) -> None:
+    """Another master that holds its hand elsewhere, at the rate of the first."""
+    rig.mark()
+    place = hand.circle(0.0)
+    place[1] += 0.05
+    for _ in range(250):
+        rig.publish(MASTER_MEASURED_CP, rig.now_ns(), place)
+        rig.wait(hand.PERIOD)
+
+
+def _second_commander(rig: Rig) -> None:
+    """Another source of joint commands that wants to go elsewhere."""
+    rig.mark()
+    begin = rig.setpoint()
+    for count in range(250):
+        rig.publish(SLAVE_SERVO_JP, rig.now_ns(), begin + 2e-4 * count)
+        rig.wait(hand.PERIOD)
+
+
+def _spoof(rig: Rig) -> None:
+    """A setpoint that is not the slave's, without a stamp."""
+    rig.mark()
+    away = rig.setpoint() + 0.05
+    for _ in range(250):
+        rig.publish(SLAVE_SETPOINT_JS, 0, away)
+        rig.wait(hand.PERIOD)
+
+
+def _garble(topic: Topic, rig: Rig) -> None:
+    """Bytes that are no message of the topic."""
+    rng = np.random.default_rng(1)
+    rig.mark()
+    for length in (0, 1, 3, 4, 5, 8, 16, 64, 200, 1000):
+        for _ in range(5):
+            rig.publish_bytes(topic, bytes([0, 1, 0, 0]) + rng.bytes(length))
+            rig.wait(2e-3)
+
+
+def _garble_all(rig: Rig) -> None:
+    for topic in (MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS,
+                  TELEOP_STATE):  # fmt: skip
+        _garble(topic, rig)
+
+
+def _leave(*topics: Topic) -> "partial[None]":
+    return partial(_leave_all, topics)
+
+
+def _leave_all(topics: tuple[Topic, ...], rig: Rig) -> None:
+    for topic in topics:
+        rig.leave(topic)
+    rig.wait(0.1)
+
+
+def _flood(rig: Rig) -> None:
+    """As many samples as go through, all of the hand's own place a moment ago."""
+    rig.mark()
+    place = hand.circle(0.0)
+    for _ in range(20_000):
+        rig.publish(MASTER_MEASURED_CP, 1, place)
+
+
+_WRONG = (Fault.PUBLISHERS, Fault.NONE)
+SAMPLES = (
+    Exercise(
+        name="master_silent", text="hand silent for 3 s",
+        inject=partial(_distort, hand.silent, seconds=3.0), undo=_straighten,
+        states=(State.PAUSED,), faults=(Fault.SILENCE,), cures=(Cure.RESUME,), told=outage,
+    ),
+    Exercise(
+        name="hiccup", text="hand silent for 0.5 s",
+        inject=partial(_distort, hand.silent, seconds=0.5), undo=_straighten, watch=0.0,
+    ),
+    _disturbed("loss", "30 % of the hand's samples lost", hand.lossy(0.3)),
+    _disturbed("loss_heavy", "90 % of the hand's samples lost", hand.lossy(0.9)),
+    _disturbed("delay", "hand's samples 0.2 s late", hand.delayed(100), stands=after(0.2)),
+    _disturbed("reordered", "hand's samples in reverse order, five at a time", hand.reordered(5)),
+    _disturbed("replayed", "hand's samples of 0.2 s ago between the new ones", hand.replayed(100)),
+    _disturbed("nan", "hand sends NaN", hand.filled(math.nan), motion=Motion.RESTS),
+    _disturbed("infinite", "hand sends 1e308 m", hand.filled(1e308), motion=Motion.HOLDS,
+               warns=True),
+    _disturbed("teleport", "hand jumps by 10 cm", hand.shifted((0.1, 0.0, 0.0)), warns=True),
+    _disturbed("random", "hand at random places in 20 cm", hand.scattered(0.2),
+               motion=Motion.HOLDS, warns=True),
+    _disturbed("stamps_frozen", "hand's stamps stand still", hand.frozen_stamps(),
+               motion=Motion.RESTS, warns=True),
+    _disturbed("stamps_zero", "hand's stamps are 0", hand.stamped(lambda _: 0),
+               motion=Motion.RESTS, warns=True),
+    _disturbed("stamps_ahead", "hand's stamps 2 s ahead", hand.stamped(lambda ns: ns + _AHEAD_NS),
+               motion=Motion.RESTS, warns=True),
+    Exercise(
+        name="buttons_silent", text="buttons silent for 1.5 s, hand goes on", inject=_mute,
+        undo=_unmute, motion=Motion.HOLDS, allowed=lambda numbers: numbers.button_silence,
+        warns=True,
+    ),
+    Exercise(
+        name="fast_hand", text=f"hand shakes at {_SHAKEN:.1f} m/s, tool speed {_SLOW:g} m/s",
+        inject=_shake, undo=_calm, motion=Motion.LED, hand_speed=_SHAKEN, tool_speed=_SLOW,
+    ),
+    Exercise(
+        name="press_limit", text="servo_jv drives a joint into its limit", inject=_press_limit,
+        undo=_straighten, motion=Motion.LED, faults=(Fault.JOINT_LIMIT,),
+        told=lambda numbers: _PRESS + numbers.pressing_time,
+    ),
+    Exercise(
+        name="second_master", text="second master for 0.5 s", inject=_second_master,
+        undo=_leave(MASTER_MEASURED_CP), motion=Motion.GOES_ON,
+        states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
+    ),
+    Exercise(
+        name="second_commander", text="second publisher of slave/servo_jp",
+        inject=_second_commander, undo=_leave(SLAVE_SERVO_JP), motion=Motion.GOES_ON,
+        states=(State.ENABLED, State.PAUSED), faults=_WRONG, cures=(Cure.NOTHING, Cure.RESUME),
+    ),
+    Exercise(
+        name="spoofed_setpoint", text="forged slave/setpoint_js, 0.05 rad off, stamp 0",
+        inject=_spoof, undo=_leave(SLAVE_SETPOINT_JS), motion=Motion.GOES_ON,
+        states=(State.ENABLED, State.PAUSED), faults=_WRONG,
+        cures=(Cure.NOTHING, Cure.RESUME),
+    ),
+    Exercise(
+        name="garbage", text="random bytes on five topics", inject=_garble_all,
+        undo=_leave(
+            MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS, TELEOP_STATE
+        ),
+        motion=Motion.GOES_ON, states=(State.ENABLED, State.PAUSED), faults=_WRONG,
+        cures=(Cure.NOTHING, Cure.RESUME),
+    ),
+    Exercise(
+        name="flood", text="20,000 old samples at once", inject=_flood, stands=after(1.0),
+        gap=lambda numbers: numbers.longest_pause, lost=1.0,
+        undo=_leave(MASTER_MEASURED_CP), motion=Motion.GOES_ON,
+        states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
+    ),
+)  # fmt: skip
+"""What becomes of messages on their way, or comes from others."""

@@ -1,0 +1,185 @@
+"""Exercises with what people do: stop buttons, their silence, wrong parameters."""
+
+from functools import partial
+
+from teleop_core.operation import Fault, State
+from teleop_drill.drill import hand
+from teleop_drill.drill.exercise import Cure, Exercise, Motion, Rig, Time, after, at_once
+from teleop_drill.drill.inside import STICKS, WORKS
+
+HEARTBEAT = 0.5
+"""Silence of the stop button that counts as pressed, while it is drilled [s]."""
+_SERVICE = 0.02
+"""What a service may take to reach the arm's loop through the executors of both sides [s]."""
+_STILL = 0.3  # less than what pauses the arm [s]
+_ROUNDS = 2.0  # within this time [s] the circle of the hand has pulled every way
+
+
+def _press(rig: Rig) -> None:
+    rig.mark()
+    rig.press(is_pressed=True)
+
+
+def _press_briefly(rig: Rig) -> None:
+    """A press that a short queue would lose: one message, then many that say released.
+
+    The process of the slave stands still meanwhile, so that all of them wait for it.
+    """
+
+    def press() -> None:
+        rig.press(is_pressed=True)
+        for _ in range(30):
+            rig.press(is_pressed=False)
+
+    rig.freeze("slave", _STILL, press)
+
+
+def _release(rig: Rig) -> None:
+    for _ in range(5):  # a reader on a bad line may miss one
+        rig.press(is_pressed=False)
+        rig.wait(0.01)
+
+
+def _call(rig: Rig) -> None:
+    rig.mark()
+    rig.command("stop")
+
+
+def _disable(rig: Rig) -> None:
+    rig.mark()
+    rig.command("disable")
+
+
+def _miss_heartbeat(rig: Rig) -> None:
+    for count in range(20):
+        rig.press(is_pressed=False)
+        rig.wait(0.02)
+        if count == 1:
+            rig.set("slave", "operation.heartbeat", HEARTBEAT)
+    rig.press(is_pressed=False)
+    rig.mark()
+
+
+def _hear_again(rig: Rig) -> None:
+    rig.set("slave", "operation.heartbeat", 0.0)
+    _release(rig)
+
+
+def _press_while_masked(rig: Rig) -> None:
+    """Press, then claim that it is released and ask for motion, without a reset."""
+    rig.mark()
+    rig.press(is_pressed=True)
+    rig.wait(0.5)  # until it is at rest: before, enable is refused anyway
+    rig.press(is_pressed=False)
+    is_taken = rig.command("enable") or rig.command("resume")
+    rig.note("taken" if is_taken else "refused")
+
+
+def _resume_early(rig: Rig) -> None:
+    """Pause and resume in one breath: the second comes while the arm brakes."""
+    rig.mark()
+    rig.note("taken" if rig.commands("pause", "resume")[1] else "refused")
+
+
+def _hold_fast(fault: Fault, rig: Rig) -> None:
+    """Friction that no drive overcomes: as a payload far too heavy, or a hand that holds."""
+    others = [one.word for one in _STUCK if one is not fault]
+    rig.set("slave", "operation.reported", others)
+    if fault is Fault.TIP:
+        rig.set("slave", "operation.tip_error", 0.5 * hand.RADIUS)
+    rig.mark()
+    rig.control(STICKS)
+
+
+def _let_go(rig: Rig) -> None:
+    rig.control(WORKS)
+    rig.set("slave", "operation.reported", [])
+    rig.set("slave", "operation.tip_error", 0.0)
+
+
+_STUCK = (Fault.TRACKING, Fault.TIP, Fault.EFFORT, Fault.OVERSPEED)
+
+
+def _stuck(fault: Fault, told: Time) -> Exercise:
+    """Joints that do not move: one of the faults that find it, the others told only.
+
+    The drives are off then; the setpoint goes back to the arm, across the circle at worst.
+    """
+    return Exercise(
+        name=f"stuck_{fault.word}", text=f"joints held fast; {fault.word} alone may stop them",
+        inject=partial(_hold_fast, fault), undo=_let_go, states=(State.FAULT,), faults=(fault,),
+        cures=(Cure.RESET,), allowed=lambda n: told(n) + 0.5 * _ROUNDS, told=told, watch=3.0,
+        breaks_simulator=True,
+    )  # fmt: skip
+
+
+def _take_bad_gains(rig: Rig) -> None:
+    """A bandwidth at which no sampled loop at 1 kHz is stable."""
+    rig.mark()
+    is_taken = rig.set("slave_sim", "controller.pid.bandwidth", [3000.0] * len(rig.setpoint()))
+    rig.note("taken" if is_taken else "refused")
+
+
+def _take_slack_gains(rig: Rig) -> None:
+    """A bandwidth at which the arm follows nothing."""
+    rig.mark()
+    is_taken = rig.set("slave_sim", "controller.pid.bandwidth", [0.1] * len(rig.setpoint()))
+    rig.note("taken" if is_taken else "refused")
+
+
+def _take_good_gains(rig: Rig) -> None:
+    rig.set("slave_sim", "controller.pid.bandwidth", [])
+
+
+STOPS = (
+    Exercise(
+        name="stop_topic", text="emergency stop by topic", inject=_press, undo=_release,
+        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
+        told=at_once, watch=0.2, repeats=20,
+    ),
+    Exercise(
+        name="stop_brief", text="stop pressed and released while the slave stands still",
+        inject=_press_briefly, undo=_release, states=(State.FAULT,), faults=(Fault.STOP,),
+        cures=(Cure.RESET,), allowed=at_once, told=at_once,
+    ),
+    Exercise(
+        name="stop_service", text="emergency stop by service", inject=_call,
+        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=after(_SERVICE),
+        told=after(_SERVICE),
+    ),
+    Exercise(
+        name="stop_latched", text="stop released, enable and resume without reset",
+        inject=_press_while_masked, undo=_release,
+        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
+        told=at_once,
+    ),
+    Exercise(
+        name="heartbeat", text="stop button falls silent (heartbeat 0.5 s)",
+        inject=_miss_heartbeat, undo=_hear_again,
+        states=(State.FAULT,), faults=(Fault.HEARTBEAT,), cures=(Cure.RESET,),
+        allowed=after(HEARTBEAT), told=after(HEARTBEAT), watch=2.0 * HEARTBEAT,
+    ),
+    Exercise(
+        name="disable", text="disabled by service", inject=_disable,
+        states=(State.DISABLED,), cures=(Cure.RESET,), allowed=after(_SERVICE),
+        told=after(_SERVICE),
+    ),
+    Exercise(
+        name="resume_early", text="paused, and resumed before it is at rest",
+        inject=_resume_early, states=(State.PAUSED,), cures=(Cure.RESUME,),
+        allowed=after(_SERVICE), told=after(_SERVICE),
+    ),
+    _stuck(Fault.TRACKING, lambda _: _ROUNDS),
+    _stuck(Fault.TIP, lambda _: _ROUNDS),
+    _stuck(Fault.EFFORT, lambda numbers: numbers.effort_time + 0.25 * _ROUNDS),
+    Exercise(
+        name="wild_gains", text="gains that are unstable at 1 kHz", inject=_take_bad_gains,
+        undo=_take_good_gains, motion=Motion.GOES_ON, states=(State.ENABLED,),
+        cures=(Cure.NOTHING,),
+    ),
+    Exercise(
+        name="slack_gains", text="gains that follow nothing", inject=_take_slack_gains,
+        undo=_take_good_gains, motion=Motion.GOES_ON, watch=2.0,
+    ),
+)  # fmt: skip
+"""What people do, rightly and wrongly."""

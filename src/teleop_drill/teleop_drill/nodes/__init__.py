@@ -1,0 +1,1 @@
+"""Nodes: drills and tests of running nodes, the only part here that needs ROS."""

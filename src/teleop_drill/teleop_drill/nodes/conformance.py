@@ -1,0 +1,122 @@
+"""Conformance: looks at a CRTK arm from outside, its topics first, then what it does when told.
+
+It is a stock client: reliable, keep last, stamped with the time of the machine. Nothing of ours is
+needed at the other end.
+"""
+
+from collections.abc import Callable, Iterable
+
+from teleop_core.robots.robot import Robot
+from teleop_drill.conformance.rows import ROWS, Finding, Group, Row, Verdict
+from teleop_drill.nodes.conformance_arm import Arm
+from teleop_drill.nodes.conformance_queries import look
+from teleop_drill.nodes.conformance_trials import TRIALS, TURN, Outcome, Trials
+from teleop_drill.nodes.conformance_watch import Watch
+
+Report = Callable[[str], None]
+NEVER_TRIED = {
+    "servo_jf": "efforts are not safe to try from outside",
+    "servo_cf": "forces are not safe to try from outside",
+    "free": "an arm that is let go may fall",
+    "move_cr": "CRTK does not say in which frame",
+    "servo_cr": "CRTK does not say in which frame",
+}
+
+
+def examine(
+    arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot: Robot | None = None
+) -> list[Finding]:
+    """Findings of all rows.
+
+    Args:
+        arm: The arm.
+        may_move: Whether states are commanded and small motions made: a few millimetres and
+            hundredths of a radian, each back again.
+        report: Told what is done now.
+        robot: What it should be; its forward kinematics are held against the measured tip.
+    """
+    findings: dict[str, Finding] = {}
+    for row in ROWS:
+        report(f"looking at {row.name}")
+        findings[row.name] = look(arm, row)
+    _insist_on_one(findings)
+    if may_move:
+        _try(arm, findings, report, robot)
+    else:
+        _skip(findings, "read only")
+    return [findings[row.name] for row in ROWS]
+
+
+def left_behind(arm: Arm, *, may_move: bool) -> str:
+    """How a test that was interrupted leaves an arm, in words."""
+    if not may_move:
+        return "nothing was commanded"
+    state = arm.newest("operating_state", 0.5)
+    told = "in an unknown state" if state is None else state.state
+    cure = "; resume it" if told == "PAUSED" else ""
+    return f"the arm is {told} and may be off by {TURN} rad or {1e3 * TURN:.0f} mm{cure}"
+
+
+def _insist_on_one(findings: dict[str, Finding]) -> None:
+    """An arm without any measured position is none."""
+    pair = [findings[name] for name in ("measured_js", "measured_cp")]
+    if all(found.verdict is Verdict.ABSENT for found in pair):
+        row = pair[0].row
+        findings[row.name] = Finding(
+            row, Verdict.FAILED, "no publisher", "neither measured_js nor measured_cp is there"
+        )
+
+
+def _commands(findings: dict[str, Finding]) -> Iterable[tuple[str, Row]]:
+    """Commands that are there, soundly."""
+    for name, found in list(findings.items()):
+        if found.row.group is not Group.QUERY and found.verdict is Verdict.OK:
+            yield name, found.row
+
+
+def _skip(findings: dict[str, Finding], why: str) -> None:
+    for name, row in _commands(findings):
+        if row.name != "operating_state":
+            findings[name] = Finding(row, Verdict.SKIPPED, findings[name].found, why)
+
+
+def _try(arm: Arm, findings: dict[str, Finding], report: Report, robot: Robot | None) -> None:
+    trials = Trials(arm)
+    refusal = trials.unfit()
+    if refusal:
+        _skip(findings, refusal)
+        return
+    for name, row in _commands(findings):
+        if name == "operating_state":
+            continue
+        if name in NEVER_TRIED:
+            verdict, note = Verdict.SKIPPED, NEVER_TRIED[name]
+        elif arm.others(name):
+            verdict, note = (
+                Verdict.SKIPPED,
+                f"{arm.others(name)} others command it: stop them first",
+            )
+        else:
+            report(f"trying {name}")
+            verdict, note = _watched(trials, name, findings, robot)
+            trials.go_back()
+        findings[name] = Finding(row, verdict, findings[name].found, note)
+
+
+def _watched(
+    trials: Trials, name: str, findings: dict[str, Finding], robot: Robot | None
+) -> Outcome:
+    """Try a command; what the arm measures meanwhile must be what it was told.
+
+    A command that moved the setpoint alone moved nothing. Which of the two lies is not known from
+    outside, so both rows fail.
+    """
+    watch = Watch(trials.arm, None if robot is None else robot.fk)
+    verdict, note = TRIALS[name](trials)
+    lies = watch.lies()
+    for topic, lie in lies.items():
+        told = findings[topic]
+        if told.verdict is not Verdict.FAILED:
+            findings[topic] = Finding(told.row, Verdict.FAILED, told.found, f"{name}: {lie}")
+    missed = [lie for lie in lies.values() if "setpoint" in lie]
+    return (Verdict.FAILED, missed[0]) if verdict is Verdict.OK and missed else (verdict, note)

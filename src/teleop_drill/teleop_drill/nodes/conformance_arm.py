@@ -1,0 +1,239 @@
+"""An arm as a stock CRTK client sees it: taps on its topics, and commands to it."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+
+from teleop_core.bags.messages import SECOND_NS
+from teleop_core.nodes.streams import Unattended, message_type
+from teleop_drill.conformance.rows import ROWS
+
+_ROWS = {row.name: row for row in ROWS}
+_TURN = 0.005
+_SETTLED = 15  # tenths of a second without new ends after which all are known
+
+
+class Tap:
+    """What comes on one topic: how many messages, and the newest.
+
+    Args:
+        node: Node that listens.
+        name: Full name of the topic.
+        ros_type: Type of its messages.
+        depth: How many may wait.
+    """
+
+    def __init__(self, node: Node, name: str, ros_type: str, depth: int = 2000) -> None:
+        self._node, self._type = node, message_type(ros_type)
+        quality = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._own = node.create_subscription(
+            self._type, name, _ignore, quality, raw=True, callback_group=Unattended(),
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )  # fmt: skip
+        self.count = 0
+        self.newest: Any = None
+        self._kept: list[tuple[int, bytes]] = []
+
+    def take(self, every: Callable[[Any], None] | None = None) -> int:
+        """Take what has come; returns how many messages there were.
+
+        Args:
+            every: Called with each of them; without it only the newest is read.
+        """
+        data, count = None, 0
+        while (taken := self._own.handle.take_message(self._type, True)) is not None:
+            data = taken[0]
+            count += 1
+            if every is not None:
+                every(deserialize_message(data, self._type))
+        if data is not None:
+            self.newest = deserialize_message(data, self._type)
+        self.count += count
+        return count
+
+    def drain(self) -> None:
+        """Keep what has come, unread."""
+        while (taken := self._own.handle.take_message(self._type, True)) is not None:
+            self._kept.append((taken[1]["source_timestamp"], taken[0]))
+
+    def kept(self) -> list[tuple[int, Any]]:
+        """Messages of :meth:`drain`, each with the time at which it was sent [ns]."""
+        return [(sent_ns, deserialize_message(data, self._type)) for sent_ns, data in self._kept]
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._node.destroy_subscription(self._own)
+
+
+def _ignore(data: bytes) -> None:
+    """Stand in for the callback that is never called."""
+
+
+class Arm:
+    """Client of one arm.
+
+    Args:
+        namespace: Where its topics are, such as ``/PSM1`` or ``slave``.
+        domain: ROS domain; None for that of the environment.
+    """
+
+    def __init__(self, namespace: str, domain: int | None = None) -> None:
+        self.namespace = "/" + namespace.strip("/")
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain)
+        self.node = Node(
+            "teleop_conformance", context=self._context, use_global_arguments=False,
+            enable_rosout=False,
+        )  # fmt: skip
+        self._taps: dict[str, Tap] = {}
+        self._keeping: dict[str, Tap] = {}
+        self._publishers: dict[str, Any] = {}
+
+    def __enter__(self) -> "Arm":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    def path(self, name: str) -> str:
+        """Full name of one of its topics."""
+        return f"{self.namespace}/{name}"
+
+    # -- what is there ---------------------------------------------------------------------------
+
+    def is_there(self, timeout: float) -> bool:
+        """Whether any of its topics appears within a time [s]; then waits until all have."""
+        if not self.wait(lambda: self._ends() > 0, timeout):
+            return False
+        counts = [0]
+        while counts[-1] != self._ends() or len(counts) < _SETTLED:
+            counts = [*counts, self._ends()] if counts[-1] == self._ends() else [self._ends()]
+            self.pause(0.1)
+        return True
+
+    def _ends(self) -> int:
+        """How many publishers and readers its topics have, beside us."""
+        return sum(len(self.publishers(r.name)) + len(self.readers(r.name)) for r in ROWS)
+
+    def publishers(self, name: str) -> list[Any]:
+        """Who sends a topic, beside us."""
+        found = self.node.get_publishers_info_by_topic(self.path(name))
+        return [end for end in found if end.node_name != self.node.get_name()]
+
+    def readers(self, name: str) -> list[Any]:
+        """Who reads a topic, beside us."""
+        found = self.node.get_subscriptions_info_by_topic(self.path(name))
+        return [end for end in found if end.node_name != self.node.get_name()]
+
+    def others(self, name: str) -> int:
+        """How many others command the arm on a topic: those who do not sit in its own nodes."""
+        own = {end.node_name for query in ("setpoint_js", "measured_js", "measured_cp")
+               for end in self.publishers(query)}  # fmt: skip
+        own |= {end.node_name for end in self.readers("servo_cp")}
+        return sum(end.node_name not in own for end in self.publishers(name))
+
+    # -- listening and speaking ------------------------------------------------------------------
+
+    def tap(self, name: str) -> Tap:
+        """What comes on one of its topics, from the first call on."""
+        if name not in self._taps:
+            self._taps[name] = Tap(self.node, self.path(name), _ROWS[name].ros_type)
+        return self._taps[name]
+
+    def untap(self, name: str) -> None:
+        """Stop to listen."""
+        if name in self._taps:
+            self._taps.pop(name).close()
+
+    def keep(self, names: list[str]) -> None:
+        """Keep all messages of some topics from now on, beside what :meth:`tap` takes."""
+        for name in names:
+            self._keeping[name] = Tap(self.node, self.path(name), _ROWS[name].ros_type)
+
+    def kept(self) -> dict[str, list[tuple[int, Any]]]:
+        """What was kept, with the times at which it was sent [ns]; nothing is kept any longer."""
+        found = {}
+        for name, tap in self._keeping.items():
+            tap.drain()
+            found[name] = tap.kept()
+            tap.close()
+        self._keeping.clear()
+        return found
+
+    def newest(self, name: str, timeout: float = 2.0) -> Any:
+        """Newest message of a topic; None if there is none within a time [s]."""
+        tap = self.tap(name)
+        self.wait(lambda: bool(tap.take()) or tap.newest is not None, timeout)
+        return tap.newest
+
+    def send(self, name: str, message: Any) -> None:
+        """Send a command, stamped with the time now."""
+        if hasattr(message, "header"):
+            stamp = message.header.stamp
+            stamp.sec, stamp.nanosec = divmod(time.time_ns(), SECOND_NS)
+        self.publisher_of(name).publish(message)
+
+    def publisher_of(self, name: str) -> Any:
+        """Publisher of a command, once the arm reads it."""
+        row = _ROWS[name]
+        if row.name not in self._publishers:
+            quality = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+            if row.name == "state_command":  # as the stock client does
+                quality.durability = DurabilityPolicy.TRANSIENT_LOCAL
+            kind = message_type(row.ros_type)
+            own = self.node.create_publisher(kind, self.path(row.name), quality)
+            self._publishers[row.name] = own
+            self.wait(lambda: own.get_subscription_count() > 0, 3.0)
+        return self._publishers[row.name]
+
+    def message(self, name: str, **values: Any) -> Any:
+        """Empty message of a topic, with some fields filled."""
+        return message_type(_ROWS[name].ros_type)(**values)
+
+    def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
+        """Whether something becomes true within a time [s]."""
+        end = time.monotonic() + timeout
+        while not condition():
+            for tap in self._keeping.values():
+                tap.drain()
+            if time.monotonic() > end:
+                return False
+            time.sleep(_TURN)
+        return True
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass [s]."""
+        self.wait(lambda: False, seconds)
+
+
+def stamp_of(message: Any) -> int:
+    """Stamp of a message [ns]."""
+    stamp = message.header.stamp
+    return int(stamp.sec * SECOND_NS + stamp.nanosec)
+
+
+def numbers_of(message: Any) -> dict[str, np.ndarray]:
+    """Vectors of a message by name, as far as it has them."""
+    if hasattr(message, "position"):
+        parts = ("position", "velocity", "effort")
+        return {part: np.array(getattr(message, part), dtype=np.float64) for part in parts}
+    if hasattr(message, "pose"):
+        p, q = message.pose.position, message.pose.orientation
+        return {"position": np.array([p.x, p.y, p.z]), "quaternion": np.array([q.w, q.x, q.y, q.z])}
+    if hasattr(message, "twist"):
+        v, w = message.twist.linear, message.twist.angular
+        return {"twist": np.array([v.x, v.y, v.z, w.x, w.y, w.z])}
+    if hasattr(message, "wrench"):
+        f, t = message.wrench.force, message.wrench.torque
+        return {"wrench": np.array([f.x, f.y, f.z, t.x, t.y, t.z])}
+    if hasattr(message, "data"):
+        return {"data": np.array(message.data, dtype=np.float64)}
+    return {}

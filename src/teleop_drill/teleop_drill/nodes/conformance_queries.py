@@ -1,0 +1,113 @@
+"""Queries: whether a topic is there, of the right type, sound, stamped, and for every reader."""
+
+import time
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from rclpy.qos import ReliabilityPolicy
+
+from teleop_drill.conformance.rows import STATES, Finding, Group, Row, Verdict
+from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
+
+_LOOK = 0.5  # time in which messages are counted [s]
+_FIRST = 2.5  # time within which the first must come [s]
+_OLD = 1.0  # a measurement may lie back by this [s]
+_UNIT = 1e-3
+
+
+def look(arm: Arm, row: Row) -> Finding:
+    """Finding of one row, without touching the arm."""
+    is_command = row.group is Group.COMMAND or row.name == "state_command"
+    ends = arm.readers(row.name) if is_command else arm.publishers(row.name)
+    side = "reader" if is_command else "publisher"
+    if not ends:
+        verdict = Verdict.FAILED if row.is_required else Verdict.ABSENT
+        return Finding(row, verdict, "" if verdict is Verdict.ABSENT else f"no {side}")
+    wrong = {end.topic_type for end in ends} - {row.ros_type}
+    if wrong:
+        return Finding(row, Verdict.FAILED, ", ".join(sorted(wrong)), f"must be {row.ros_type}")
+    if is_command:
+        return Finding(row, Verdict.OK, f"{len(ends)} {side}{'s' * (len(ends) > 1)}")
+    return _listen(arm, row, ends)
+
+
+def _listen(arm: Arm, row: Row, ends: list[Any]) -> Finding:
+    """What comes on a topic with publishers of the right type."""
+    messages: list[Any] = []
+    tap = arm.tap(row.name)
+    arm.wait(lambda: tap.take(messages.append) > 0, _FIRST)
+    begin, before = time.monotonic(), tap.count
+    while time.monotonic() - begin < _LOOK:
+        tap.take(messages.append)
+        arm.pause(0.01)
+    rate = (tap.count - before) / (time.monotonic() - begin)
+    arm.untap(row.name)
+    if not messages:
+        return Finding(row, Verdict.FAILED, "no message", f"nothing came within {_FIRST:g} s")
+    found = f"{rate:.0f} Hz" if rate > 0 else "1 message"
+    faults = [*_stamps(row, messages), *_content(row, messages)]
+    if faults:
+        return Finding(row, Verdict.FAILED, found, faults[0])
+    if len(ends) > 1:
+        return Finding(
+            row, Verdict.NOTED, found, f"{len(ends)} publishers: who speaks for the arm?"
+        )
+    if all(end.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT for end in ends):
+        note = "offered best effort: stock clients, which are reliable, get nothing"
+        return Finding(row, Verdict.FAILED, found, note)
+    return Finding(row, Verdict.OK, found)
+
+
+def _stamps(row: Row, messages: list[Any]) -> list[str]:
+    """What is wrong with the stamps."""
+    if not hasattr(messages[0], "header"):
+        return []
+    stamps = [stamp_of(message) for message in messages]
+    if 0 in stamps:
+        return ["its stamp is 0, which means invalid"]
+    if any(late < early for early, late in pairwise(stamps)):
+        return ["its stamps go back"]
+    age = 1e-9 * (time.time_ns() - stamps[-1])
+    if row.name.startswith("measured") and not -_OLD < age < _OLD + _LOOK:
+        return [f"its stamp is {age:.3g} s old: another clock, or none"]
+    if row.name.startswith("measured") and len(stamps) > 2 and stamps[0] == stamps[-1]:
+        return ["its stamp does not move"]
+    return []
+
+
+def _content(row: Row, messages: list[Any]) -> list[str]:
+    """What is wrong with the numbers, names and words."""
+    newest = messages[-1]
+    if row.name == "operating_state":
+        known = ", ".join(STATES)
+        return [] if newest.state in STATES else [f"state {newest.state!r:.40}, must be of {known}"]
+    vectors = numbers_of(newest)
+    bad = [name for name, values in vectors.items() if not np.isfinite(values).all()]
+    if bad:
+        return [f"its {bad[0]} is not finite"]
+    if hasattr(newest, "name"):
+        return _joints(row, newest, vectors)
+    if "quaternion" in vectors:
+        length = float(np.linalg.norm(vectors["quaternion"]))
+        if abs(length - 1.0) > _UNIT:
+            return [f"its quaternion has length {length:.4g}, must be 1"]
+    if row.name == "jacobian":
+        dim = newest.layout.dim
+        if len(dim) != 2 or dim[0].size != 6 or dim[0].size * dim[1].size != len(newest.data):
+            return ["its layout is not that of 6 rows, one column for each joint"]
+    return []
+
+
+def _joints(row: Row, message: Any, vectors: dict[str, np.ndarray]) -> list[str]:
+    names = list(message.name)
+    sizes = {len(values) for values in vectors.values() if len(values)}
+    if not sizes:
+        return ["it holds no numbers"]
+    if len(sizes) > 1 or (names and {len(names)} != sizes):
+        return [f"its vectors have different lengths: {sorted(sizes | {len(names)})}"]
+    if not names and row.name == "measured_js":
+        return ["it names no joints"]
+    if len(set(names)) < len(names):
+        return ["it names a joint twice"]
+    return []

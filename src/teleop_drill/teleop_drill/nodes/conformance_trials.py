@@ -1,0 +1,331 @@
+"""Trials: small motions of an arm, each commanded as a stock client does, and taken back."""
+
+import math
+from collections.abc import Callable, Mapping
+from functools import partial
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from teleop_core.errors import SessionError
+from teleop_core.geometry import Array
+from teleop_drill.conformance.rows import Verdict
+from teleop_drill.nodes.conformance_arm import Arm, numbers_of
+
+TURN = 0.01
+"""How far a joint is moved [rad or m]."""
+WAY = 0.003
+"""How far the tip is moved [m]."""
+_NEAR = 0.05  # share of the way that may be missing in the end
+_MOVED = 0.3  # share of the way that is a motion at all
+_PATIENCE = 10.0  # of a move [s]
+_NOTHING = 1.5  # without any motion for so long nothing will come [s]
+_STATE = 3.0  # of a change of state [s]
+_STILL = 1e-4  # joints that moved by less stand still [rad or m]
+Outcome = tuple[Verdict, str]
+_OK: Outcome = (Verdict.OK, "")
+
+
+class Trials:
+    """Trials of one arm that is enabled, homed and at rest.
+
+    Args:
+        arm: The arm.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        self.arm = arm
+        self._start = np.empty(0)
+        self._joint, self._axis = (
+            (-1, 0.0),
+            (-1, 0.0),
+        )  # of which the direction is free, and its sign
+
+    def unfit(self) -> str:
+        """Why nothing can be tried; empty if it can."""
+        state = self.arm.newest("operating_state", 3.0)
+        if state is None:
+            return "no operating_state: whether it may be moved is not known"
+        if state.state != "ENABLED" or not state.is_homed:
+            homed = "homed" if state.is_homed else "not homed"
+            return f"it is {state.state}, {homed}: enable and home it first"
+        if state.is_busy:
+            return "it is busy: wait until it is not"
+        if self.arm.newest("setpoint_js") is None and self.arm.newest("measured_js") is None:
+            return "neither setpoint_js nor measured_js: where it is, is not known"
+        self._start = self.joints()
+        return ""
+
+    # -- where it is -----------------------------------------------------------------------------
+
+    def joints(self) -> Array:
+        """Its joints: where it is told to be, or else where it is."""
+        name = "setpoint_js" if self.arm.publishers("setpoint_js") else "measured_js"
+        return self._fresh(name)["position"]
+
+    def place(self) -> tuple[Array, Array]:
+        """Position and quaternion of its tip."""
+        name = "setpoint_cp" if self.arm.publishers("setpoint_cp") else "measured_cp"
+        found = self._fresh(name)
+        return found["position"], found["quaternion"]
+
+    def _fresh(self, name: str) -> dict[str, Array]:
+        tap = self.arm.tap(name)
+        self.arm.wait(lambda: tap.take() > 0, 0.5)
+        if tap.newest is None and self.arm.newest(name) is None:
+            raise SessionError(f"{self.arm.path(name)} fell silent in the middle: is the arm gone?")
+        return numbers_of(tap.newest)
+
+    def go_back(self) -> None:
+        """Bring it where it was at the start, smoothly."""
+        if self.is_back() or not self.arm.readers("move_jp"):
+            return
+        self.arm.send("move_jp", self.arm.message("move_jp", position=self._start.tolist()))
+        self.arm.wait(self.is_back, _PATIENCE)
+
+    def is_back(self) -> bool:
+        """Whether its joints are where they were at the start."""
+        return float(np.abs(self.joints() - self._start).max()) < _STILL
+
+    # -- commands --------------------------------------------------------------------------------
+
+    def state_command(self) -> Outcome:
+        """Pause, refuse to move, resume; words that are no commands change nothing."""
+        arm = self.arm
+        self._say("no such command")
+        arm.pause(0.3)
+        if self._state() != "ENABLED":
+            return Verdict.FAILED, "a word that is no command changed the state"
+        if not self._reaches("pause", "PAUSED"):
+            return Verdict.FAILED, f"pause: {self._state()} in place of PAUSED after {_STATE:g} s"
+        before = self.joints()
+        if arm.readers("move_jp"):
+            goal = before.copy()
+            goal[0] += TURN
+            arm.send("move_jp", arm.message("move_jp", position=goal.tolist()))
+            arm.pause(0.7)
+        moved = float(np.abs(self.joints() - before).max())
+        if not self._reaches("resume", "ENABLED"):
+            return Verdict.FAILED, f"resume: {self._state()} in place of ENABLED"
+        if moved > _STILL:
+            return Verdict.FAILED, f"moved by {moved:.3g} while PAUSED"
+        return _OK
+
+    def _say(self, word: str) -> None:
+        self.arm.send("state_command", self.arm.message("state_command", string=word))
+
+    def _state(self) -> str:
+        self.arm.tap("operating_state").take()
+        return str(self.arm.newest("operating_state").state)
+
+    def _reaches(self, command: str, state: str) -> bool:
+        self._say(command)
+        return self.arm.wait(lambda: self._state() == state, _STATE)
+
+    def move_joints(self, name: str, *, is_relative: bool) -> Outcome:
+        """Move a joint and back; busy meanwhile, and not afterwards."""
+        for joint, sign in self._candidates(self._joint, len(self._start)):
+            begin = self.joints()
+            step = np.zeros(len(begin))
+            step[joint] = sign * TURN
+            outcome = self._move(name, begin, begin + step, step if is_relative else begin + step)
+            if outcome is not None:
+                self._joint = joint, sign
+                return outcome
+        return Verdict.FAILED, "no joint moves, neither way"
+
+    def _move(self, name: str, begin: Array, goal: Array, sent: Array) -> Outcome | None:
+        """What became of a move of joints; None if nothing moved."""
+        message = self.arm.message(name, position=sent.tolist())
+        off = partial(self._off, self.joints, goal)
+        return self._watch_move(name, message, off, float(np.abs(goal - begin).max()))
+
+    def move_tip(self, name: str) -> Outcome:
+        """Move the tip by a few millimetres; busy meanwhile, and not afterwards."""
+        for axis, sign in self._candidates(self._axis, 3):
+            p, q = self.place()
+            goal = p.copy()
+            goal[axis] += sign * WAY
+            message = _filled(self.arm.message(name), goal, q)
+            off = partial(self._off, lambda: self.place()[0], goal)
+            outcome = self._watch_move(name, message, off, WAY)
+            if outcome is not None:
+                self._axis = axis, sign
+                return outcome
+        return Verdict.FAILED, "the tip moves along no axis, neither way"
+
+    def _off(self, where: Callable[[], Array], goal: Array) -> float:
+        return float(np.abs(where() - goal).max())
+
+    def _watch_move(
+        self, name: str, message: Any, off: Callable[[], float], way: float
+    ) -> Outcome | None:
+        tap, busy = self.arm.tap("operating_state"), [False]
+        tap.take()
+
+        def watch(state: Any) -> None:
+            busy[0] = busy[0] or state.is_busy
+
+        self.arm.publisher_of(name)
+        self.arm.send(name, message)
+        if not self.arm.wait(lambda: off() < way * (1.0 - _MOVED), _NOTHING):
+            return None
+        if not self.arm.wait(lambda: off() < way * _NEAR, _PATIENCE):
+            return Verdict.FAILED, f"{off():.2g} short of its goal after {_PATIENCE:g} s"
+        self.arm.wait(lambda: tap.take(watch) > 0 and not tap.newest.is_busy and busy[0], 2.0)
+        if not busy[0]:
+            return Verdict.FAILED, "is_busy never rose: who waits for the move waits for ever"
+        return (Verdict.FAILED, "still busy at its goal") if tap.newest.is_busy else _OK
+
+    def _candidates(self, known: tuple[int, float], count: int) -> list[tuple[int, float]]:
+        """Directions to try: the one that is known to be free, or all."""
+        return [known] if known[0] >= 0 else list(product(range(count), (1.0, -1.0)))
+
+    def stream_joints(self, name: str, rate: float, *, is_relative: bool = False) -> Outcome:
+        """Stream a joint there and back again in two seconds."""
+        for joint, sign in self._candidates(self._joint, len(self._start)):
+            begin = self.joints()
+
+            def sent(
+                share: float, last: float, p: Array = begin, i: int = joint, s: float = sign
+            ) -> Any:
+                base = 0.0 * p if is_relative else p.copy()
+                base[i] += s * TURN * (share - last if is_relative else share)
+                return self.arm.message(name, position=base.tolist())
+
+            where = partial(self._along_joint, begin, joint, sign)
+            outcome = self._stream(name, rate, sent, where)
+            if outcome is not None:
+                self._joint = joint, sign
+                return outcome
+        return Verdict.FAILED, "no joint follows, neither way"
+
+    def _along_joint(self, begin: Array, joint: int, sign: float) -> float:
+        return float(sign * (self.joints() - begin)[joint] / TURN)
+
+    def stream_tip(self, name: str, rate: float) -> Outcome:
+        """Stream the tip there and back again in two seconds."""
+        for axis, sign in self._candidates(self._axis, 3):
+            p, q = self.place()
+
+            def sent(
+                share: float, _: float, p: Array = p, q: Array = q, i: int = axis, s: float = sign
+            ) -> Any:
+                goal = p.copy()
+                goal[i] += s * WAY * share
+                return _filled(self.arm.message(name), goal, q)
+
+            outcome = self._stream(name, rate, sent, partial(self._along_axis, p, axis, sign))
+            if outcome is not None:
+                self._axis = axis, sign
+                return outcome
+        return Verdict.FAILED, "the tip follows along no axis, neither way"
+
+    def _along_axis(self, begin: Array, axis: int, sign: float) -> float:
+        return float(sign * (self.place()[0] - begin)[axis] / WAY)
+
+    def _stream(
+        self, name: str, rate: float, sent: Callable[[float, float], Any],
+        where: Callable[[], float],
+    ) -> Outcome | None:  # fmt: skip
+        """What became of a stream whose share of the way rises to 1 and falls to 0."""
+        self.arm.publisher_of(name)
+        count, last, farthest = round(2.0 * rate), 0.0, 0.0
+        for i in range(count + 1):
+            share = 0.5 * (1.0 - math.cos(2.0 * math.pi * i / count))
+            self.arm.send(name, sent(share, last))
+            last = share
+            self.arm.pause(1.0 / rate)
+            farthest = max(farthest, where())
+            if i == count // 2 and farthest < 0.1:
+                return None
+        self.arm.wait(lambda: abs(where()) < _NEAR, 1.0)
+        if farthest < 1.0 - _MOVED:
+            return Verdict.FAILED, f"followed {farthest:.0%} of the way"
+        rest = abs(where())
+        return (Verdict.FAILED, f"{rest:.0%} of the way off in the end") if rest > _NEAR else _OK
+
+    def run_joints(self, name: str) -> Outcome:
+        """Run a joint at a speed, then fall silent: it must come to rest by itself."""
+        for joint, sign in self._candidates(self._joint, len(self._start)):
+            begin, speed = self.joints(), np.zeros(len(self._start))
+            speed[joint] = sign * 2.0 * TURN
+            message = self.arm.message(name, velocity=speed.tolist())
+            where = partial(self._along_joint, begin, joint, sign)
+            outcome = self._run(name, message, self.arm.message(name), where)
+            if outcome is not None:
+                return outcome
+        return Verdict.FAILED, "no joint runs, neither way"
+
+    def run_tip(self, name: str) -> Outcome:
+        """Run the tip at a speed, then fall silent: it must come to rest by itself."""
+        for axis, sign in self._candidates(self._axis, 3):
+            begin, message = self.place()[0], self.arm.message(name)
+            setattr(message.twist.linear, "xyz"[axis], sign * 2.0 * WAY)
+            where = partial(self._along_axis, begin, axis, sign)
+            outcome = self._run(name, message, self.arm.message(name), where)
+            if outcome is not None:
+                return outcome
+        return Verdict.FAILED, "the tip runs along no axis, neither way"
+
+    def _run(
+        self, name: str, message: Any, halt: Any, where: Callable[[], float]
+    ) -> Outcome | None:
+        """What became of half a second at twice the way per second."""
+        self.arm.publisher_of(name)
+        for _ in range(25):
+            self.arm.send(name, message)
+            self.arm.pause(0.02)
+        went = where()
+        if went < 0.1:
+            return None
+        self.arm.pause(1.0)
+        before = self.joints()
+        self.arm.pause(0.3)
+        drift = float(np.abs(self.joints() - before).max())
+        if hasattr(halt, "velocity"):
+            halt.velocity = [0.0] * len(self._start)
+        self.arm.send(name, halt)
+        if drift > _STILL:
+            return Verdict.NOTED, "goes on a second after the last message: it has no watchdog"
+        return _OK if 0.3 < went < 3.0 else (Verdict.FAILED, f"ran {went:.0%} of the way asked for")
+
+    def hold(self) -> Outcome:
+        """Hold: nothing moves, and it stays enabled."""
+        before = self.joints()
+        self.arm.publisher_of("hold")
+        self.arm.send("hold", self.arm.message("hold"))
+        self.arm.pause(0.5)
+        moved = float(np.abs(self.joints() - before).max())
+        if moved > _STILL:
+            return Verdict.FAILED, f"moved by {moved:.3g}"
+        is_enabled = self._state() == "ENABLED"
+        return _OK if is_enabled else (Verdict.FAILED, f"{self._state()} afterwards")
+
+
+def _filled(message: Any, p: Array, q: Array) -> Any:
+    """Pose message with a position and a quaternion w, x, y, z."""
+    target = message.pose
+    target.position.x, target.position.y, target.position.z = p.tolist()
+    names = ("w", "x", "y", "z")
+    for name, number in zip(names, q.tolist(), strict=True):
+        setattr(target.orientation, name, number)
+    return message
+
+
+TRIALS: Mapping[str, Callable[[Trials], Outcome]] = {
+    "state_command": Trials.state_command,
+    "move_jp": lambda t: t.move_joints("move_jp", is_relative=False),
+    "move_jr": lambda t: t.move_joints("move_jr", is_relative=True),
+    "move_cp": lambda t: t.move_tip("move_cp"),
+    "interpolate_jp": lambda t: t.stream_joints("interpolate_jp", 20.0),
+    "interpolate_cp": lambda t: t.stream_tip("interpolate_cp", 20.0),
+    "servo_jp": lambda t: t.stream_joints("servo_jp", 100.0),
+    "servo_jr": lambda t: t.stream_joints("servo_jr", 100.0, is_relative=True),
+    "servo_jv": lambda t: t.run_joints("servo_jv"),
+    "servo_cp": lambda t: t.stream_tip("servo_cp", 100.0),
+    "servo_cv": lambda t: t.run_tip("servo_cv"),
+    "hold": Trials.hold,
+}
+"""What is tried with each command."""

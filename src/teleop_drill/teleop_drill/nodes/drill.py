@@ -1,0 +1,257 @@
+"""Drill: breaks a running session in one way after the other, and measures what the arm does."""
+
+import math
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from teleop_core import api
+from teleop_core.errors import SessionError
+from teleop_core.nodes.children import environment, free_domain
+from teleop_core.own_parts import VARIABLE, load_own_parts
+from teleop_core.session.configuration import Configuration
+from teleop_drill.drill import hand, inside
+from teleop_drill.drill.exercise import Exercise, Master
+from teleop_drill.drill.judging import judge
+from teleop_drill.drill.numbers import WARNED, Numbers, Scheduling
+from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.recordings import Counted, Recorded, judge_recording
+from teleop_drill.nodes.drill_evidence import help_on, note_state, recover, seen_of
+from teleop_drill.nodes.drill_rig import LiveRig
+from teleop_drill.nodes.drill_session import DrillSession
+
+_BEFORE = 0.2  # motion that is seen before a fault [s]
+_FOLLOWS = 90.0  # until it follows after the start [s]
+_CIRCLE = (
+    "operator.kind=circle", f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
+    f"operator.period={hand.ROUND}", "operator.approach_time=1.0", "haptic_master.patience=0.0",
+    "operator.rotation=0.0",
+)  # fmt: skip
+_MEASURED = 2.0  # time in which this machine's own lateness is measured [s]
+_STEADY = 4  # looks, a tenth of a second apart, at an arm that follows
+Say = Callable[[str], None]
+
+
+def drill(
+    exercises: Sequence[Exercise],
+    folder: Path,
+    say: Say,
+    *,
+    is_composed: bool = False,
+    files: Sequence[Path] = (),
+    texts: Sequence[str] = (),
+    drives: Sequence[str] = (),
+) -> list[Outcome]:
+    """Do exercises in sessions of their own, on a ROS domain of their own.
+
+    Args:
+        exercises: What is done, as of :func:`teleop_drill.drill.chosen`.
+        folder: Where recordings go.
+        say: Told a line about each.
+        is_composed: Whether all nodes share one process.
+        files: Parameter files over the scenario ``free_motion``.
+        texts: Parameters ``key=value`` over all files.
+        drives: Command of drives that the slave leads in place of the simulated ones, with its
+            arguments; exercises that break the simulator are left out.
+
+    Raises:
+        TeleopError: A parameter is wrong, or a session cannot be started.
+    """
+    sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for its turn
+    outcomes: list[Outcome] = []
+    for master in Master:
+        own = [o for o in exercises if o.master is master and not (drives and o.breaks_simulator)]
+        if own:
+            place = folder / master.name.lower()
+            place.mkdir(parents=True)
+            made = _configuration(master, files, texts)
+            part = _Drill(master, made, place, say, is_composed=is_composed, drives=drives)
+            outcomes += part.run(own)
+            if part.is_over:
+                break
+    order = [one.name for one in exercises]
+    return sorted(outcomes, key=lambda outcome: order.index(outcome.exercise.name))
+
+
+class _Drill:
+    """Exercises with one master."""
+
+    def __init__(
+        self, master: Master, configuration: Configuration, folder: Path, say: Say, *,
+        is_composed: bool, drives: Sequence[str],
+    ) -> None:  # fmt: skip
+        self._drives = drives
+        self._master, self._folder, self._say = master, folder, say
+        self._is_composed, self._configuration = is_composed, configuration
+        self._numbers, self._scheduling = Numbers.of(configuration), Scheduling()
+        self._rig: LiveRig | None = None
+        self._sessions = 0
+        self._open: dict[Path, list[tuple[int, Outcome]]] = {}
+        self._killed: dict[Path, int] = {}
+        self._counted: dict[Path, Counted] = {}
+        self._sessions_of: dict[Path, DrillSession] = {}
+        self.is_over = False
+        """Whether it was stopped before its end."""
+
+    def run(self, exercises: Sequence[Exercise]) -> list[Outcome]:
+        """Do them, and look at the recordings when all is over."""
+        outcomes: list[Outcome] = []
+        try:
+            for exercise in exercises:
+                rig = self._prepared()
+                outcome = self._repeated(exercise, rig)
+                outcomes.append(outcome)
+                if math.isnan(outcome.recovered):
+                    outcome.note = rig.complaints()
+                    self._close()
+                self._say(_line(outcome))
+        except (KeyboardInterrupt, SessionError) as error:
+            if not outcomes:
+                raise
+            self._say(f"stopped: {error or 'interrupted'}; what was measured until now:")
+            self.is_over = True
+        finally:
+            self._close()
+        for path, recorded in self._open.items():
+            judge_recording(Recorded(
+                path, recorded, self._counted[path], self._sessions_of[path].until_ns(path),
+                self._killed.get(path),
+            ), self._numbers.tick)  # fmt: skip
+        return outcomes
+
+    # -- sessions --------------------------------------------------------------------------------
+
+    def _prepared(self) -> LiveRig:
+        """As :meth:`_ready`; a session that cannot go on is given up once."""
+        if self._rig is None:
+            return self._ready()
+        try:
+            return self._ready()
+        except SessionError as error:
+            self._say(f"gives the session up: {error}")
+            self._close()
+            return self._ready()
+
+    def _ready(self) -> LiveRig:
+        """A session whose slave follows the hand; a new one if the last did not survive."""
+        if self._rig is None:
+            self._sessions += 1
+            folder = self._folder / f"session_{self._sessions}"
+            folder.mkdir()
+            self._rig = LiveRig(
+                self._configuration, self._numbers.robot, folder, _environment(self._master),
+                is_composed=self._is_composed, master=self._master, drives=self._drives,
+            )  # fmt: skip
+            way = "one process" if self._is_composed else "a process for each node"
+            self._say(f"starts a session: {way}, the hand is that of {_who(self._master)}")
+            self._rig.session.start()
+            self._await_following(self._rig)
+            self._measure_scheduling(self._rig)
+        self._await_following(self._rig)
+        return self._rig
+
+    def _measure_scheduling(self, rig: LiveRig) -> None:
+        """How late this machine wakes the drill's own thread while the session works."""
+        since_ns = time.time_ns()
+        rig.wait(_MEASURED)
+        found = self._scheduling = rig.tap.scheduling(since_ns)
+        late = f"{1e3 * found.usual:.2f} ms usually, {1e3 * found.worst:.1f} ms at worst"
+        self._say(f"this machine is late by {late}; twice the worst is granted to every time")
+
+    def _await_following(self, rig: LiveRig) -> None:
+        """Wait until the slave follows, and help it; raises SessionError where it does not."""
+        deadline = time.monotonic() + _FOLLOWS
+        steady = 0
+        while steady < _STEADY:
+            if rig.is_following():
+                steady += 1
+            else:
+                steady = 0
+                help_on(rig)  # a busy machine may have paused it already
+            rig.wait(0.1)
+            if time.monotonic() > deadline:
+                raise SessionError(f"the slave does not follow: {rig.complaints()}")
+
+    def _close(self) -> None:
+        if self._rig is not None:
+            rig, self._rig = self._rig, None
+            rig.close()
+            self._counted |= dict.fromkeys(rig.session.recordings, rig.tap.counted())
+            self._sessions_of |= dict.fromkeys(rig.session.recordings, rig.session)
+
+    # -- one exercise ----------------------------------------------------------------------------
+
+    def _repeated(self, exercise: Exercise, rig: LiveRig) -> Outcome:
+        """The worst of all repetitions, which end with the first that fails; medians as well."""
+        found = [self._once(exercise, rig)]
+        while len(found) < exercise.repeats and not found[-1].failures():
+            try:
+                self._ready()
+            except SessionError:
+                found[-1].recovered = math.nan
+                break
+            found.append(self._once(exercise, rig))
+        worst = found[-1]
+        if not worst.failures():
+            worst = max(found, key=lambda one: one.measured("travel_m").value)
+        for name in ("still_s", "rest_s"):
+            worst.extra[f"{name}_median"] = float(
+                np.median([m.measured(name).value for m in found])
+            )
+        worst.extra["repeats"] = len(found)
+        return worst
+
+    def _once(self, exercise: Exercise, rig: LiveRig) -> Outcome:
+        rig.wait(_BEFORE)
+        rig.tap.clear()
+        outcome = Outcome(exercise=exercise, load=os.getloadavg()[0] / (os.cpu_count() or 1))
+        self._open.setdefault(rig.session.recordings[-1], []).append((time.time_ns(), outcome))
+        before = rig.operation()
+        rig.mark()
+        rig.wait(0.0)
+        exercise.inject(rig)
+        rig.wait(exercise.watch)
+        end_ns = time.time_ns()
+        note_state(outcome, rig, before)
+        outcome.note, begin_ns = rig.said, rig.begin_ns
+        if exercise.cuts_recording:
+            self._killed[rig.session.recordings[-1]] = begin_ns
+        exercise.undo(rig)
+        recover(outcome, rig)
+        while exercise.warns and not rig.warned and time.time_ns() - begin_ns < 1.2e9 * WARNED:
+            rig.wait(0.05)
+        seen = seen_of(outcome, rig, (begin_ns, end_ns), self._scheduling)
+        outcome.measures = {m.name: m for m in judge(exercise, seen, self._numbers)}
+        outcome.extra["late_s"] = seen.scheduling.worst
+        return outcome
+
+
+def _configuration(master: Master, files: Sequence[Path], texts: Sequence[str]) -> Configuration:
+    """Configuration of a session: the hand goes round at constant speed."""
+    own: tuple[str, ...] = _CIRCLE
+    if master is Master.DRILL:
+        load_own_parts([Path(inside.__file__)])
+        own = (*own, f"teleop.stages=[{inside.STAGE_NAME}]")
+    return api.configuration("free_motion", files=files, texts=(*own, *texts))
+
+
+def _environment(master: Master) -> dict[str, str]:
+    env = environment() | {"ROS_DOMAIN_ID": free_domain()}
+    if master is Master.DEVICE:
+        env.pop(VARIABLE, None)
+    return env
+
+
+def _who(master: Master) -> str:
+    return "the simulated device" if master is Master.DEVICE else "the drill"
+
+
+def _line(outcome: Outcome) -> str:
+    failures = outcome.failures()
+    mark = "✗" if failures else "✓"
+    note = f" ({outcome.note})" if math.isnan(outcome.recovered) else ""
+    return f"{mark} {outcome.exercise.name}: {'; '.join(failures) or outcome.state_text}{note}"

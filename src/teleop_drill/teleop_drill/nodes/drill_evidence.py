@@ -1,0 +1,113 @@
+"""Evidence of a drill: what a session says of a fault, what the tap hears, what recovery takes."""
+
+import time
+
+from teleop_core.operation import Fault, State
+from teleop_core.topics import (
+    SLAVE_MEASURED_CP,
+    SLAVE_MEASURED_JS,
+    SLAVE_OPERATION,
+    SLAVE_SETPOINT_JS,
+    SLAVE_TRUE_CP,
+    TELEOP_STATE,
+)
+from teleop_drill.drill.exercise import Cure, Exercise
+from teleop_drill.drill.judging import Seen
+from teleop_drill.drill.numbers import Scheduling
+from teleop_drill.drill.outcome import Outcome
+from teleop_drill.nodes.drill_rig import LiveRig
+
+_PATIENCE = 1.0  # for an arm that goes on by itself [s]
+_LONGEST = 60.0  # until an arm follows again, whatever it takes [s]
+_STRENGTH = (Cure.NOTHING, Cure.RESUME, Cure.RESET, Cure.RESTART)
+
+
+def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None:
+    """State that followed, and who told first."""
+    begin_ns = rig.begin_ns
+    told: list[tuple[int, str]] = []
+    for sent_ns, report in rig.tap.reports(SLAVE_OPERATION):
+        if sent_ns >= begin_ns and _differs(report, before):
+            told.append((sent_ns, "slave/operation"))
+            if outcome.told is None and _is_expected(report, outcome.exercise):
+                outcome.told = 1e-9 * (sent_ns - begin_ns)
+                outcome.fault = Fault(int(report["fault"]))
+            if report["fault"] and outcome.fault is Fault.NONE:
+                outcome.fault = Fault(int(report["fault"]))
+    for sent_ns, report in rig.tap.reports(TELEOP_STATE):
+        if sent_ns >= begin_ns and not report["is_following"]:
+            told.append((sent_ns, "teleop/state"))
+    told += [(ns, f"diagnostics of {n}") for n, ns in rig.warned.items() if ns >= begin_ns]
+    if told:
+        first_ns, outcome.told_by = min(told)
+        outcome.detected = 1e-9 * (first_ns - begin_ns)
+    if rig.session.is_running("slave"):
+        outcome.state = State(int(rig.operation()["state"]))
+
+
+def seen_of(
+    outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling: Scheduling
+) -> Seen:
+    """What the tap has heard of a fault, beside what the slave says of itself.
+
+    Args:
+        outcome: With what was told.
+        rig: The session.
+        time_ns: Begin and end of the fault [ns].
+        scheduling: How late this machine was at the start.
+    """
+    begin_ns, end_ns = time_ns
+    true_cp = rig.tap.trace(SLAVE_TRUE_CP)  # which only a simulator tells
+    tip = true_cp if len(true_cp) else rig.tap.trace(SLAVE_MEASURED_CP)
+    told_ns = None if outcome.told is None else begin_ns + round(1e9 * outcome.told)
+    warned = [ns for ns in rig.warned.values() if ns >= begin_ns]
+    return Seen(
+        begin_ns, end_ns, rig.tap.trace(SLAVE_SETPOINT_JS), rig.tap.trace(SLAVE_MEASURED_JS),
+        tip, told_ns, min(warned, default=None),
+        rig.tap.scheduling(begin_ns).beside(scheduling), max(0.0, 1e-9 * (rig.woken_ns - begin_ns)),
+    )  # fmt: skip
+
+
+def _differs(report: dict[str, float], before: dict[str, float]) -> bool:
+    return any(report[name] != before.get(name) for name in ("state", "fault"))
+
+
+def _is_expected(report: dict[str, float], exercise: Exercise) -> bool:
+    """Whether a report tells what an exercise is to end in."""
+    is_fault = not exercise.faults or Fault(int(report["fault"])) in exercise.faults
+    return is_fault and State(int(report["state"])) in exercise.states
+
+
+def recover(outcome: Outcome, rig: LiveRig) -> None:
+    """Wait until the arm follows again; help it more and more."""
+    begin, used = time.monotonic(), Cure.NOTHING
+    while (elapsed := time.monotonic() - begin) < _LONGEST:
+        if rig.is_following():
+            outcome.recovered, outcome.cure = elapsed, used
+            break
+        if elapsed > _PATIENCE or rig.operation().get("state") != State.ENABLED:
+            used = max(used, help_on(rig), key=_STRENGTH.index)
+        rig.wait(0.05)
+    if rig.session.dead():
+        rig.session.start()
+
+
+def help_on(rig: LiveRig) -> Cure:
+    """Do what the arm's state asks for."""
+    if rig.session.dead():
+        rig.session.start()
+        return Cure.RESTART
+    operation = rig.operation()
+    state = operation.get("state")
+    if state == State.PAUSED:
+        rig.command("resume")
+        return Cure.RESUME
+    if state == State.FAULT:
+        rig.command("reset")
+    if state in {State.FAULT, State.DISABLED}:
+        rig.command("enable")
+        return Cure.RESET
+    if state == State.ENABLED and not operation["is_homed"] and not operation["is_busy"]:
+        rig.command("home")
+        return Cure.RESET
+    return Cure.NOTHING

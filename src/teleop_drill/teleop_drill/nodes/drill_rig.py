@@ -1,0 +1,321 @@
+"""Rig of a drill: all that can be done to a running session, on its topics and to its processes."""
+
+import re
+import signal
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.srv import SetParameters
+from rclpy.context import Context
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from teleop_core.bags.messages import layout
+from teleop_core.geometry import Array
+from teleop_core.nodes.observer import WARNING, Observer
+from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.streams import message_type, profile
+from teleop_core.operation import State
+from teleop_core.operation.states import COMMANDS
+from teleop_core.robots.robot import Robot
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.layers import SESSION
+from teleop_core.topics import SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
+from teleop_drill.drill import inside
+from teleop_drill.drill.exercise import Master
+from teleop_drill.drill.hand import Distortion
+from teleop_drill.nodes.drill_session import DrillSession
+from teleop_drill.nodes.drill_tap import Tap
+
+_NUMBERS = re.compile(r"[-+]?[0-9][0-9.e]*")
+_SLAVE = ("slave", "slave_sim")
+_EMPTY = {"operation.reported": Parameter.Type.STRING_ARRAY}
+_PERIOD_NS = 1_000_000_000  # of reports: what comes later tells of the time since the fault
+_ANSWER = 3.0  # patience with a service [s]
+_FOUND = 3.0  # patience with discovery [s]
+_DRIVE_PERIOD = 0.01
+_FRESH = 0.3  # a setpoint that is older is none of a running slave [s]
+
+
+class LiveRig:
+    """A session of processes with the drill's own nodes beside them.
+
+    Args:
+        configuration: What runs.
+        robot: The slave.
+        folder: Where recordings and the drill's own file go.
+        env: Environment of the processes, with their ROS domain.
+        is_composed: Whether all nodes share one process.
+        master: Who moves the hand.
+        drives: Command of drives in place of the simulated ones.
+    """
+
+    def __init__(
+        self, configuration: Configuration, robot: Robot, folder: Path, env: dict[str, str], *,
+        is_composed: bool, master: Master, drives: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        self.is_composed, self._robot = is_composed, robot
+        domain = int(env["ROS_DOMAIN_ID"])
+        self._control = inside.Control.make(folder / "control")
+        env = env | {inside.VARIABLE: str(folder / "control")}
+        self.observer = Observer(domain)
+        self.session = DrillSession(
+            configuration, folder, env, self.observer, is_composed=is_composed, master=master,
+            drives=drives,
+        )  # fmt: skip
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain)
+        self._node, self._own = (self._make_node("drill"), self._make_node("drill_hand"))
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._stop = self._node.create_publisher(  # as anybody's button, which keeps no state
+            Bool, STOP_TOPIC, 100,
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        )  # fmt: skip
+        self._speeds = self._node.create_publisher(JointState, "/slave/servo_jv", 10)
+        self._services = {
+            name: self._node.create_client(Trigger, f"/slave/{name}") for name in COMMANDS
+        }
+        self._settings = {
+            node: self._node.create_client(SetParameters, f"/{node}/set_parameters")
+            for node in _SLAVE
+        }
+        self._intruders: dict[str, Any] = {}
+        self.begin_ns, self.warned, self.said = 0, dict[str, int](), ""
+        self.woken_ns, self._warned_before = 0, dict[str, str]()
+        self.tap = Tap(
+            self._own, robot.joint_names, configuration.groups[SESSION].real_time,
+            has_hand=master is Master.DRILL,
+        )  # fmt: skip
+
+    def _make_node(self, name: str) -> Node:
+        return Node(name, context=self._context, use_global_arguments=False, enable_rosout=False)
+
+    def close(self) -> None:
+        """End the processes and leave."""
+        try:
+            self.session.close()
+        finally:
+            self.tap.close()
+            self.observer.__exit__()
+            self._executor.shutdown()
+            self._node.destroy_node()
+            self._own.destroy_node()
+            self._context.try_shutdown()
+
+    # -- what is seen ----------------------------------------------------------------------------
+
+    def mark(self) -> None:
+        """The fault begins now."""
+        self.begin_ns, self.warned, self.said = time.time_ns(), {}, ""
+        self._warned_before = self._warnings()
+
+    def _warnings(self) -> dict[str, str]:
+        """What each node warns of now, but for the numbers, which change with every report."""
+        told = self.observer.statuses.items()
+        return {n: _NUMBERS.sub("", s.message) for n, s in told if s.level >= WARNING}
+
+    def note(self, text: str) -> None:
+        """Say something that belongs beside the state."""
+        self.said = text
+
+    def now_ns(self) -> int:
+        """Time [ns]."""
+        return time.time_ns()
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass [s]; warnings of nodes are noted with their time."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0.0:
+            self.observer.listen(min(left, 0.02))
+            for name, text in self._warnings().items():
+                arrival = self.observer.statuses[name].arrival
+                arrival_ns = time.time_ns() - round(1e9 * (time.monotonic() - arrival))
+                is_new = self._warned_before.get(name) != text
+                if name not in self.warned and (is_new or arrival_ns > self.begin_ns + _PERIOD_NS):
+                    self.warned[name] = arrival_ns
+
+    def setpoint(self) -> Array:
+        """Newest joint setpoint (n,) of the slave [rad or m]."""
+        rows = self.tap.recent(SLAVE_SETPOINT_JS, 1)
+        return np.array(rows[-1] if len(rows) else self._robot.home)
+
+    def way_to_limit(self) -> Array:
+        """Way (n,) of one joint, that which moves the tip least, to its nearer limit [rad or m]."""
+        q, robot = self.setpoint(), self._robot
+        up, down = robot.upper - q, robot.lower - q
+        ways = np.where(up < -down, up, down)
+        moved = np.linalg.norm(robot.jacobian(q)[:3], axis=0) * np.abs(ways)
+        fastest = np.abs(ways) / np.array(robot.drives.speed_limit)  # type: ignore[union-attr]
+        joint = int(np.argmin(moved + fastest))
+        return np.where(np.arange(robot.n) == joint, ways, 0.0)
+
+    def drive(self, speeds: Array, seconds: float) -> None:
+        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            self._speeds.publish(JointState(velocity=speeds.tolist()))
+            self.wait(_DRIVE_PERIOD)
+
+    def operation(self) -> dict[str, float]:
+        """Newest report of the slave's operation; empty before the first."""
+        reports = self.tap.reports(SLAVE_OPERATION)
+        return reports[-1][1] if reports else {}
+
+    def is_following(self) -> bool:
+        """Whether the slave is at work, enabled and homed, and its setpoint moves."""
+        operation = self.operation()
+        if not operation or operation["state"] != State.ENABLED or operation["is_busy"]:
+            return False
+        if self.tap.age(SLAVE_SETPOINT_JS) > _FRESH or not self.session.is_running("slave"):
+            return False
+        rows = self.tap.recent(SLAVE_SETPOINT_JS, 60)
+        moves = np.any(np.diff(rows, axis=0) != 0.0, axis=1)
+        return bool(len(moves) >= 40 and np.mean(moves) > 0.3)
+
+    def complaints(self) -> str:
+        """What nodes complain of, in one line."""
+        age = self.tap.age(SLAVE_SETPOINT_JS)
+        told = [f"{n}: {s.message}" for n, s in self.observer.statuses.items()]
+        moves = np.any(np.diff(self.tap.recent(SLAVE_SETPOINT_JS, 60), axis=0) != 0.0, axis=1)
+        seen = f"newest setpoint {age:.2f} s old, {np.sum(moves)} of the last {len(moves)} moved"
+        return "; ".join((f"{seen}; {self.operation()}", *told))
+
+    # -- processes -------------------------------------------------------------------------------
+
+    def kill(self, node: str) -> None:
+        """Kill a node's process."""
+        self.mark()
+        self.session.send(node, signal.SIGKILL)
+        self.session.await_end(node, 2.0)
+
+    def freeze(
+        self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None
+    ) -> None:
+        """Stop a node's process for a time [s], do something, then let it go on."""
+        self.mark()
+        self.session.send(node, signal.SIGSTOP)
+        begin = time.monotonic()
+        try:
+            meanwhile()
+            self.wait(seconds - (time.monotonic() - begin))
+        finally:
+            if self.is_composed or node in _SLAVE:
+                self.woken_ns = time.time_ns()
+            self.session.send(node, signal.SIGCONT)
+
+    def limit_files(self, node: str, room: int | None) -> None:
+        """Let files of a node's process grow by so many bytes only; None: as they like."""
+        self.session.limit_files(node, room)
+
+    def hog(self, seconds: float) -> None:
+        """Keep all cores busy for a time [s]."""
+        self.session.hog()
+        try:
+            self.wait(seconds)
+        finally:
+            self.session.relieve()
+
+    def start_bystander(self) -> None:
+        """Start a ROS process of others that listens to all streams."""
+        self.session.start_bystander()
+
+    def kill_bystander(self) -> None:
+        """Kill it."""
+        self.session.kill_bystander()
+
+    def control(self, word: int, offset_ns: int = 0) -> None:
+        """Say what the drill's own stage does, and by how much all clocks are off [ns]."""
+        self._control.write(word, offset_ns)
+
+    # -- topics ----------------------------------------------------------------------------------
+
+    def distort(self, distortion: Distortion) -> None:
+        """Let something become of the hand's samples on the way."""
+        self.tap.distortion = distortion
+
+    def mute_buttons(self, *, is_mute: bool) -> None:
+        """Send no buttons, or send them again."""
+        self.tap.is_mute = is_mute
+
+    def publish(self, topic: Topic, stamp_ns: int, values: Array) -> None:
+        """Send one message as another publisher of the topic would."""
+        form = layout(topic, self._robot.joint_names)
+        self._intruder(topic).publish(form.encode_one(stamp_ns, values))
+
+    def publish_bytes(self, topic: Topic, data: bytes) -> None:
+        """Send bytes that are no message as another publisher of the topic would."""
+        self._intruder(topic).publish(data)
+
+    def leave(self, topic: Topic) -> None:
+        """Close that other publisher."""
+        publisher = self._intruders.pop(topic.name, None)
+        if publisher is not None:
+            self._own.destroy_publisher(publisher)
+
+    def _intruder(self, topic: Topic) -> Any:
+        """Other publisher of a topic, once somebody hears it; the fault begins with it."""
+        if topic.name not in self._intruders:
+            kind = message_type(topic.kind.ros_type)
+            made = self._own.create_publisher(kind, f"/{topic.name}", profile(topic))
+            self._intruders[topic.name] = made
+            is_first = len(self._intruders) == 1
+            deadline = time.monotonic() + _FOUND
+            while made.get_subscription_count() == 0 and time.monotonic() < deadline:
+                time.sleep(2e-3)
+            if is_first:
+                self.mark()
+        return self._intruders[topic.name]
+
+    def press(self, *, is_pressed: bool) -> None:
+        """Send a message of the stop button."""
+        deadline = time.monotonic() + _FOUND
+        while self._stop.get_subscription_count() == 0 and time.monotonic() < deadline:
+            time.sleep(2e-3)
+        if is_pressed:
+            self.mark()
+        self._stop.publish(Bool(data=is_pressed))
+
+    # -- services --------------------------------------------------------------------------------
+
+    def command(self, name: str) -> bool:
+        """Ask the slave for something by service; whether it was done."""
+        return self.commands(name)[0]
+
+    def commands(self, *names: str) -> list[bool]:
+        """As :meth:`command`, some at once, without waiting for the answers in between."""
+        if not all(self._services[name].wait_for_service(_FOUND) for name in names):
+            return [False] * len(names)
+        asked = [self._services[name].call_async(Trigger.Request()) for name in names]
+        found = [self._answer(one) for one in asked]
+        return [one is not None and one.success for one in found]
+
+    def set(self, node: str, name: str, value: object) -> bool:
+        """Set a parameter of a running node; whether it was taken."""
+        entry = (
+            Parameter(name, _EMPTY.get(name, Parameter.Type.DOUBLE_ARRAY), [])
+            if value == []
+            else Parameter(name, value=value)
+        )
+        request = SetParameters.Request(parameters=[entry.to_parameter_msg()])
+        found = self._call(self._settings[node], request)
+        return bool(found is not None and all(one.successful for one in found.results))
+
+    def _call(self, client: Any, request: Any) -> Any:
+        """Answer of a service; None if there is none in time."""
+        if not client.wait_for_service(_FOUND):
+            return None
+        return self._answer(client.call_async(request))
+
+    def _answer(self, future: Any) -> Any:
+        """What a service answered; None if it did not in time."""
+        self._executor.spin_until_future_complete(future, _ANSWER)
+        return future.result() if future.done() else None

@@ -1,0 +1,216 @@
+"""Processes of a drill: the nodes of one session, each of which may be broken and started anew."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any
+
+import yaml
+
+from teleop_core.errors import SessionError
+from teleop_core.graph import RECORDER_NAME
+from teleop_core.nodes.children import Child, end_all
+from teleop_core.nodes.live import parameter_file
+from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.start import SESSION as SESSION_NODE
+from teleop_core.session.configuration import Configuration
+from teleop_drill.drill.exercise import Master
+
+_NEVER_NS = 2**62
+START_TIMEOUT = 180.0
+_MASTER, _SIMULATOR = "haptic_master", "slave_sim"
+_BUSY = "while True: pass"
+_BYSTANDER = "from teleop_drill.nodes.drill_tap import stand_by; stand_by()"
+_MIDDLEWARE = ("FASTRTPS_", "FASTDDS_", "ROS_AUTOMATIC", "ROS_LOCALHOST", "ROS_STATIC")
+
+
+class DrillSession:
+    """The nodes of a session in processes that this one has started; it touches no others.
+
+    Args:
+        configuration: What runs.
+        folder: Where the recordings go.
+        env: Environment of the processes.
+        observer: Who hears what nodes say of themselves.
+        is_composed: Whether all nodes share one process.
+        master: Who moves the hand.
+        drives: Command of the drives that the slave leads in place of the simulated ones.
+
+    Attributes:
+        recordings: Recordings so far, the present one last.
+    """
+
+    def __init__(
+        self, configuration: Configuration, folder: Path, env: dict[str, str], observer: Observer,
+        *, is_composed: bool, master: Master, drives: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        self._configuration, self._folder, self._env = configuration, folder, env
+        self._observer, self._is_composed = observer, is_composed
+        self._has_device, self._drives = master is Master.DEVICE, tuple(drives)
+        self._children: dict[str, Child] = {}
+        self._files: list[IO[str]] = []
+        self._others: list[subprocess.Popen[Any]] = []
+        self._bystander: subprocess.Popen[str] | None = None
+        self.recordings: list[Path] = []
+        self._begun_ns: list[int] = []
+        names = [member.name for member in configuration.graph.members]
+        self._nodes = [n for n in names if self._has_device or n != _MASTER]
+
+    # -- start and end ---------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start what does not run, the recorder first, and wait until all are at work.
+
+        Raises:
+            SessionError: One ends, or is not at work within three minutes.
+        """
+        for crew in self._crews():
+            waiting = []
+            for process, nodes in crew.items():
+                if not self.is_running(process):
+                    waiting += nodes
+                    self._launch(process)
+            self._await([name for name in waiting if not self._is_foreign(name)])
+
+    def _crews(self) -> tuple[dict[str, list[str]], ...]:
+        if self._is_composed:
+            return ({SESSION_NODE: [RECORDER_NAME, *self._nodes]},)
+        return ({RECORDER_NAME: [RECORDER_NAME]}, {name: [name] for name in self._nodes})
+
+    def _launch(self, process: str) -> None:
+        if process in {RECORDER_NAME, SESSION_NODE}:
+            self.recordings.append(self._folder / f"recording_{len(self.recordings) + 1}")
+            self._begun_ns.append(time.time_ns())
+        # Kept open: a process that is started later reads it as well.
+        file = tempfile.TemporaryFile("w+")  # noqa: SIM115
+        file.write(self._parameters())
+        file.flush()
+        self._files.append(file)
+        if process in self._children:
+            self._children[process].end()
+        command = self._drives if self._is_foreign(process) else ()
+        self._children[process] = Child(process, file, self._env, command)
+
+    def _is_foreign(self, process: str) -> bool:
+        return bool(self._drives) and process == _SIMULATOR
+
+    def _parameters(self) -> str:
+        text = parameter_file(self._configuration, str(self.recordings[-1]))
+        if self._has_device:
+            return text
+        content = yaml.safe_load(text)
+        content[f"/{_MASTER}"]["ros__parameters"]["autostart"] = False
+        return str(yaml.safe_dump(content, allow_unicode=True))
+
+    def _await(self, nodes: list[str]) -> None:
+        for name in nodes:
+            self._observer.statuses.pop(name, None)
+        deadline = time.monotonic() + START_TIMEOUT
+        while not all(self._observer.is_active(name) for name in nodes):
+            self._observer.listen(0.05)
+            for child in self._children.values():
+                if not self._is_alive(child):
+                    child.check()
+            if time.monotonic() > deadline:
+                raise SessionError(f"{', '.join(nodes)}: not at work after {START_TIMEOUT:g} s")
+
+    def close(self) -> None:
+        """End all, in order."""
+        for other in self._others:
+            other.kill()
+            other.wait()
+        self._others.clear()
+        for child in self._children.values():
+            with suppress(ProcessLookupError):
+                os.kill(child.pid, signal.SIGCONT)
+        recorder = self._children.pop(RECORDER_NAME, None)
+        end_all(self._children.values())
+        end_all([recorder] if recorder else [])
+        self._children.clear()
+        for file in self._files:
+            file.close()
+
+    def until_ns(self, recording: Path) -> int:
+        """When the recording after one was begun [ns]; later than all without another."""
+        place = self.recordings.index(recording) + 1
+        return self._begun_ns[place] if place < len(self._begun_ns) else _NEVER_NS
+
+    # -- what can be done to them ----------------------------------------------------------------
+
+    def is_running(self, node: str) -> bool:
+        """Whether the process of a node runs."""
+        child = self._children.get(self._process(node))
+        return child is not None and self._is_alive(child)
+
+    def dead(self) -> list[str]:
+        """Processes that have ended."""
+        return [name for name in self._children if not self.is_running(name)]
+
+    @staticmethod
+    def _is_alive(child: Child) -> bool:
+        try:  # looked at only: who has started it is to learn how it ended
+            return os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
+        except ChildProcessError:
+            return False
+
+    def _process(self, node: str) -> str:
+        return SESSION_NODE if self._is_composed else node
+
+    def _pid(self, node: str) -> int:
+        return self._children[self._process(node)].pid
+
+    def send(self, node: str, number: int) -> None:
+        """Send a signal to a node's process."""
+        os.kill(self._pid(node), number)
+
+    def await_end(self, node: str, timeout: float) -> None:
+        """Wait until a node's process has ended, or for so long [s]."""
+        deadline = time.monotonic() + timeout
+        while self.is_running(node) and time.monotonic() < deadline:
+            time.sleep(0.01)
+
+    def limit_files(self, node: str, room: int | None) -> None:
+        """Let files of a node's process grow by so many bytes only; None: as they like."""
+        if not self.is_running(node):
+            return
+        pid = self._pid(node)
+        _, hard = resource.prlimit(pid, resource.RLIMIT_FSIZE)
+        size = sum(file.stat().st_size for file in self.recordings[-1].glob("*.mcap"))
+        soft = hard if room is None else size + room
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (soft, hard))
+
+    def hog(self) -> None:
+        """Start a process on each core that does nothing but work."""
+        for _ in range(os.cpu_count() or 1):
+            self._others.append(subprocess.Popen([sys.executable, "-S", "-c", _BUSY]))
+
+    def relieve(self) -> None:
+        """End them."""
+        while self._others:
+            other = self._others.pop()
+            other.kill()
+            other.wait()
+
+    def start_bystander(self) -> None:
+        """Start a ROS process with the middleware's own settings that listens to all streams."""
+        env = {k: v for k, v in self._env.items() if not k.startswith(_MIDDLEWARE)}
+        self._bystander = subprocess.Popen(
+            [sys.executable, "-c", _BYSTANDER], env=env, stdout=subprocess.PIPE, text=True
+        )
+        self._others.append(self._bystander)
+        assert self._bystander.stdout is not None
+        if self._bystander.stdout.readline() != "listens\n":
+            raise SessionError("the bystander did not start")
+
+    def kill_bystander(self) -> None:
+        """Kill it."""
+        if self._bystander is not None:
+            self._bystander.kill()
+            self._bystander.wait()

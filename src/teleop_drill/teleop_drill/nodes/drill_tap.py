@@ -1,0 +1,249 @@
+"""Tap of a drill: the hand of the drill on its topics, and what the slave says, in one thread."""
+
+import struct
+import threading
+import time
+from array import array
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from rclpy.node import Node
+
+from teleop_core.bags.messages import (
+    SECOND_NS,
+    Layout,
+    Refusal,
+    Values,
+    layout,
+    read_any,
+    read_numbers,
+)
+from teleop_core.geometry import Array
+from teleop_core.nodes.real_time import apply_options
+from teleop_core.nodes.streams import Subscription, message_type, profile
+from teleop_core.session.layers import RealTimeParameters
+from teleop_core.topics import (
+    MASTER_BUTTONS,
+    MASTER_MEASURED_CP,
+    NO_COMMAND_NS,
+    SLAVE_MEASURED_CP,
+    SLAVE_MEASURED_JS,
+    SLAVE_OPERATION,
+    SLAVE_SETPOINT_JS,
+    SLAVE_TRUE_CP,
+    TELEOP_STATE,
+    Topic,
+)
+from teleop_drill.drill import hand
+from teleop_drill.drill.hand import Distortion, Sample
+from teleop_drill.drill.measure import Trace
+from teleop_drill.drill.numbers import Scheduling
+from teleop_drill.drill.recordings import Counted
+
+STREAMS_HEARD = (SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_TRUE_CP)
+"""Streams that are heard, and counted against the recording."""
+_HEARD = (*STREAMS_HEARD, SLAVE_OPERATION, TELEOP_STATE)
+_STAMP = struct.Struct("<iI")
+_DAY_NS = 86_400 * SECOND_NS
+_STAMP_AT = 4  # behind the encapsulation
+_QUEUE = 4000
+_BUTTONS_EVERY = 5
+_FAR_BEHIND = 0.1
+Heard = list[tuple[int, int, bytes]]
+
+
+class Tap:
+    """Hears the slave, and moves the hand if asked to; works from its making until :meth:`close`.
+
+    Args:
+        node: Node that owns its topics; no executor serves it.
+        joint_names: Of the slave.
+        real_time: What its thread asks of the system.
+        has_hand: Whether it is the master.
+
+    Attributes:
+        distortion: What becomes of the hand's samples.
+        is_mute: Whether no buttons are sent.
+    """
+
+    def __init__(
+        self, node: Node, joint_names: tuple[str, ...], real_time: RealTimeParameters, *,
+        has_hand: bool,
+    ) -> None:  # fmt: skip
+        self._real_time = real_time
+        self.distortion: Distortion = hand.faithful
+        self.is_mute, self._joint_names = False, joint_names
+        self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
+        self._counted = {topic.name: (array("q"), array("q")) for topic in STREAMS_HEARD}
+        self._late: list[tuple[int, float]] = []
+        self._subscriptions = [Subscription(node, t, f"/{t.name}", _QUEUE) for t in _HEARD]
+        self._hand = _Hand(node, self) if has_hand else None
+        self._is_running, self._lock = True, threading.Lock()
+        self._thread = threading.Thread(target=self._run, name="tap", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Fall silent."""
+        self._is_running = False
+        self._thread.join()
+        for subscription in self._subscriptions:
+            subscription.close()
+
+    def clear(self) -> None:
+        """Forget what was heard, but the last of each topic that is sent where it changes."""
+        with self._lock:
+            self._late.clear()
+            for topic in _HEARD:
+                keep = -1 if topic in {SLAVE_OPERATION, TELEOP_STATE} else -400
+                self._heard[topic.name] = self._heard[topic.name][keep:]
+
+    def trace(self, topic: Topic) -> Trace:
+        """What was heard of a stream."""
+        with self._lock:
+            heard = list(self._heard[topic.name])
+        form = layout(topic, self._joint_names)
+        found = [(sent, number, self._read(topic, form, data)) for sent, number, data in heard]
+        sound = [(s, number, one) for s, number, one in found if not isinstance(one, Refusal)]
+        rows = [values for *_, (_, values) in sound]
+        return Trace(
+            np.array([sent for sent, *_ in sound], np.int64),
+            np.array([number for _, number, _ in sound], np.int64),
+            np.array(rows) if rows else np.empty((0, form.width)),
+            np.array([stamp for *_, (stamp, _) in sound], np.int64),
+        )
+
+    def counted(self) -> Counted:
+        """Of every stream: when each message since the start was sent, and its stamp [ns]."""
+        with self._lock:
+            both = {n: [np.array(a, np.int64) for a in two] for n, two in self._counted.items()}
+        return {name: (sent, stamps) for name, (sent, stamps) in both.items()}
+
+    def scheduling(self, since_ns: int) -> Scheduling:
+        """How late this thread was woken since a time [ns]."""
+        with self._lock:
+            late = [seconds for at_ns, seconds in self._late if at_ns >= since_ns]
+        return Scheduling(float(np.median(late)), max(late)) if late else Scheduling()
+
+    def recent(self, topic: Topic, count: int) -> Array:
+        """Values of the newest messages of a stream, shape (at most count, width)."""
+        with self._lock:
+            heard = self._heard[topic.name][-count:]
+        form = layout(topic, self._joint_names)
+        found = [self._read(topic, form, data) for *_, data in heard]
+        rows = [one[1] for one in found if not isinstance(one, Refusal)]
+        return np.array(rows) if rows else np.empty((0, form.width))
+
+    def _read(self, topic: Topic, form: Layout, data: bytes) -> tuple[int, Values] | Refusal:
+        """Stamp and values of a message, of ours or of anybody's."""
+        return form.decode_one(data) or read_any(topic.kind, data, self._joint_names)
+
+    def age(self, topic: Topic) -> float:
+        """Time since the newest message of a topic was sent [s]; infinite before the first."""
+        with self._lock:
+            heard = self._heard[topic.name]
+            return 1e-9 * (time.time_ns() - heard[-1][0]) if heard else float("inf")
+
+    def reports(self, topic: Topic) -> list[tuple[int, dict[str, float]]]:
+        """Reports of a topic, each with the time at which it was sent [ns]."""
+        with self._lock:
+            heard = list(self._heard[topic.name])
+        found = [(sent, read_numbers(data, topic.columns)) for sent, _, data in heard]
+        return [
+            (sent, dict(zip(topic.columns, one[1].tolist(), strict=True)))
+            for sent, one in found
+            if isinstance(one, tuple)
+        ]
+
+    def _run(self) -> None:
+        apply_options(self._real_time)
+        due = time.monotonic()
+        while self._is_running:
+            if self._hand is not None:
+                self._hand.move()
+            self._listen()
+            due += hand.PERIOD
+            now = time.monotonic()
+            if (
+                due <= now
+            ):  # its own work took longer than a period: nothing is known of the machine
+                due = now if due < now - _FAR_BEHIND else due
+                continue
+            time.sleep(due - now)
+            self._late.append((time.time_ns(), max(0.0, time.monotonic() - due)))
+
+    def _listen(self) -> None:
+        with self._lock:
+            for subscription in self._subscriptions:
+                heard = self._heard[subscription.topic.name]
+                while (taken := subscription.take()) is not None:
+                    data, about = taken
+                    number = about["publication_sequence_number"]
+                    sent_ns = about["source_timestamp"]
+                    if self._count(subscription.topic.name, sent_ns, data):
+                        heard.append((sent_ns, number, data))
+
+    def _count(self, name: str, sent_ns: int, data: bytes) -> bool:
+        """Count a message of a stream; False for one that the drill itself has forged."""
+        if name not in self._counted:
+            return True
+        if len(data) < _STAMP_AT + _STAMP.size:
+            return False
+        seconds, nanoseconds = _STAMP.unpack_from(data, _STAMP_AT)
+        stamp_ns = seconds * SECOND_NS + nanoseconds
+        if stamp_ns != NO_COMMAND_NS and abs(stamp_ns - sent_ns) >= _DAY_NS:
+            return False
+        sent, stamps = self._counted[name]
+        sent.append(sent_ns)
+        stamps.append(stamp_ns)
+        return True
+
+
+class _Hand:
+    """Publishers of the hand."""
+
+    def __init__(self, node: Node, tap: Tap) -> None:
+        self._tap, self._begin, self._count = tap, time.monotonic(), 0
+        self._pose = sender(node, MASTER_MEASURED_CP, ())
+        self._buttons = sender(node, MASTER_BUTTONS, ())
+
+    def move(self) -> None:
+        """Send what is due."""
+        stamp_ns = time.time_ns()
+        pose = hand.circle(time.monotonic() - self._begin)
+        if self._count % _BUTTONS_EVERY == 0 and not self._tap.is_mute:
+            self._buttons(stamp_ns, np.zeros(3))
+        for sample in self._tap.distortion(Sample(stamp_ns, pose)):
+            self._pose(sample.stamp_ns, sample.pose)
+        self._count += 1
+
+
+def sender(node: Node, topic: Topic, joint_names: tuple[str, ...]) -> Callable[[int, Array], None]:
+    """Sender of stamps [ns] and values as a message of a topic."""
+    publisher: Any = node.create_publisher(
+        message_type(topic.kind.ros_type), f"/{topic.name}", profile(topic)
+    )
+    form = layout(topic, joint_names)
+    return lambda stamp_ns, values: publisher.publish(form.encode_one(stamp_ns, values))
+
+
+def stand_by() -> None:
+    """Listen to all streams as a process of others, and say so; until it is killed."""
+    import rclpy
+
+    from teleop_core.topics import STREAMS
+
+    rclpy.init()
+    node = rclpy.create_node("drill_bystander")
+    heard = [0]
+
+    def hear(_: bytes) -> None:
+        heard[0] += 1
+        if heard[0] == 100:
+            print("listens", flush=True)
+
+    for topic in STREAMS:
+        kind = message_type(topic.kind.ros_type)
+        node.create_subscription(kind, f"/{topic.name}", hear, profile(topic, 10), raw=True)
+    while True:
+        rclpy.spin_once(node)

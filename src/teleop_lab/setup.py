@@ -1,0 +1,33 @@
+"""Install teleop_lab with pip or colcon; constraints.txt at the top pins dependencies."""
+
+from setuptools import find_packages, setup
+
+COMMANDS = ("calibrate", "experiment", "fit", "reach")
+VERSION = "0.6.0"  # released together with teleop_core
+
+setup(
+    name="teleop_lab",
+    version=VERSION,
+    description="Experiments, calibration, fitting and planning for teleop_core",
+    license="Apache-2.0",
+    packages=find_packages(include=["teleop_lab", "teleop_lab.*"]),
+    package_data={"teleop_lab": ["py.typed", "*.pyi", "fitting/*.csv"]},
+    python_requires=">=3.11",
+    install_requires=[
+        f"teleop_core=={VERSION}",
+        "lazy_loader",
+        "numpy",
+        "pandas",
+        "plotly",
+        "pyyaml",
+        "rich",
+        "scipy",
+    ],
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/teleop_lab"]),
+        ("share/teleop_lab", ["package.xml"]),
+    ],
+    entry_points={
+        "teleop_core.commands": [f"{name} = teleop_lab.commands.{name}:add" for name in COMMANDS]
+    },
+)

@@ -1,0 +1,13 @@
+from . import calibration as calibration, experiments as experiments
+from .experiments import (
+    Bench as Bench,
+    Experiment as Experiment,
+    Findings as Findings,
+    Outcome as Outcome,
+    Row as Row,
+    register_experiment as register_experiment,
+)
+from .fitting import FitError as FitError, FitResult as FitResult, fit_plant as fit_plant
+from .planning.reach import Reach as Reach, reach as reach
+
+__version__: str

@@ -1,0 +1,185 @@
+"""Calibration: how an arm was really built, from measured places of its tip.
+
+:func:`simulate` measures an arm with known errors, :func:`calibrate` takes measurements of yours::
+
+    from teleop_lab.calibration import calibrate, read_measured, simulate
+    from teleop_core.robots import load_robot
+
+    robot = load_robot("rcrt1")
+    print(simulate(robot, poses=40, noise=0.1e-3, errors=["cnc", "d3=5.5e-3"]))
+    print(calibrate(robot, read_measured("poses.csv", robot)))
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from teleop_core.robots.link_errors import LinkErrors
+from teleop_core.robots.robot import Robot
+from teleop_lab.calibration import appendix_e
+from teleop_lab.calibration.accuracy import Accuracy, at_fresh, at_measured, left_out
+from teleop_lab.calibration.identify import Found, identify
+from teleop_lab.calibration.measured import CalibrationError, Measured, read_measured
+from teleop_lab.calibration.model import FRAME, Model
+from teleop_lab.calibration.poses import random_poses
+from teleop_lab.calibration.simulate import (
+    RULER,
+    chosen_poses,
+    default_errors,
+    ruled,
+    tracked,
+    true_errors,
+)
+
+if TYPE_CHECKING:
+    from teleop_lab.calibration.corrected import Table
+
+__all__ = [
+    "Accuracy",
+    "Calibration",
+    "CalibrationError",
+    "Found",
+    "LinkErrors",
+    "Measured",
+    "Model",
+    "appendix_e",
+    "calibrate",
+    "read_measured",
+    "simulate",
+]
+FRESH = 500
+"""Poses at which a simulated calibration is tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What a calibration found, and what it is worth.
+
+    Attributes:
+        robot: The arm as drawn.
+        measured: The readings.
+        found: Link errors and their confidence intervals.
+        fitted: Accuracy at the poses measured.
+        tried: Accuracy at poses that the errors were not found from; None where they are too few.
+        truth: Errors of a simulated arm; None for a real one.
+        equivalent: What a perfect fit would give the entries found for it; an entry that others act
+            as is the sum of all. Empty for a real arm.
+    """
+
+    robot: Robot
+    measured: Measured
+    found: Found
+    fitted: Accuracy
+    tried: Accuracy | None
+    truth: LinkErrors | None = None
+    equivalent: Mapping[str, float] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        from teleop_lab.calibration.report import text
+
+        return text(self)
+
+    def to_json(self) -> dict[str, object]:
+        """All numbers [m, rad], for JSON."""
+        from teleop_lab.calibration.report import content
+
+        return content(self)
+
+    def table(self) -> "Table":
+        """The arm as found, as a table for :func:`teleop_core.robots.robot_from_table`."""
+        from teleop_lab.calibration.corrected import corrected_table
+
+        return corrected_table(self.robot, self.found.errors)
+
+
+def calibrate(
+    robot: Robot,
+    measured: Measured,
+    fit: str | Sequence[str] = "all",
+    *,
+    finds_frame: bool = False,
+    keeps_all: bool = False,
+) -> Calibration:
+    """Link errors of an arm from measurements.
+
+    Args:
+        robot: The arm as drawn; a chain of links.
+        measured: Points or distances of the tip, as of :func:`read_measured`.
+        fit: "all" link errors, joint "offsets", or names such as ["d3", "theta2"].
+        finds_frame: Whether points are in a frame whose place is not known, as those of a tracker.
+        keeps_all: Whether errors stay that are not told from zero.
+
+    Raises:
+        ParameterError: The robot is no chain.
+        UnknownNameError: ``fit`` names what is no link error.
+        CalibrationError: Too few poses, errors that cannot be told apart, or no convergence.
+    """
+    model = Model.of(robot)
+    found = identify(model, measured, fit, finds_frame=finds_frame, keeps_all=keeps_all)
+    return Calibration(
+        robot, measured, found, at_measured(found, measured), left_out(found, measured)
+    )
+
+
+def simulate(
+    robot: Robot,
+    *,
+    poses: int = 40,
+    noise: float | str = 0.1e-3,
+    errors: Sequence[str] | None = None,
+    fit: str | Sequence[str] | None = None,
+    choose: str = "optimal",
+    finds_frame: bool = False,
+    keeps_all: bool = False,
+    seed: int = 1,
+) -> Calibration:
+    """Calibrate an arm whose errors are known, measured at simulated poses.
+
+    Args:
+        robot: The arm as drawn; a chain of links.
+        poses: How many are measured.
+        noise: Standard deviation of a tracker on each axis [m], or "ruler" of 0.5 mm, which is laid
+            along one axis after the other.
+        errors: Tolerances and values as of :func:`~teleop_lab.calibration.simulate.true_errors`;
+            None for "cnc", of the rcrt1 with the published offset of d3.
+        fit: As of :func:`calibrate`; None for "all", of a ruler for "offsets".
+        choose: "optimal" or "random" poses of a tracker.
+        finds_frame: Whether the tracker has a frame of its own, which is found too.
+        keeps_all: Whether errors stay that are not told from zero.
+        seed: Of poses, errors and noise.
+
+    Raises:
+        ParameterError, UnknownNameError, CalibrationError: As of :func:`calibrate`, and for values
+            that are not possible.
+    """
+    model, rng = Model.of(robot), np.random.default_rng(seed)
+    truth = true_errors(robot, default_errors(robot) if errors is None else errors, rng)
+    is_ruler = noise == RULER
+    wanted = fit if fit is not None else "offsets" if is_ruler else "all"
+    if isinstance(noise, str):
+        if not is_ruler:
+            raise CalibrationError(f"noise is {noise!r}, must be a number [m] or {RULER!r}")
+        measured = ruled(model, truth, poses)
+    else:
+        q = chosen_poses(model, poses, choose, wanted, rng)
+        measured = tracked(model, truth, q, noise, rng, is_elsewhere=finds_frame)
+    found = identify(model, measured, wanted, finds_frame=finds_frame, keeps_all=keeps_all)
+    sums = found.equivalent(truth, random_poses(robot, FRESH, rng))
+    return Calibration(
+        robot, measured, found, at_measured(found, measured),
+        _tried(found, truth, measured, finds_frame, rng), truth,
+        {name: value for name, value in sums.items() if name not in FRAME},
+    )  # fmt: skip
+
+
+def _tried(
+    found: Found, truth: LinkErrors, measured: Measured, finds_frame: bool,
+    rng: np.random.Generator,
+) -> Accuracy | None:  # fmt: skip
+    """Accuracy at fresh poses, without noise; of a tracker elsewhere at poses left out."""
+    if finds_frame:
+        return left_out(found, measured)
+    q = random_poses(found.model.robot, FRESH, rng)
+    return at_fresh(found, tracked(Model.of(found.model.robot), truth, q, 0.0, rng))

@@ -1,0 +1,88 @@
+"""Identifiability: which entries of a model measurements tell apart, and what hides the others.
+
+It is found by the singular values of the identification Jacobian with columns of unit length: as
+long as the ratio of the largest to the smallest is above a bound, one entry of the weakest
+combination is left at zero, a length or a twist before a joint offset.
+
+Source:
+    Bound of 100: Schröer 1993, as quoted in the chapter on model identification by Hollerbach,
+    Khalil and Gautier of the Springer handbook of robotics, 2016, which has the elimination by
+    singular values too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.geometry import Array
+from teleop_lab.calibration.model import FRAME, Model
+
+WORST_CONDITION = 100.0
+# Motion of the tip [m] per metre of an entry, or of the arm's length times its angle, below which
+# it does not move it; and share of a column below which what others leave of it is rounding.
+_NOTHING, _SAME = 1e-9, 1e-6
+# How readily an entry is left out: links before offsets, and the frame last.
+_LINK, _OFFSET, _FRAME = 1.0, 0.2, 0.01
+
+
+@dataclass(frozen=True)
+class Left:
+    """Entry that was left at zero, and why."""
+
+    name: str
+    reason: str
+
+
+def select(
+    model: Model, J: Array, names: Sequence[str], worst_condition: float
+) -> tuple[tuple[str, ...], tuple[Left, ...]]:
+    """Names that readings with slopes J (m, 4n + 6) tell apart, and the others with reasons."""
+    column = {name: J[:, model.names.index(name)] for name in names}
+    lever = {name: model.size if model.unit(name) == "rad" else 1.0 for name in names}
+    effect = {name: float(np.linalg.norm(column[name])) / lever[name] for name in names}
+    kept = [name for name in names if effect[name] > _NOTHING * np.sqrt(len(J))]
+    moving = list(kept)
+    while kept and condition(np.column_stack([column[name] for name in kept])) > worst_condition:
+        kept.remove(_weakest(model, column, kept))
+    left = []
+    for name in names:
+        if name not in moving:
+            left.append(Left(name, "does not change what is measured"))
+        elif name not in kept:
+            left.append(Left(name, _reason(column, name, kept)))
+    return tuple(kept), tuple(left)
+
+
+def _unit_columns(columns: Array) -> Array:
+    return columns / np.linalg.norm(columns, axis=0)
+
+
+def condition(columns: Array) -> float:
+    """Ratio of the largest to the smallest singular value of columns of unit length."""
+    values = np.linalg.svd(_unit_columns(columns), compute_uv=False)
+    if len(values) < columns.shape[1] or values[-1] == 0.0:
+        return float("inf")
+    return float(values[0] / values[-1])
+
+
+def _weakest(model: Model, column: dict[str, Array], kept: list[str]) -> str:
+    """Entry that has the largest part in the combination that readings tell the least of."""
+    _, _, Vt = np.linalg.svd(_unit_columns(np.column_stack([column[k] for k in kept])))
+    ease = [
+        _FRAME if name in FRAME else _OFFSET if name in model.offsets else _LINK for name in kept
+    ]
+    return kept[int(np.argmax(np.abs(Vt[-1]) * ease))]
+
+
+def _reason(column: dict[str, Array], name: str, kept: Sequence[str]) -> str:
+    """What an entry cannot be told from."""
+    A = np.column_stack([column[k] for k in kept])
+    share = np.linalg.lstsq(_unit_columns(A), column[name], rcond=None)[0]
+    rest = column[name] - _unit_columns(A) @ share
+    length = np.linalg.norm(column[name])
+    order = np.argsort(-np.abs(share))
+    many = [kept[i] for i in order if abs(share[i]) > 0.05 * length][:4]
+    how = "acts as" if np.linalg.norm(rest) < _SAME * length else "is hardly told from"
+    together = " together" if len(many) > 1 else ""
+    return f"{how} {' and '.join(filter(None, (', '.join(many[:-1]), many[-1])))}{together}"

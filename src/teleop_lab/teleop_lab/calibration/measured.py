@@ -1,0 +1,184 @@
+"""Measured: what an instrument says of the tip, pose by pose, and where such tables come from."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from teleop_core.damage import damage_told
+from teleop_core.errors import ParameterError, ShapeError, TeleopError
+from teleop_core.exchange.names import without_unit
+from teleop_core.geometry import Array, checked_array
+from teleop_core.robots.robot import Robot
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+_ANGLES = {"": 1.0, "rad": 1.0, "deg": np.pi / 180.0}
+# Farther beyond the limits, in shares of their distance, is no pose of the arm but another unit.
+_BEYOND = 0.5
+
+
+class CalibrationError(TeleopError):
+    """Measurements do not tell what is asked of them; the text says why, and what would."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measured:
+    """Readings of an instrument at poses of an arm; the arrays are read-only copies.
+
+    Args:
+        joints: What the encoders said, (N, n) [rad, m].
+        points: Place of the tip (N, 3) [m], NaN where an axis was not read; None for distances.
+        distances: Distance (N,) [m] of the tip from where it was at ``origins``; None for points.
+        origins: Joint vectors (N, n) from which distances count; None for points.
+        labels: A name for each reading under which errors of distances are counted, such as the
+            axis along which the tip went; empty for none.
+
+    Raises:
+        ShapeError: Arrays that do not belong together.
+        ParameterError: Neither points nor distances, or joints that are not finite.
+    """
+
+    joints: Array
+    points: Array | None = None
+    distances: Array | None = None
+    origins: Array | None = None
+    labels: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        joints = np.array(self.joints, dtype=np.float64)
+        if joints.ndim != 2:
+            raise ShapeError("joints", "(N, n)", joints.shape)
+        checked_array("joints", joints, joints.shape[1:])
+        if (self.points is None) == (self.distances is None):
+            raise ParameterError("measured", "both or none", "either points or distances")
+        count = len(joints)
+        for name, shape in (
+            ("joints", joints.shape), ("points", (count, 3)), ("distances", (count,)),
+            ("origins", joints.shape),
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = np.array(value, dtype=np.float64)
+            if array.shape != shape:
+                raise ShapeError(name, shape, array.shape)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        if self.distances is not None and self.origins is None:
+            raise ParameterError("origins", None, "joint vectors from which distances count")
+        if self.labels and len(self.labels) != count:
+            raise ShapeError("labels", (count,), (len(self.labels),))
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    @property
+    def readings(self) -> int:
+        """Numbers that were read: up to three a pose."""
+        if self.points is not None:
+            return int(np.isfinite(self.points).sum())
+        return len(self)
+
+    def part(self, rows: Array) -> "Measured":
+        """Some of the poses, by a mask or by their places."""
+        at = np.arange(len(self))[rows]
+        return Measured(
+            joints=self.joints[at],
+            points=None if self.points is None else self.points[at],
+            distances=None if self.distances is None else self.distances[at],
+            origins=None if self.origins is None else self.origins[at],
+            labels=tuple(self.labels[i] for i in at) if self.labels else (),
+        )
+
+
+def read_measured(path: Path, robot: Robot) -> Measured:
+    """Measured poses from a CSV file: a column per joint, and x, y, z of the tip.
+
+    Joints are called as the robot calls them, or q1 ... qn, in metres and radians; ``x [mm]``,
+    ``theta1_deg`` and their like say another unit. Cells of x, y, z may be empty. Other columns
+    are left out.
+
+    Raises:
+        RecordingError: It cannot be read, or is no table of text.
+        CalibrationError: Columns are missing, cells are no numbers, or joints are far beyond their
+            limits, which are in another unit as a rule.
+    """
+    import pandas as pd
+
+    with damage_told(path, "is no table of text with a head ({})"):
+        frame = pd.read_csv(path, sep=None, engine="python", comment="#", skipinitialspace=True)
+    found = {_plain(name): name for name in map(str, frame.columns)}
+    joints, slides = np.empty((len(frame), robot.n)), _slides(robot)
+    for i, name in enumerate(robot.joint_names):
+        column = found.get(_plain(name), found.get(f"q{i + 1}"))
+        if column is None:
+            raise _missing(path, f"joint {name} (or q{i + 1})", frame.columns)
+        joints[:, i] = _numbers(path, frame, column, _LENGTHS if name in slides else _ANGLES)
+    points = np.empty((len(frame), 3))
+    for i, axis in enumerate("xyz"):
+        if axis not in found:
+            raise _missing(path, axis, frame.columns)
+        points[:, i] = _numbers(path, frame, found[axis], _LENGTHS, may_miss=True)
+    _check_joints(path, joints, robot)
+    return Measured(joints=joints, points=points)
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^0-9a-z]+", "", without_unit(name)[0].lower())
+
+
+def _slides(robot: Robot) -> tuple[str, ...]:
+    """Names of the sliding joints."""
+    from teleop_lab.calibration.model import Model
+
+    kinds = Model.of(robot).chain.kinds
+    return tuple(n for n, kind in zip(robot.joint_names, kinds, strict=True) if abs(kind) > 1.5)
+
+
+def _missing(path: Path, what: str, columns: Iterable[str]) -> CalibrationError:
+    names = ", ".join(map(str, columns))
+    return CalibrationError(f"{path}: has no column for {what}; its columns are {names}")
+
+
+def _numbers(
+    path: Path,
+    frame: "pd.DataFrame",
+    column: str,
+    units: dict[str, float],
+    *,
+    may_miss: bool = False,
+) -> Array:
+    """Column in SI units; NaN only where cells may miss."""
+    import pandas as pd
+
+    cells = frame[column]
+    unit = without_unit(column)[1]
+    if unit not in units:
+        known = ", ".join(sorted(filter(None, units)))
+        raise CalibrationError(f"{path}: column {column!r} is in {unit!r}, must be in {known}")
+    values = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64)
+    bad = ~np.isfinite(values) & (~cells.isna().to_numpy() if may_miss else True)
+    if bad.any():
+        row = int(np.argmax(bad))
+        cell = f"'{cells.iloc[row]}'"
+        raise CalibrationError(f"{path}: row {row + 1} of {column!r} is {cell}, must be a number")
+    return np.asarray(values * units[unit], dtype=np.float64)
+
+
+def _check_joints(path: Path, joints: Array, robot: Robot) -> None:
+    margin = _BEYOND * (robot.upper - robot.lower)
+    is_bad = (joints < robot.lower - margin) | (joints > robot.upper + margin)
+    if not is_bad.any():
+        return
+    row, i = map(int, np.argwhere(is_bad)[0])
+    name, low, high = robot.joint_names[i], robot.lower[i], robot.upper[i]
+    raise CalibrationError(
+        f"{path}: row {row + 1}: {name} is {joints[row, i]:g}, far from its limits {low:.4g} to "
+        f"{high:.4g}; say its unit in the head, such as '{name}_deg' or '{name} [mm]'"
+    )

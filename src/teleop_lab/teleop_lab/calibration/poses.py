@@ -1,0 +1,53 @@
+"""Poses for a calibration: at random inside the limits, or those that tell most (D-optimality)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from teleop_core.geometry import Array
+from teleop_core.robots.robot import Robot
+from teleop_lab.calibration.model import Model
+
+CANDIDATES = 400
+"""Random poses from which the best are chosen."""
+_START = 1e-6  # of the information about each entry before the first pose
+
+
+def random_poses(robot: Robot, count: int, rng: np.random.Generator) -> Array:
+    """Joint vectors (count, n), even inside the limits [rad, m]."""
+    return rng.uniform(robot.lower, robot.upper, (count, robot.n))
+
+
+def optimal_poses(
+    model: Model, count: int, names: Sequence[str], rng: np.random.Generator
+) -> Array:
+    """Joint vectors (count, n) at which points of the tip tell most about some entries.
+
+    Out of :data:`CANDIDATES` random ones, each the one that raises the determinant of the
+    information matrix JᵀJ most; none is taken twice before all were.
+
+    Args:
+        model: The arm as drawn.
+        count: Number of poses.
+        names: Entries that can be told apart.
+        rng: Source of the candidates.
+
+    Source:
+        Fedorov 1972, Theory of optimal experiments: forward steps; for calibration
+        Borm and Menq 1991.
+    """
+    pool = random_poses(model.robot, max(CANDIDATES, 2 * count), rng)
+    J = model.jacobian(pool, np.zeros(len(model.names)))
+    J = J[:, :, [model.names.index(name) for name in names]]
+    J = J / np.sqrt((J**2).sum(axis=(0, 1)))
+    # The determinant of a sum M + JᵀJ is that of M times that of I + J M⁻¹ Jᵀ, (3, 3).
+    inverse, chosen = np.eye(len(names)) / _START, list[int]()
+    for _ in range(count):
+        spread = np.einsum("nij,jk,nlk->nil", J, inverse, J, optimize=True)
+        gain = np.linalg.slogdet(np.eye(3) + spread)[1]
+        gain[chosen] = -np.inf
+        best = int(np.argmax(gain))
+        chosen.append(best)
+        part = inverse @ J[best].T
+        inverse -= part @ np.linalg.solve(np.eye(3) + spread[best], part.T)
+    return np.asarray(pool[chosen])

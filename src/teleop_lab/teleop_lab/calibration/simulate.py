@@ -1,0 +1,133 @@
+"""Simulated calibration: errors drawn from tolerances, and instruments that measure an arm."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.geometry import Array
+from teleop_core.robots.link_errors import LinkErrors
+from teleop_core.robots.robot import Robot
+from teleop_lab.calibration import appendix_e
+from teleop_lab.calibration.identifiable import WORST_CONDITION, select
+from teleop_lab.calibration.identify import wanted_names
+from teleop_lab.calibration.measured import CalibrationError, Measured
+from teleop_lab.calibration.model import Model, rotation_of
+from teleop_lab.calibration.poses import optimal_poses, random_poses
+
+TOLERANCES = {"cnc": 20e-6, "prototype": 100e-6}
+"""Half widths of tolerances [m], published: Vongbunyong 2008, chapter 3, of milled and of
+rapid-prototyped parts."""
+SEAT = 0.05
+"""Lever [m] over which a tolerance turns an axis; assumed: the size of a bearing seat or a link."""
+RULER = "ruler"
+CHOICES = ("optimal", "random")
+_FAR = 0.5  # [m] from the base to a tracker whose place nobody knows
+
+
+def default_errors(robot: Robot) -> tuple[str, ...]:
+    """Errors of an arm for which none are given: milled parts; of the rcrt1 the offset of d3."""
+    offset = (f"d3={appendix_e.OFFSET_OF_D3}",) if robot.name == "rcrt1" else ()
+    return ("cnc", *offset)
+
+
+def true_errors(robot: Robot, texts: Sequence[str], rng: np.random.Generator) -> LinkErrors:
+    """Link errors of an arm: drawn from tolerances, or given.
+
+    Args:
+        robot: The arm.
+        texts: Names of :data:`TOLERANCES`, of which every error is drawn evenly, and texts such as
+            ``d3=5.5e-3`` [m, rad], which replace what was drawn.
+        rng: Source of what is drawn.
+
+    Raises:
+        UnknownNameError: No such tolerance or error.
+        ParameterError: A value that is no number.
+    """
+    vector, given = np.zeros(4 * robot.n), {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            vector += _drawn(robot, name.strip(), rng)
+            continue
+        given[name.strip()] = _number(text, value)
+    fixed = LinkErrors.of(robot, given)
+    names = Model.of(robot).names[: len(vector)]
+    is_given = np.array([name in given for name in names])
+    return LinkErrors.from_vector(np.where(is_given, fixed.vector, vector))
+
+
+def _drawn(robot: Robot, name: str, rng: np.random.Generator) -> Array:
+    if name not in TOLERANCES:
+        raise UnknownNameError("errors", name, (*TOLERANCES, "NAME=VALUE, such as d3=5.5e-3"))
+    model, width = Model.of(robot), TOLERANCES[name]
+    units = [model.unit(entry) for entry in model.names[: 4 * robot.n]]
+    widths = np.array([width if unit == "m" else width / SEAT for unit in units])
+    return np.asarray(rng.uniform(-widths, widths))
+
+
+def _number(text: str, value: str) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        raise ParameterError("errors", text, "NAME=NUMBER, such as d3=5.5e-3 [m, rad]") from None
+
+
+def chosen_poses(
+    model: Model, count: int, choose: str, fit: str | Sequence[str], rng: np.random.Generator
+) -> Array:
+    """Joint vectors (count, n) for a tracker: "random", or "optimal" for what is to be found.
+
+    Raises:
+        UnknownNameError: No such choice, or ``fit`` names what is no link error.
+        CalibrationError: No poses.
+    """
+    if choose not in CHOICES:
+        raise UnknownNameError("choose", choose, CHOICES)
+    if count < 1:
+        raise CalibrationError(f"{count} poses tell nothing; ask for at least 2")
+    if choose == "random":
+        return random_poses(model.robot, count, rng)
+    names, pool = wanted_names(model, fit), random_poses(model.robot, 100, rng)
+    J = model.jacobian(pool, np.zeros(len(model.names))).reshape(-1, len(model.names))
+    kept, _ = select(model, J, names, WORST_CONDITION)
+    return optimal_poses(model, count, kept or names, rng)
+
+
+def tracked(
+    model: Model, errors: LinkErrors, q: Array, noise: float, rng: np.random.Generator,
+    *, is_elsewhere: bool = False,
+) -> Measured:  # fmt: skip
+    """What a tracker says of the tip at poses: its place plus noise on each axis.
+
+    Args:
+        model: The arm as drawn.
+        errors: How it was built.
+        q: Joint vectors (N, n).
+        noise: Standard deviation [m], >= 0.
+        rng: Source of the noise.
+        is_elsewhere: Whether the tracker has a frame of its own, at a random place.
+
+    Raises:
+        ParameterError: Noise that is negative or not finite.
+    """
+    if not 0.0 <= noise < np.inf:
+        raise ParameterError("noise", noise, "a finite number [m], >= 0")
+    points = true_tips(model, errors, q) + rng.normal(0.0, noise, (len(q), 3))
+    if is_elsewhere:
+        points = points @ rotation_of(rng.uniform(-1.0, 1.0, 3)).T + rng.uniform(-_FAR, _FAR, 3)
+    return Measured(joints=q, points=points)
+
+
+def ruled(model: Model, errors: LinkErrors, count: int) -> Measured:
+    """What a ruler of 0.5 mm says along one axis after the other, as in appendix E."""
+    moves = appendix_e.ruler_moves(model.robot, count)
+    assert moves.origins is not None
+    way = true_tips(model, errors, moves.joints) - true_tips(model, errors, moves.origins)
+    read = appendix_e.STEP * np.round(np.linalg.norm(way, axis=1) / appendix_e.STEP)
+    return Measured(joints=moves.joints, origins=moves.origins, distances=read, labels=moves.labels)
+
+
+def true_tips(model: Model, errors: LinkErrors, q: Array) -> Array:
+    """Places of the tip (N, 3) [m] of the arm as built, in its base."""
+    return Model.of(model.robot).tips(q, np.concatenate((errors.vector, np.zeros(6))))

@@ -1,0 +1,158 @@
+"""``teleop calibrate``: how an arm was really built, from measured places of its tip."""
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from teleop_core.commands.arguments import command, geometry_argument
+from teleop_core.errors import ParameterError, TeleopError
+
+if TYPE_CHECKING:
+    from teleop_core.robots import Robot
+    from teleop_lab.calibration import Calibration
+
+PUBLISHED = "published"
+_EPILOG = """\
+simulated, to see what a measurement would tell before it is made:
+  teleop calibrate --poses 40 --noise 0.1e-3            a tracker of 0.1 mm; the rcrt1 as published
+  teleop calibrate --poses 30 --noise ruler             a ruler of 0.5 mm along x, y and z
+  teleop calibrate --robot puma560 --errors prototype theta2=2e-3 --choose random
+from measurements, and back into a session:
+  teleop calibrate --data poses.csv --frame unknown --out arm.yaml
+  teleop sim --set robot=arm.yaml --out bags/calibrated
+  teleop calibrate --data published --fit d3            tables E.1-E.3 of the rcrt1's source
+poses.csv has a column per joint, named as `teleop robot` shows them or q1, q2 ..., and x, y, z of
+the tip; metres and radians, or as the head says: "theta1_deg", "x [mm]".
+errors are called a1, alpha1, d1, theta1 for link 1 and so on (standard Denavit-Hartenberg).
+"""
+_OF_SIMULATION = ("poses", "noise", "errors", "choose", "seed")
+
+
+def add(commands: Any) -> None:
+    """Add the command's parser."""
+    text = "find joint offsets and link errors of an arm from measured places of its tip"
+    parser = command(commands, "calibrate", _run, text)
+    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--robot", default="rcrt1", help="a chain of links (default: rcrt1)")
+    geometry_argument(parser)
+    parser.add_argument(
+        "--data", metavar="FILE.csv",
+        help=f"measured poses in place of simulated ones, or {PUBLISHED!r}",
+    )  # fmt: skip
+    _add_simulation(parser)
+    parser.add_argument(
+        "--fit", nargs="+", metavar="NAME",
+        help="`all` link errors, joint `offsets`, or names such as d3 theta2 (default: all; with "
+        "a ruler offsets)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--frame", choices=("known", "unknown"), default="known",
+        help="whether x, y, z are in the robot's base, or its place is to be found too",
+    )  # fmt: skip
+    parser.add_argument(
+        "--keep-all", action="store_true", help="keep errors that are not told from zero"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.yaml",
+        help="the arm as found, as a table for --set robot=FILE.yaml",
+    )  # fmt: skip
+
+
+def _add_simulation(parser: argparse.ArgumentParser) -> None:
+    """Options of a simulated measurement; None where not given."""
+    parser.add_argument("--poses", type=int, metavar="N", help="poses to measure (default: 40)")
+    parser.add_argument(
+        "--noise", metavar="M|ruler",
+        help="standard deviation of a tracker [m], or a ruler of 0.5 mm (default: 0.1e-3)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--errors", nargs="+", metavar="NAME=VALUE",
+        help="how the arm was built: cnc (±20 µm), prototype (±100 µm), and errors [m, rad] such "
+        "as d3=5.5e-3 (default: cnc, of the rcrt1 with d3=5.5e-3)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--choose", metavar="optimal|random",
+        help="poses that tell most, or any (default: optimal)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seed", type=int, metavar="N", help="of poses, errors, noise (default: 1)"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from teleop_core.evaluation.command import check_place
+    from teleop_core.robots import load_robot_set
+
+    for file in (arguments.json, arguments.out):
+        if file is not None:
+            check_place(file)
+    robot = load_robot_set(arguments.robot, arguments.geometry)
+    calibration = (
+        _simulated(robot, arguments) if arguments.data is None else _real(robot, arguments)
+    )
+    print(calibration)
+    _write(calibration, arguments)
+    return 0
+
+
+def _fit(arguments: argparse.Namespace) -> str | list[str] | None:
+    """What is to be found, as the API takes it."""
+    given: list[str] | None = arguments.fit
+    if given is not None and len(given) == 1 and given[0] in ("all", "offsets"):
+        return given[0]
+    return given
+
+
+def _simulated(robot: "Robot", arguments: argparse.Namespace) -> "Calibration":
+    from teleop_lab.calibration import simulate
+
+    given = {name: getattr(arguments, name) for name in _OF_SIMULATION}
+    options = {name: value for name, value in given.items() if value is not None}
+    if "noise" in options:
+        options["noise"] = _noise(options["noise"])
+    return simulate(
+        robot, fit=_fit(arguments), finds_frame=arguments.frame == "unknown",
+        keeps_all=arguments.keep_all, **options,
+    )  # fmt: skip
+
+
+def _noise(text: str) -> float | str:
+    from teleop_lab.calibration.simulate import RULER
+
+    if text == RULER:
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise ParameterError("--noise", text, f"a number [m] or {RULER}") from None
+
+
+def _real(robot: "Robot", arguments: argparse.Namespace) -> "Calibration":
+    from teleop_lab.calibration import appendix_e, calibrate, read_measured
+
+    given = [f"--{name}" for name in _OF_SIMULATION if getattr(arguments, name) is not None]
+    if given:
+        raise TeleopError(f"--data has measured poses; {', '.join(given)} are of simulated ones")
+    is_published = arguments.data == PUBLISHED
+    measured = (
+        appendix_e.published(robot) if is_published else read_measured(Path(arguments.data), robot)
+    )
+    fit = _fit(arguments) or ("offsets" if is_published else "all")
+    return calibrate(
+        robot, measured, fit, finds_frame=arguments.frame == "unknown",
+        keeps_all=arguments.keep_all,
+    )  # fmt: skip
+
+
+def _write(calibration: "Calibration", arguments: argparse.Namespace) -> None:
+    from teleop_lab.calibration.report import correction_file
+
+    if arguments.json is not None:
+        text = json.dumps(calibration.to_json(), indent=2, allow_nan=False)
+        arguments.json.write_text(text + "\n", encoding="utf-8")
+        print(f"numbers: {arguments.json}")
+    if arguments.out is not None:
+        arguments.out.write_text(correction_file(calibration), encoding="utf-8")
+        print(f"arm: {arguments.out}; take it with --set robot={arguments.out}")

@@ -1,0 +1,78 @@
+"""``teleop reach``: what a slave can follow of a recorded hand, and with what it follows most."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from teleop_core.commands.arguments import command, geometry_argument, setting_arguments
+from teleop_core.errors import TeleopError
+
+if TYPE_CHECKING:
+    from teleop_lab.planning.reach import Reach
+
+_EPILOG = """\
+shares are of the time: as given, and with a start of the slave, an order of axes and gains that
+reach the goal with the largest gains. Take them as they are printed, or as a file:
+  teleop reach bags/hand --robot rcrt1 --html reach.html --out reach.yaml
+  teleop replay bags/hand --out bags/followed --set robot=rcrt1 --config reach.yaml
+"""
+
+
+def add(commands: Any) -> None:
+    """Add the command's parser."""
+    text = "say how much of a hand's motion a slave can follow, and propose where to put it"
+    parser = command(commands, "reach", _run, text)
+    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser.add_argument(
+        "sources", nargs="+", metavar="BAG|SCENARIO",
+        help="recording, ours or of others, or one of `teleop scenarios`",
+    )  # fmt: skip
+    parser.add_argument("--robot", help="slave, in place of the recording's; see `teleop robot`")
+    geometry_argument(parser)
+    parser.add_argument("--arm", default="", help="namespace of the arm (default: the first)")
+    parser.add_argument(
+        "--share", type=float, default=99.0, metavar="PERCENT",
+        help="share of the time that is to be followed (default: 99)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--keep-axes", action="store_true", help="leave the map of axes from hand to slave as it is"
+    )
+    parser.add_argument("--html", type=Path, metavar="FILE", help="page with pictures")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.yaml",
+        help="proposal as a ROS 2 parameter file, for --config; of one recording alone",
+    )  # fmt: skip
+    setting_arguments(parser)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    if arguments.out is not None and len(arguments.sources) > 1:
+        raise TeleopError("--out takes the proposal of one recording; give one, or leave it out")
+    for file in (arguments.html, arguments.out):
+        if file is not None and not file.parent.is_dir():
+            raise TeleopError(f"{file}: the directory {file.parent} does not exist; make it first")
+    if not 0.0 < arguments.share <= 100.0:
+        raise TeleopError(f"--share {arguments.share:g} must be above 0 and at most 100 percent")
+    found = [_reach(source, arguments) for source in arguments.sources]
+    print("\n\n".join(map(str, found)))
+    if arguments.html is not None:
+        from teleop_lab.planning.page import write_reach_page
+
+        write_reach_page(found, arguments.html)
+        print(f"page: {arguments.html}")
+    if arguments.out is not None:
+        arguments.out.write_text(found[0].parameter_file(), encoding="utf-8")
+        print(f"parameters: {arguments.out}; take them with --config {arguments.out}")
+    return 0
+
+
+def _reach(source: str, arguments: argparse.Namespace) -> "Reach":
+    from teleop_core.commands.progress import shown_progress
+    from teleop_lab.planning.reach import reach
+
+    with shown_progress(f"searching, {Path(source).name}") as progress:
+        return reach(
+            source, robot=arguments.robot, geometry=arguments.geometry, arm=arguments.arm,
+            share=arguments.share / 100.0, keeps_axes=arguments.keep_axes, progress=progress,
+            files=arguments.config, texts=arguments.settings,
+        )  # fmt: skip

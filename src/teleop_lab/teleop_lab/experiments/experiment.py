@@ -1,0 +1,87 @@
+"""Experiment: what a source did, as a function from a bench to what was found."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from teleop_core.errors import PartError
+from teleop_core.registry import Registry
+from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.outcome import Findings, Outcome
+
+_PLACE = "teleop_lab.experiments"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What a source did and printed.
+
+    Attributes:
+        name: What ``teleop experiment`` calls it.
+        title: What it is, in one line.
+        source: Where the published figures stand.
+        measure: ``measure(bench)`` runs it; sessions come from the bench, so that they run once.
+    """
+
+    name: str
+    title: str
+    source: str
+    measure: Callable[[Bench], Findings]
+
+    def run(self, bench: Bench) -> Outcome:
+        """Run it.
+
+        Raises:
+            PartError: The function returned something else than :class:`Findings`.
+        """
+        found = self.measure(bench)
+        if not isinstance(found, Findings):
+            text = f"one whose measure returns Findings, not a {type(found).__name__}"
+            raise PartError("experiment", self.name, text)
+        return Outcome(
+            self.name, self.title, self.source, bench.seed,
+            tuple(found.rows), tuple(found.figures), tuple(found.notes),
+        )  # fmt: skip
+
+
+def _checked(name: str, part: object) -> Experiment:
+    if not isinstance(part, Experiment):
+        raise PartError("experiment", name, f"an Experiment, not a {type(part).__name__}")
+    if not callable(part.measure):
+        raise PartError("experiment", name, "one whose measure can be called with a Bench")
+    return part
+
+
+EXPERIMENTS: Registry[Experiment] = Registry(
+    "experiment",
+    "experiments",
+    {
+        "resolution": f"{_PLACE}.resolution:RESOLUTION",
+        "tendons": f"{_PLACE}.tendons:TENDONS",
+        "poses": f"{_PLACE}.poses:POSES",
+        "workspace": f"{_PLACE}.workspace:WORKSPACE",
+        "filter": f"{_PLACE}.reference_filter:FILTER",
+        "precision": f"{_PLACE}.precision:PRECISION",
+        "repeatability": f"{_PLACE}.precision:REPEATABILITY",
+        "responses": f"{_PLACE}.responses:RESPONSES",
+        "accuracy": f"{_PLACE}.accuracy:ACCURACY",
+        "master_slave": f"{_PLACE}.master_slave:MASTER_SLAVE",
+        "controllers": f"{_PLACE}.controllers:CONTROLLERS",
+        "gravity": f"{_PLACE}.gravity:GRAVITY",
+        "robustness": f"{_PLACE}.robustness:ROBUSTNESS",
+        "shares": f"{_PLACE}.shares:SHARES",
+        "points24": f"{_PLACE}.points24:POINTS24",
+        "mma_frames": f"{_PLACE}.mma_frames:MMA_FRAMES",
+        "mma_balance": f"{_PLACE}.mma_spring:MMA_BALANCE",
+        "hybrid": f"{_PLACE}.hybrid:HYBRID",
+        "parallel_robots": f"{_PLACE}.parallel_robots:PARALLEL_ROBOTS",
+        "dh_robots": f"{_PLACE}.dh_robots:DH_ROBOTS",
+    },
+    _checked,
+    package="teleop_lab",
+)
+"""All experiments by name, in the order in which ``all`` runs them."""
+
+
+def register_experiment(name: str, experiment: Experiment, *, replace: bool = False) -> Experiment:
+    """Add an experiment for the rest of the program; see :meth:`Registry.add`."""
+    return EXPERIMENTS.add(name, experiment, replace=replace)

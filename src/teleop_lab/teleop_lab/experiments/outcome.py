@@ -1,0 +1,220 @@
+"""Outcome: what an experiment found, beside what its source printed."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from teleop_core.errors import ParameterError
+from teleop_core.evaluation.figure import Figure
+
+Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
+_KINDS = ("exact", "share", "absolute", "factor")
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far a prediction may be from a published figure and still agree with it.
+
+    Attributes:
+        kind: "exact" but for rounding of the computer, "share" of the published figure, "absolute"
+            in the unit of the row, or "factor", which bounds the ratio of both from either side.
+        amount: Share (0.15), amount in the unit (0.5), or factor above 1 (1.6); of "exact" 0.
+
+    Raises:
+        ParameterError: Another kind, or an amount that nothing can keep to.
+    """
+
+    kind: str
+    amount: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in _KINDS:
+            raise ParameterError("kind", self.kind, f"one of {', '.join(_KINDS)}")
+        if self.kind == "exact":
+            if self.amount != 0.0:
+                raise ParameterError("amount", self.amount, "0 for what must be exact")
+            return
+        least = 1.0 if self.kind == "factor" else 0.0
+        if not (math.isfinite(self.amount) and self.amount > least):
+            raise ParameterError("amount", self.amount, f"finite and above {least:g}")
+
+    def allows(self, published: float, predicted: float) -> bool:
+        """Whether both agree."""
+        if self.kind == "factor":
+            if published * predicted <= 0.0:
+                return False
+            return abs(math.log(predicted / published)) <= math.log(self.amount)
+        room = self.amount * (abs(published) if self.kind == "share" else 1.0)
+        # A difference that is the tolerance itself, but for rounding, agrees.
+        room += _ROUNDING * (room or max(1.0, abs(published)))
+        return abs(predicted - published) <= room
+
+    def text(self, unit: str) -> str:
+        """For people: "15 %", "0.5 mm", "factor 1.6", "exact"."""
+        if self.kind == "exact":
+            return self.kind
+        if self.kind == "share":
+            return f"{100.0 * self.amount:.3g} %"
+        if self.kind == "factor":
+            return f"factor {self.amount:g}"
+        return f"{self.amount:.3g}{unit if unit == '°' else f' {unit}'.rstrip()}"
+
+
+EXACT = Tolerance("exact")
+
+
+def percent(amount: float) -> Tolerance:
+    """Agreement within so many percent of the published figure."""
+    return Tolerance("share", amount / 100.0)
+
+
+def absolute(amount: float) -> Tolerance:
+    """Agreement within an amount in the unit of the row."""
+    return Tolerance("absolute", amount)
+
+
+def factor(amount: float) -> Tolerance:
+    """Agreement within a factor from either side."""
+    return Tolerance("factor", amount)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One number of an experiment, each None where there is none.
+
+    Attributes:
+        quantity: What it is.
+        unit: Its unit; empty for pure numbers.
+        published: What the source printed.
+        predicted: What our model of the source's machine says.
+        ours: What another controller reaches on the same model.
+        within: What counts as agreement of ``predicted`` with ``published``; None: not judged.
+        lowest: Smallest of several seeds, of which ``predicted`` is the mean.
+        highest: Largest of them.
+        group: Heading under which it stands.
+        note: What must be known to read it, such as a misprint.
+
+    Raises:
+        ParameterError: A number is not finite.
+    """
+
+    quantity: str
+    unit: str = ""
+    published: float | None = None
+    predicted: float | None = None
+    ours: float | None = None
+    within: Tolerance | None = None
+    lowest: float | None = None
+    highest: float | None = None
+    group: str = ""
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("published", "predicted", "ours", "lowest", "highest"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if not math.isfinite(value):
+                raise ParameterError(f"{name} of {self.quantity}", value, "finite, or None")
+            object.__setattr__(self, name, float(value))  # whatever NumPy made of it
+
+    @property
+    def difference(self) -> float | None:
+        """Predicted less published; None if one of them is missing."""
+        if self.published is None or self.predicted is None:
+            return None
+        return self.predicted - self.published
+
+    @property
+    def agrees(self) -> bool | None:
+        """Whether prediction and publication agree; None where that is not judged."""
+        if self.within is None or self.published is None or self.predicted is None:
+            return None
+        return self.within.allows(self.published, self.predicted)
+
+    def to_json(self) -> dict[str, Plain]:
+        """The row as plain values; numbers are exact."""
+        within: Plain = None
+        if self.within is not None:
+            within = {"kind": self.within.kind, "amount": self.within.amount}
+        return {
+            "group": self.group, "quantity": self.quantity, "unit": self.unit,
+            "published": self.published, "predicted": self.predicted, "ours": self.ours,
+            "difference": self.difference, "within": within, "agrees": self.agrees,
+            "lowest": self.lowest, "highest": self.highest, "note": self.note,
+        }  # fmt: skip
+
+
+class Findings(NamedTuple):
+    """What the function of an experiment returns.
+
+    Attributes:
+        rows: Numbers, published and predicted.
+        figures: Plots for the page, with published points on them where there are any.
+        notes: Sentences without which the numbers mislead.
+    """
+
+    rows: tuple[Row, ...]
+    figures: tuple[Figure, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What an experiment found.
+
+    Attributes:
+        name: Name of the experiment.
+        title: What it is, in one line.
+        source: Where the published figures stand.
+        seed: Seed of everything random in it.
+        rows: Numbers, published and predicted.
+        figures: Plots for the page.
+        notes: Sentences without which the numbers mislead.
+    """
+
+    name: str
+    title: str
+    source: str
+    seed: int
+    rows: tuple[Row, ...]
+    figures: tuple[Figure, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def judged(self) -> int:
+        """How many rows are judged."""
+        return sum(row.agrees is not None for row in self.rows)
+
+    @property
+    def agreeing(self) -> int:
+        """How many of them agree with what was published."""
+        return sum(row.agrees is True for row in self.rows)
+
+    def row(self, quantity: str, group: str = "") -> Row:
+        """The row of a quantity.
+
+        Raises:
+            UnknownNameError: There is none; those there are are listed.
+        """
+        from teleop_core.errors import UnknownNameError
+
+        for row in self.rows:
+            if row.quantity == quantity and (not group or row.group == group):
+                return row
+        kind = f"quantity of {self.name}" + f" in {group!r}" * bool(group)
+        raise UnknownNameError(kind, quantity, dict.fromkeys(row.quantity for row in self.rows))
+
+    def to_json(self) -> dict[str, Plain]:
+        """The outcome as plain values, without its plots; numbers are exact."""
+        return {
+            "name": self.name, "title": self.title, "source": self.source, "seed": self.seed,
+            "judged": self.judged, "agreeing": self.agreeing,
+            "rows": [row.to_json() for row in self.rows], "notes": list(self.notes),
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        from teleop_lab.experiments.table import text
+
+        return text(self)

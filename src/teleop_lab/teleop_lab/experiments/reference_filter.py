@@ -1,0 +1,150 @@
+"""Filter: the low-pass on the joint references, and what it leaves of the gimbal's jitter."""
+
+import math
+
+import numpy as np
+
+from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure, time_axis
+from teleop_core.geometry import Array
+from teleop_core.mapping.filters import lag_step
+from teleop_core.signals import DT
+from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_lab.experiments.bench import Bench, Session, Settings
+from teleop_lab.experiments.drawing import axis, level, line, points
+from teleop_lab.experiments.experiment import Experiment
+from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute, factor
+
+# Eqs. 6.2.8 and 6.2.9, sign corrected; printed to two digits.
+_COEFFICIENTS = {"of the last output": 0.99, "of the last input": -0.09, "of the input": 0.1}
+_STEP = (0.1, 0.109, 0.11791)
+_BEFORE, _AFTER = 2e-3, 5e-4
+_RESTS: Settings = {
+    "operator.kind": "hold", "operator.rotation": 0.0, "hand.tremor_amplitude": 0.0,
+    "buttons.fixture": (), "duration": 16.0,
+}  # fmt: skip
+_JUDGED = "theta5"  # which the gimbal turns one to one; near the home pose theta4 and 6 turn more
+_WRIST = ("theta4", "theta5", "theta6")
+_QUIET_S = 6.0  # after the approach, and after the filter has settled
+
+
+def lag(value: float, last_input: float, last_output: float) -> float:
+    """Next output of the filter with its default parameters."""
+    p = ReferenceFilterParameters()
+    return float(lag_step(value, last_input, last_output, p.gain, p.zero, p.pole, DT))
+
+
+def step_response(count: int) -> Array:
+    """Answer (count,) to a unit step, from rest."""
+    out, last_input, last = [], 0.0, 0.0
+    for _ in range(count):
+        last = lag(1.0, last_input, last)
+        last_input = 1.0
+        out.append(last)
+    return np.array(out)
+
+
+def gain_at(frequency: Array) -> Array:
+    """Gain of the filter at frequencies [Hz], from its difference equation."""
+    z = np.exp(2j * math.pi * np.asarray(frequency) * DT)
+    a, b, c = lag(0.0, 0.0, 1.0), lag(0.0, 1.0, 0.0), lag(1.0, 0.0, 0.0)
+    return np.asarray(np.abs((c + b / z) / (1.0 - a / z)), dtype=np.float64)
+
+
+def _measure(bench: Bench) -> Findings:
+    found = (lag(0.0, 0.0, 1.0), lag(0.0, 1.0, 0.0), lag(1.0, 0.0, 0.0))
+    rows = [
+        Row(quantity=f"coefficient {name}", published=printed, predicted=value,
+            within=EXACT, group="difference equation at 1 kHz")
+        for (name, printed), value in zip(_COEFFICIENTS.items(), found, strict=True)
+    ]  # fmt: skip
+    rows += [
+        Row(quantity=f"unit step after {k} ticks", published=printed, predicted=value,
+            within=EXACT, group=rows[0].group, note="of the equation, not printed")
+        for k, (printed, value) in enumerate(zip(_STEP, step_response(3), strict=True), start=1)
+    ]  # fmt: skip
+    rows += [
+        Row(quantity="gain at rest", published=1.0, predicted=float(gain_at(np.zeros(1))[0]),
+            within=EXACT, group="gain"),
+        Row(quantity="gain at 50 Hz", published=0.1, predicted=float(gain_at(np.array([50.0]))[0]),
+            within=absolute(0.01), group="gain"),
+        Row(quantity="lag behind a ramp", unit="ms", predicted=_ramp_lag_ms(), group="gain"),
+    ]  # fmt: skip
+    session = bench.session("coarse_box", settings=_RESTS)
+    jitter = {name: _jitter(session, name) for name in _WRIST}
+    group = "jitter of the references with the stylus at rest, half of peak to peak"
+    for when, printed, which in (("before", _BEFORE, 0), ("after", _AFTER, 1)):
+        rows += [
+            Row(quantity=f"{when} the filter, {name}", unit="rad", predicted=pair[which],
+                published=printed if name == _JUDGED else None,
+                within=factor(1.5) if name == _JUDGED else None, group=group)
+            for name, pair in jitter.items()
+        ]  # fmt: skip
+    return Findings(tuple(rows), (_jitter_figure(session), _gain_figure()), _NOTES)
+
+
+_NOTES = (
+    "The equation is printed with its pole outside the unit circle (1.01) and diverges as such. "
+    "The ±2e-3 rad are what the source saw of its reference, from which the noise of the gimbal is "
+    "derived; what is predicted is what comes through kinematics and filter.",
+)
+
+
+def _ramp_lag_ms() -> float:
+    """Delay [ms] behind a ramp after ten seconds."""
+    last = 0.0
+    ticks = 10_000
+    for k in range(1, ticks + 1):
+        last = lag(float(k), float(k - 1), last)
+    return ticks - last
+
+
+def _quiet(session: Session, name: str) -> tuple[Array, Array, Array]:
+    """Times [s], and reference before and after the filter [rad], with the stylus at rest."""
+    before, after = session["slave/servo_jp"], session["slave/setpoint_js"]
+    start = float(before.time[np.argmax(session.is_followed)]) + _QUIET_S
+    kept, same = before.time >= start, after.time >= start
+    return before.time[kept] - start, before[name][kept], after[name][same]
+
+
+def _jitter(session: Session, name: str) -> tuple[float, float]:
+    """Half of peak to peak of a joint's reference [rad] before and after the filter."""
+    _, before, after = _quiet(session, name)
+    return 0.5 * float(np.ptp(before)), 0.5 * float(np.ptp(after))
+
+
+def _jitter_figure(session: Session) -> Figure:
+    times, before, after = _quiet(session, "theta5")
+    middle = float(before.mean())
+    traces = [
+        line(times, 1e3 * (before - middle), "before the filter", COMMAND, 1.0, "mrad"),
+        line(times[: len(after)], 1e3 * (after - middle), "after it", MEASURED, 1.5, "mrad"),
+    ]
+    drawn = [
+        level(sign * 1e3 * value, f"published ±{1e3 * value:g}" if sign > 0 else "")
+        for value in (_BEFORE, _AFTER) for sign in (1.0, -1.0)
+    ]  # fmt: skip
+    layout = {
+        "xaxis": {**time_axis(), "range": [0.0, 2.0]},
+        "yaxis": axis("reference of joint 5", "mrad"),
+        "shapes": [shape for shape, _ in drawn], "annotations": [note for _, note in drawn],
+    }  # fmt: skip
+    sentence = "Reference of joint 5 around its mean with the stylus at rest, as figure 6.11."
+    return Figure("What the filter leaves of the jitter", sentence, traces, layout, 340)
+
+
+def _gain_figure() -> Figure:
+    frequency = np.logspace(-1.0, 2.6, 200)
+    traces = [
+        line(frequency, gain_at(frequency), "difference equation", FIRST, 2.0, ""),
+        points(np.array([50.0]), np.array([0.1]), "published", "#111", "", 0),
+    ]
+    layout = {"xaxis": axis("frequency", "Hz", type="log"), "yaxis": axis("gain", type="log")}
+    return Figure("Gain of the filter", "Gain over frequency.", traces, layout, 300)
+
+
+FILTER = Experiment(
+    "filter",
+    "the low-pass on the references: coefficients, gain, and what it leaves of the jitter",
+    "Vongbunyong 2008, eqs. 6.2.8-6.2.9, figure 6.11",
+    _measure,
+)

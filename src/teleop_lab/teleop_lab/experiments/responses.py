@@ -1,0 +1,208 @@
+"""Responses: one move from home to each point of the precision test, against time."""
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.evaluation.figure import (
+    FIRST,
+    MEASURED,
+    REFERENCE,
+    SECOND,
+    THIRD,
+    Figure,
+    axis_suffix,
+    stacked_axes,
+    time_axis,
+)
+from teleop_core.geometry import Array
+from teleop_core.robots import load_robot
+from teleop_core.signals import TICK_NS
+from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.trajectory import cubic_move, shortest_move_time
+from teleop_lab.experiments.bench import Bench, Settings
+from teleop_lab.experiments.conditions import OURS, PREDICTED
+from teleop_lab.experiments.drawing import axis, level, line
+from teleop_lab.experiments.experiment import Experiment
+from teleop_lab.experiments.outcome import Findings, Row, factor
+from teleop_lab.fitting.table import PUBLISHED, read_rests
+
+# What the text reads from its plots once the tip rests [mm].
+_AT_REST_MM = (0.091, 0.432, 0.432, 0.128, 0.142, 0.075)
+_POINT_3_Z_MM = 0.332
+# What it reads of the way there: the largest errors, of two points alone, and when they and the
+# rest come [s]; the axis of these times is wrong, see the notes.
+_LARGEST_MM = (None, 1.521, 1.524, None, None, None)
+_PEAK_S = (0.08, 0.0, 0.0, 0.08, 0.02, 0.02)
+_SETTLED_S = (None, 0.12, 0.12, 0.10, None, None)
+_REST = 0.1  # of the largest error less that at rest, within which an error has settled
+_SPEED, _SETTLE_S = 0.5, 1.0  # share of the speed limits; rest after the move
+_CURVE = 4  # of how many samples one is drawn
+_SCALES = np.array([math.degrees(1.0), math.degrees(1.0), 1e3, *[math.degrees(1.0)] * 3])
+_UNITS = ("°", "°", "mm", "°", "°", "°")
+
+
+class Response(NamedTuple):
+    """One move, a row a tick.
+
+    Attributes:
+        times: Since the move began (N,) [s].
+        reference: Joints that the control law follows (N, 6) [rad, m].
+        measured: Joints that the encoders show (N, 6) [rad, m].
+        wanted_mm: Tip of the reference (N, 3) [mm].
+        reached_mm: Tip by the encoders (N, 3) [mm].
+    """
+
+    times: Array
+    reference: Array
+    measured: Array
+    wanted_mm: Array
+    reached_mm: Array
+
+    @property
+    def error_mm(self) -> Array:
+        """Reached less wanted (N, 3) [mm]."""
+        return self.reached_mm - self.wanted_mm
+
+
+def response(parameters: ArmParameters, target: Array) -> Response:
+    """Move the slave from home to a joint target (n,) by a cubic, and let it rest there."""
+    robot = load_robot(parameters.robot)
+    assert robot.drives is not None
+    slave = SimulatedArm(replace(parameters, start=tuple(robot.home.tolist())))
+    goal = np.clip(target, robot.lower, robot.upper)
+    move_time = shortest_move_time(robot.home, goal, _SPEED * robot.drives.speed_limit)
+    times = slave.dt * np.arange(1.0, round((move_time + _SETTLE_S) / slave.dt) + 1.0)
+    way = cubic_move(robot.home, goal, move_time, times)[0]
+    reference, measured = np.empty_like(way), np.empty_like(way)
+    signals = slave.signals
+    for k, joints in enumerate(way):
+        signals["now_ns"] = signals["slave_servo_jp_ns"] = (k + 1) * TICK_NS
+        signals["slave_servo_jp"] = joints
+        slave.step()
+        reference[k] = signals["slave_setpoint_js"]
+        measured[k] = signals["slave_measured_js"][: robot.n]
+    wanted, reached = (1e3 * robot.fk(rows)[:, :3, 3] for rows in (reference, measured))
+    return Response(times, reference, measured, wanted, reached)
+
+
+def _responses(bench: Bench, settings: Settings) -> list[Response]:
+    targets = read_rests(PUBLISHED, load_robot("rcrt1")).targets
+    return [response(bench.slave(settings), target) for target in targets]
+
+
+def _rest_mm(found: Response) -> float:
+    return float(np.linalg.norm(found.error_mm[-1]))
+
+
+def _transient(found: Response) -> tuple[float, float, float]:
+    """Largest error on the way [mm], when it is, and when the error has settled at rest [s]."""
+    error = np.linalg.norm(found.error_mm, axis=1)
+    peak, room = int(error.argmax()), _REST * (error.max() - error[-1])
+    off = np.flatnonzero(np.abs(error - error[-1]) > room)
+    settled = found.times[int(off[-1])] if len(off) else 0.0
+    return float(error[peak]), float(found.times[peak]), float(settled)
+
+
+def _measure(bench: Bench) -> Findings:
+    predicted, ours = _responses(bench, PREDICTED), _responses(bench, OURS)
+    rows = [
+        Row(quantity=f"error at rest, point {k}", unit="mm", published=printed,
+            predicted=_rest_mm(found), ours=_rest_mm(other), within=factor(1.6),
+            group="read from its plots",
+            note="text repeats that of point 2; table 7.7 has 0.387" * (k == 3))
+        for k, (printed, found, other) in enumerate(
+            zip(_AT_REST_MM, predicted, ours, strict=True), start=1)
+    ]  # fmt: skip
+    rows.append(
+        Row(quantity="error at rest along z, point 3", unit="mm", published=_POINT_3_Z_MM,
+            predicted=abs(float(predicted[2].error_mm[-1, 2])),
+            ours=abs(float(ours[2].error_mm[-1, 2])), within=factor(1.6),
+            group="read from its plots")
+    )  # fmt: skip
+    for text, unit, printed_of, number in (
+        ("largest error", "mm", _LARGEST_MM, 0),
+        ("time of it", "s", _PEAK_S, 1),
+        ("settled at", "s", _SETTLED_S, 2),
+    ):
+        rows += [
+            Row(quantity=f"{text}, point {k}", unit=unit, group="on the way, of figures 7.4-7.14",
+                published=printed, predicted=_transient(found)[number],
+                ours=_transient(other)[number])
+            for k, (printed, found, other) in enumerate(
+                zip(printed_of, predicted, ours, strict=True), start=1)
+        ]  # fmt: skip
+    figures = [
+        figure
+        for k, found in enumerate(predicted, start=1)
+        for figure in (_error_figure(k, found), _place_figure(k, found), _joint_figure(k, found))
+    ]
+    return Findings(tuple(rows), tuple(figures), _NOTES)
+
+
+_NOTES = (
+    "The source's plots end after 0.15 s, in which its drives cannot make these moves: they need "
+    "0.5 to 1.7 s. Moves here take half of the speed limits. Its plots are of one run each, and "
+    "so is what is predicted. Times read from them are printed for the record, not compared: their "
+    "axis is wrong by a factor of 4 to 11, and errors at a start from rest cannot be 1.5 mm.",
+)
+
+
+def _error_figure(point: int, found: Response) -> Figure:
+    off, times = found.error_mm[::_CURVE], found.times[::_CURVE]
+    traces = [
+        line(times, off[:, k], "xyz"[k], color, 1.2)
+        for k, color in enumerate((FIRST, SECOND, THIRD))
+    ]
+    traces.append(line(times, np.linalg.norm(off, axis=1), "distance", MEASURED, 1.6))
+    shape, note = level(_AT_REST_MM[point - 1], "published, at rest")
+    layout = {"xaxis": time_axis(), "yaxis": axis("error of the tip", "mm"), "shapes": [shape],
+              "annotations": [note]}  # fmt: skip
+    sentence = f"Reached less wanted: {_rest_mm(found):.3f} mm at rest."
+    title = f"Point {point}: error (of figures 7.3-7.15)"
+    return Figure(title, sentence, traces, layout, 320)
+
+
+def _place_figure(point: int, found: Response) -> Figure:
+    layout, traces = stacked_axes("xyz", "mm"), []
+    for row in range(3):
+        place = {"yaxis": f"y{axis_suffix(row)}", "showlegend": row == 0}
+        for path, name, color, width in (
+            (found.wanted_mm, "wanted", REFERENCE, 4.0),
+            (found.reached_mm, "reached", MEASURED, 1.2),
+        ):  # fmt: skip
+            traces.append({**line(found.times[::_CURVE], path[::_CURVE, row], name, color, width),
+                           **place})  # fmt: skip
+    sentence = "Way of the tip from home."
+    return Figure(
+        f"Point {point}: displacement (of figures 7.3-7.15)", sentence, traces, layout, 400
+    )
+
+
+def _joint_figure(point: int, found: Response) -> Figure:
+    names = load_robot("rcrt1").joint_names
+    layout, traces = stacked_axes(names, ""), []
+    for row, (name, unit) in enumerate(zip(names, _UNITS, strict=True)):
+        suffix = axis_suffix(row)
+        layout[f"yaxis{suffix}"]["title"] = {"text": f"{name} [{unit}]"}
+        place = {"yaxis": f"y{suffix}", "showlegend": row == 0}
+        for joints, text, color, width in (
+            (found.reference, "reference", REFERENCE, 4.0),
+            (found.measured, "measured", MEASURED, 1.2),
+        ):  # fmt: skip
+            values = _SCALES[row] * joints[::_CURVE, row]
+            traces.append(
+                {**line(found.times[::_CURVE], values, text, color, width, unit), **place}
+            )
+    title = f"Point {point}: joints (figure E.{point})"
+    return Figure(title, "References and encoders of all joints.", traces, layout, 760)
+
+
+RESPONSES = Experiment(
+    "responses",
+    "one move from home to each point of the precision test, against time",
+    "Vongbunyong 2008, section 7.3, figures 7.3-7.15 and E.1-E.6",
+    _measure,
+)

@@ -1,0 +1,142 @@
+"""Table: an experiment on the terminal, published beside predicted."""
+
+import io
+import math
+from collections.abc import Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from teleop_core.evaluation.rows import MISSING
+
+if TYPE_CHECKING:
+    from teleop_lab.experiments.outcome import Outcome, Row
+
+MARKS = {True: "✓", False: "✗", None: ""}
+_COLORS = {True: "green", False: "red", None: "default"}
+_WIDTH = 110
+_DIGITS = 6  # after the point, the most that any source prints
+
+
+def numbers(row: "Row") -> tuple[str, str, str, str]:
+    """Texts of published, predicted, ours and difference.
+
+    What is predicted has a decimal more than what was printed, so that rounding shows.
+    """
+    if row.published is None:
+        return "", _plain(row.predicted), _plain(row.ours), ""
+    texts = [_beside(value, row.published) for value in (row.predicted, row.ours)]
+    difference = "" if row.difference is None else _signed(row.difference, row.published)
+    return _printed(row.published), texts[0], texts[1], difference
+
+
+def _printed(published: float) -> str:
+    """A published number as it was printed; four digits of one that was computed from such."""
+    text = f"{published:.9g}"
+    return text if len(text.partition(".")[2]) <= _DIGITS else f"{published:.4g}"
+
+
+def _beside(value: float | None, published: float) -> str:
+    """Text of a number with one decimal more than what was printed, or three digits if more."""
+    if value is None:
+        return ""
+    if 0.0 < abs(published) < 1e-4:
+        return f"{value:.4g}"
+    printed = len(_printed(published).partition(".")[2])
+    size = 0 if abs(value) < 1e-9 else math.floor(math.log10(abs(value)))
+    return f"{value + 0.0:.{max(printed + 1, min(2 - size, printed + 2))}f}"
+
+
+def _plain(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
+
+
+def _signed(difference: float, published: float) -> str:
+    """Difference; as none where it is rounding of the computer."""
+    if abs(difference) <= 1e-12 * max(1.0, abs(published)):
+        return "0"
+    digits = 2 if abs(difference) < 10.0 else int(math.log10(abs(difference))) + 1
+    return f"{difference:+.{digits}g}"
+
+
+def spread(row: "Row") -> str:
+    """From the smallest to the largest of several seeds."""
+    if row.lowest is None or row.highest is None:
+        return ""
+    return f"{row.lowest:.3g} … {row.highest:.3g}"
+
+
+def within(row: "Row") -> str:
+    """What counts as agreement."""
+    return row.within.text(row.unit) if row.within is not None else ""
+
+
+def summary(outcomes: "Sequence[Outcome]") -> str:
+    """One line: how many figures agree."""
+    judged, agreeing = (sum(getattr(o, n) for o in outcomes) for n in ("judged", "agreeing"))
+    rows = sum(len(outcome.rows) for outcome in outcomes)
+    return f"{agreeing} of {judged} published figures agree; {rows - judged} rows are not judged"
+
+
+def outcome_table(outcome: "Outcome") -> Table:
+    """Table of one outcome."""
+    has_ours = any(row.ours is not None for row in outcome.rows)
+    has_spread = any(spread(row) for row in outcome.rows)
+    table = Table(
+        box=SIMPLE, title=f"[bold]{escape(outcome.name)}[/bold]: {escape(outcome.title)}",
+        title_justify="left", pad_edge=False, padding=(0, 1, 0, 0),
+    )  # fmt: skip
+    table.add_column("", min_width=20)
+    table.add_column("unit", style="dim", no_wrap=True)
+    heads = ["published", "predicted", *["seeds"] * has_spread, *["ours"] * has_ours, "difference"]
+    for head in heads:
+        table.add_column(head, justify="right", no_wrap=True)
+    table.add_column("within", style="dim", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    for group, rows in groupby(outcome.rows, key=lambda row: row.group):
+        if group:
+            table.add_section()
+            table.add_row(f"[bold]{escape(group)}[/bold]")
+        for row in rows:
+            published, predicted, ours, difference = numbers(row)
+            mark = f"[{_COLORS[row.agrees]}]{MARKS[row.agrees]}[/]"
+            cells = [published, predicted, *[spread(row)] * has_spread, *[ours] * has_ours]
+            note = f" [dim]({escape(row.note)})[/dim]" if row.note else ""
+            table.add_row(
+                f"{escape(row.quantity)}{note}", escape(row.unit), *map(escape, cells),
+                escape(difference), escape(within(row)), mark,
+            )  # fmt: skip
+    return table
+
+
+def show(outcome: "Outcome", console: Console) -> None:
+    """Print the table of an outcome, and what must be known to read it."""
+    console.print(outcome_table(outcome))
+    told = f"{MARKS[True]} agrees, {MARKS[False]} does not; {outcome.source}"
+    for line in (told, *outcome.notes):
+        console.print(line, markup=False, highlight=False, style="dim")
+    console.print()
+
+
+def terminal() -> Console:
+    """Console on standard output; as wide as a table needs where it is no terminal."""
+    console = Console(legacy_windows=False)
+    return console if console.is_terminal else Console(width=_WIDTH, legacy_windows=False)
+
+
+def text(outcome: "Outcome") -> str:
+    """The table as plain text."""
+    console = Console(file=io.StringIO(), width=_WIDTH, color_system=None, legacy_windows=False)
+    show(outcome, console)
+    out = console.file
+    assert isinstance(out, io.StringIO)
+    return "\n".join(line.rstrip() for line in out.getvalue().splitlines()).strip("\n")
+
+
+def empty(value: str) -> str:
+    """A dash for a missing number."""
+    return value or MISSING

@@ -1,0 +1,68 @@
+"""Fitting: numbers of a plant from what was measured on the machine.
+
+:func:`fit_plant` does what ``teleop fit`` does::
+
+    import teleop_core as tc
+
+    print(tc.fit_plant())  # tables 7.1-7.6 of the RCRT-1's source
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from teleop_lab.fitting.fit import LOSSES, FitError, FitResult, Fitted, default_free, fit
+from teleop_lab.fitting.table import PUBLISHED, RestTable, read_rests
+
+__all__ = [
+    "LOSSES",
+    "PUBLISHED",
+    "FitError",
+    "FitResult",
+    "Fitted",
+    "RestTable",
+    "default_free",
+    "fit",
+    "fit_plant",
+    "read_rests",
+]
+
+
+def _silent(share: float) -> None:
+    """Show no progress."""
+
+
+def fit_plant(
+    table: Path | str | None = None,
+    *,
+    robot: str = "rcrt1",
+    free: Sequence[str] | None = None,
+    files: Iterable[Path | str] = (),
+    texts: Iterable[str] = (),
+    loss: str = "cauchy",
+    progress: Callable[[float], None] = _silent,
+) -> FitResult:
+    """Fit the plant ``hardware`` of a robot to where its joints came to rest.
+
+    Args:
+        table: CSV as :func:`read_rests` takes it; None for the published one of the RCRT-1.
+        robot: Whose joints it has.
+        free: What is fitted, as of :func:`fit`; None for what the table can tell.
+        files: Parameter files of the slave; what nothing says is the source's PID.
+        texts: Parameters of the slave over them, ``key=value``.
+        loss: One of :data:`LOSSES`: how fast points that no model explains are let go.
+        progress: Hears the share that is done, 0 to 1.
+
+    Raises:
+        TeleopError: The table has another shape, a name is wrong, the fit does not converge, or
+            parameters cannot be told apart.
+    """
+    from teleop_core.robots import load_robot_set
+    from teleop_core.session.configuration import configure
+    from teleop_core.slave.pair import ArmParameters
+
+    given = [f"robot={robot}", "plant=hardware", "controller=source_pid"]
+    made = configure(None, [Path(file) for file in files], [*given, *texts])
+    slave = ArmParameters.of(made.group("slave"), made.group("slave_sim"))
+    arm = load_robot_set(slave.robot, slave.geometry)
+    rests = read_rests(Path(table or PUBLISHED), arm)
+    return fit(rests, slave, free, progress, loss=loss)

@@ -1,0 +1,363 @@
+"""Fit: the faults of a real arm from where it comes to rest, by simulating the same moves.
+
+Free are the dry friction of joints, the bias of amplifiers, and weights that no source states.
+What a joint leaves to its target, under a controller without integral action, is their effort over
+Kp; so the numbers belong to the gains with which they were fitted.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import chi2, t
+
+from teleop_core.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.geometry import Array
+from teleop_core.plants.hardware import faults_of
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.hardware import Hardware
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.pair import ArmParameters
+from teleop_core.slave.slave_sim import SlaveSim
+from teleop_lab.fitting.rests import rest_positions
+from teleop_lab.fitting.table import RestTable
+
+_WEAK = 0.1  # singular value over the largest below which a direction is not identifiable
+_STEP = 0.01  # of differences, in units of the start
+_SHARE = 0.95  # of intervals
+_ROUNDS = 60
+_UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
+_WANDER = 0.3  # with which the answer to wandering friction is measured
+
+
+LOSSES: dict[str, Callable[[Array], Array]] = {
+    "cauchy": lambda r: 1.0 / (1.0 + r**2),
+    "huber": lambda r: 1.0 / np.maximum(1.0, np.abs(r)),
+    "soft_l1": lambda r: 1.0 / np.sqrt(1.0 + r**2),
+    "linear": np.ones_like,
+}
+"""Losses by the names of scipy, each with the weight of a residual: how fast it lets go."""
+
+
+class FitError(TeleopError):
+    """A fit has no answer: it does not converge, or its parameters cannot be told apart."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One number with the interval that holds it with 95 %, in SI units."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """What a fit found.
+
+    Attributes:
+        robot: Name of the robot.
+        joint_names: Its joints.
+        table: Name of the table.
+        numbers: Fitted numbers in their order.
+        measured: Mean of rest less target in the table (k, n) [rad or m].
+        predicted: The same, simulated with the fitted numbers.
+        measured_spread: Standard deviation (n,) of the runs [rad or m].
+        predicted_spread: The same, simulated.
+        encoder_step: Smallest difference (n,) that is measured [rad or m].
+        one_sided: Axes (n,) that all moves approach from one side, of which the distance to the
+            target is fitted, not its side, because friction and bias cannot be told apart there.
+    """
+
+    robot: str
+    joint_names: tuple[str, ...]
+    table: str
+    numbers: tuple[Fitted, ...]
+    measured: Array
+    predicted: Array
+    measured_spread: Array
+    predicted_spread: Array
+    encoder_step: Array
+    one_sided: NDArray[np.bool_]
+
+    def value(self, name: str) -> float:
+        """A fitted number.
+
+        Raises:
+            UnknownNameError: It was not fitted; those that were are listed.
+        """
+        found = {number.name: number.value for number in self.numbers}
+        if name not in found:
+            raise UnknownNameError("fitted number", name, found)
+        return found[name]
+
+    def __str__(self) -> str:
+        from teleop_lab.fitting.report import text
+
+        return text(self)
+
+    def to_json(self) -> dict[str, object]:
+        """All of it as plain values; numbers are exact, [SI]."""
+        return {
+            "robot": self.robot, "table": self.table, "joints": list(self.joint_names),
+            "numbers": [vars(number) for number in self.numbers],
+            "measured": self.measured.tolist(), "predicted": self.predicted.tolist(),
+            "measured_spread": self.measured_spread.tolist(),
+            "predicted_spread": self.predicted_spread.tolist(),
+            "one_sided": self.one_sided.tolist(),
+        }  # fmt: skip
+
+    def parameter_file(self) -> str:
+        """ROS 2 parameter file of a slave on the fitted plant."""
+        from teleop_lab.fitting.report import parameter_file
+
+        return parameter_file(self)
+
+
+class _Problem:
+    """Rests of a robot as a function of scaled numbers; 1 is of the size that the table shows."""
+
+    def __init__(
+        self, robot: Robot, parameters: ArmParameters, table: RestTable, free: Sequence[str]
+    ) -> None:
+        self.robot, self.parameters, self.table, self.free = robot, parameters, table, tuple(free)
+        stiffness = np.abs(SlaveSim(parameters).arm.gains[:, 0])
+        off = np.abs(table.mean).mean(axis=0)
+        self.scales = np.array([self._scale(name, off * stiffness) for name in free])
+        self.one_sided = one_sided(robot, table)
+        assert robot.drives is not None
+        self.spread = np.maximum(table.spread, robot.drives.encoder_step)
+
+    def _scale(self, name: str, effort: Array) -> float:
+        kind, _, of = name.partition(".")
+        if kind != "weight":
+            return float(effort[self.robot.joint_names.index(of)])
+        model = self.robot.dynamics
+        assert model is not None
+        change = np.zeros(self.robot.n)
+        row = model.parameters.copy()
+        row[model.unknown[of]] += 1.0
+        model.gravity(self.robot.home.copy(), row, change)
+        before = np.zeros(self.robot.n)
+        model.gravity(self.robot.home.copy(), model.parameters.copy(), before)
+        lever = np.abs(change - before)
+        axis = int(lever.argmax())
+        if lever[axis] == 0.0:
+            raise ParameterError("free", name, "a weight that loads a joint at home")
+        return float(effort[axis] / lever[axis])
+
+    def faults(self, x: Array, wander: Array | None = None) -> Hardware:
+        """The arm's faults with scaled numbers ``x`` in their place."""
+        base, model = faults_of(self.robot), self.robot.dynamics
+        assert model is not None
+        coulomb, bias = base.coulomb.copy(), np.zeros(self.robot.n)
+        row = model.parameters.copy()
+        for name, value in zip(self.free, x * self.scales, strict=True):
+            kind, _, of = name.partition(".")
+            if kind == "weight":
+                row[model.unknown[of]] = value
+            else:
+                axis = self.robot.joint_names.index(of)
+                (coulomb if kind == "coulomb" else bias)[axis] = value
+        still = np.zeros(self.robot.n) if wander is None else wander
+        return replace(base, coulomb=coulomb, bias=bias, wander=still, dynamics=row)
+
+    def rests(self, x: Array, runs: int = 1, wander: Array | None = None) -> Array:
+        """Rest less target, simulated: (k, runs, n); without wandering smooth in ``x``."""
+        faults, table = self.faults(x, wander), self.table
+        inside = np.clip(table.targets, self.robot.lower, self.robot.upper)
+        is_smooth = wander is None
+        rests = rest_positions(self.parameters, inside, runs, faults, is_smooth=is_smooth)
+        return rests - inside[:, None]
+
+    def residuals(self, x: Array) -> Array:
+        """Simulated less measured rests in standard deviations of the runs, flat."""
+        predicted, measured = self.rests(x)[:, 0], self.table.mean
+        predicted = np.where(self.one_sided, np.abs(predicted), predicted)
+        measured = np.where(self.one_sided, np.abs(measured), measured)
+        return np.asarray(((predicted - measured) / self.spread).ravel())
+
+    def slopes(self, x: Array) -> Array:
+        """Derivatives of the residuals, by central differences."""
+        columns = []
+        for i in range(len(x)):
+            step = np.zeros(len(x))
+            step[i] = _STEP
+            columns.append((self.residuals(x + step) - self.residuals(x - step)) / (2.0 * _STEP))
+        return np.stack(columns, axis=1)
+
+
+def one_sided(robot: Robot, table: RestTable) -> NDArray[np.bool_]:
+    """Axes (n,) that every move of a table, from home, approaches from the same side."""
+    way = np.sign(table.targets - robot.home)
+    return np.asarray(np.abs(way.sum(axis=0)) == len(way))
+
+
+def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
+    """What a table can tell of a robot: names for :func:`fit`.
+
+    Dry friction of every axis that gravity does not leave to an integrator, the bias of those
+    among them that are approached from both sides and not loaded by gravity, and weights that no
+    source states.
+    """
+    from teleop_core.controllers.source_pid import loaded_axes
+
+    model, loaded, single = robot.dynamics, loaded_axes(robot), one_sided(robot, table)
+    assert model is not None
+    stuck = [
+        name for name, is_loaded in zip(robot.joint_names, loaded, strict=True) if not is_loaded
+    ]
+    free_of_weight = ~(loaded | model.compensated)
+    both = [
+        name
+        for name, is_free, is_single in zip(robot.joint_names, free_of_weight, single, strict=True)
+        if is_free and not is_single
+    ]
+    return (
+        *(f"coulomb.{name}" for name in stuck), *(f"bias.{name}" for name in both),
+        *(f"weight.{name}" for name in model.unknown),
+    )  # fmt: skip
+
+
+def fit(
+    table: RestTable,
+    parameters: ArmParameters,
+    free: Sequence[str] | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+    *,
+    loss: str = "cauchy",
+) -> FitResult:
+    """Fit numbers of the plant ``hardware`` to where a machine came to rest.
+
+    Residuals count in standard deviations of the runs; Cauchy's loss lets go of points that no
+    such model explains. Intervals are those of M-estimates. The wandering of friction
+    follows afterwards, from the spread of the runs.
+
+    Args:
+        table: Measured rests.
+        parameters: The slave, its controller and gains; its plant must be ``hardware``.
+        free: ``coulomb.<joint>``, ``bias.<joint>``, ``weight.<name>``; None for
+            :func:`default_free`.
+        progress: Hears the share that is done.
+        loss: One of :data:`LOSSES`.
+
+    Raises:
+        ParameterError: Another plant.
+        UnknownNameError: No such loss.
+        UnknownNameError: ``free`` names what cannot be fitted.
+        FitError: The fit does not converge, or parameters cannot be told apart; they are named.
+    """
+    robot = load_robot_set(parameters.robot, parameters.geometry)
+    if parameters.plant.kind.kind != "hardware":
+        raise ParameterError("slave_sim.plant", parameters.plant.kind.kind, "hardware")
+    if loss not in LOSSES:
+        raise UnknownNameError("loss", loss, LOSSES)
+    names = default_free(robot, table) if free is None else tuple(free)
+    _insist_on_known(names, robot)
+    problem = _Problem(robot, parameters, table, names)
+    start = np.array([0.1 if name.startswith("bias") else 1.0 for name in names])
+    lower = [0.0 if name.startswith("coulomb") else -np.inf for name in names]
+    slopes = problem.slopes(start)
+    _insist_on_identifiable(names, slopes)
+    progress(0.1)
+    found = least_squares(
+        problem.residuals, start, jac=problem.slopes, bounds=(lower, np.inf),  # type: ignore[arg-type]
+        loss=loss, max_nfev=_ROUNDS, xtol=1e-4, ftol=1e-4,
+    )  # fmt: skip
+    if not found.success:
+        raise FitError(
+            f"the fit did not converge in {_ROUNDS} rounds; its cost is {found.cost:.3g}"
+        )
+    progress(0.7)
+    return _result(problem, found.x, problem.slopes(found.x), LOSSES[loss], progress)
+
+
+def _insist_on_known(names: Sequence[str], robot: Robot) -> None:
+    assert robot.dynamics is not None
+    known = [f"{kind}.{joint}" for kind in ("coulomb", "bias") for joint in robot.joint_names]
+    known += [f"weight.{name}" for name in robot.dynamics.unknown]
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("free", name, known)
+    if not names or len(set(names)) < len(names):
+        raise ParameterError("free", list(names), "one name or more, each once")
+
+
+def _insist_on_identifiable(names: Sequence[str], slopes: Array) -> None:
+    """Refuse parameters that the table does not show, or not apart from others."""
+    sizes = np.linalg.norm(slopes, axis=0)
+    unseen = [name for name, size in zip(names, sizes, strict=True) if size < _WEAK * sizes.max()]
+    if unseen or not sizes.any():
+        text = ", ".join(unseen or names)
+        raise FitError(f"not identifiable from this table, on which they do not act: {text}")
+    if len(slopes) < len(names):
+        raise FitError(f"{len(names)} parameters need as many rests; the table has {len(slopes)}")
+    _, values, directions = np.linalg.svd(slopes / sizes)
+    for value, direction in zip(values, directions, strict=False):
+        if value < _WEAK * values[0]:
+            mixed = [n for n, part in zip(names, direction, strict=True) if abs(part) > 0.1]
+            text = ", ".join(mixed)
+            raise FitError(f"not identifiable from this table, for they act alike: {text}")
+
+
+def _result(
+    problem: _Problem,
+    x: Array,
+    slopes: Array,
+    weigh: Callable[[Array], Array],
+    progress: Callable[[float], None],
+) -> FitResult:
+    residuals = problem.residuals(x)
+    used = np.abs(slopes).max(axis=1) > 0.0
+    freedom = max(int(used.sum()) - len(x), 1)
+    weights = weigh(residuals)  # covariance of an M-estimate: Huber 1967
+    bend = np.linalg.inv(slopes.T @ (slopes * weights[:, None]))
+    pull = slopes * (weights * residuals)[:, None]
+    covariance = used.sum() / freedom * bend @ (pull.T @ pull) @ bend
+    half = t.ppf(0.5 + 0.5 * _SHARE, freedom) * np.sqrt(np.diag(covariance))
+    values = np.stack((x, x - half, x + half), axis=1) * problem.scales[:, None]
+    numbers = [
+        Fitted(name, _UNITS[name.partition(".")[0]], *row)
+        for name, row in zip(problem.free, values.tolist(), strict=True)
+    ]
+    wander, spread = _wander(problem, x, progress)
+    assert problem.robot.drives is not None
+    step = problem.robot.drives.encoder_step
+    return FitResult(
+        problem.robot.name, problem.robot.joint_names, problem.table.name, (*numbers, *wander),
+        problem.table.mean, problem.rests(x)[:, 0], problem.table.spread, spread, step,
+        problem.one_sided,
+    )  # fmt: skip
+
+
+def _wander(
+    problem: _Problem, x: Array, progress: Callable[[float], None]
+) -> tuple[list[Fitted], Array]:
+    """How much friction wanders about the fitted one, from the spread of the runs (n,)."""
+    runs = max(10, *(len(rests) for rests in problem.table.rests))
+    robot, measured = problem.robot, problem.table.spread
+
+    def spread(wander: Array) -> Array:
+        rests = problem.rests(x, runs, wander)
+        off = rests - rests.mean(axis=1, keepdims=True)
+        return np.asarray(np.sqrt((off**2).sum(axis=(0, 1)) / (off.shape[0] * (runs - 1))))
+
+    answered = spread(np.full(robot.n, _WANDER))
+    progress(0.85)
+    share = {name: _WANDER * measured[i] / answered[i] for i, name in enumerate(robot.joint_names)
+             if f"coulomb.{name}" in problem.free and answered[i] > 0.0}  # fmt: skip
+    wander = np.array([share.get(name, 0.0) for name in robot.joint_names])
+    freedom = sum(len(rests) - 1 for rests in problem.table.rests)
+    low, high = np.sqrt(freedom / chi2.ppf([0.5 + 0.5 * _SHARE, 0.5 - 0.5 * _SHARE], freedom))
+    numbers = [
+        Fitted(f"wander.{name}", "", float(w), float(w * low), float(w * high))
+        for name, w in share.items()
+    ]
+    predicted = spread(wander)
+    progress(1.0)
+    return numbers, predicted

@@ -1,0 +1,72 @@
+"""Aim: let the tool turn about the axes about which the hand turns.
+
+Turns of the stylus are turns of the tool in its own axes, by way of ``tool_axes`` and
+``tool_roll``. Seen from outside, the tool turns as the hand does, through the map of ``axes``, only
+if these fit the attitudes of stylus and tool at the moment of engagement.
+"""
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from teleop_core.geometry import Array, rotation, rotations_from_quaternions
+from teleop_core.mapping.parameters import axis_map
+from teleop_core.robots.robot import Robot
+from teleop_lab.planning.placement import Placement
+from teleop_lab.planning.turns import turns
+
+# What fits within this angle of the best is kept as it is given.
+_NEAR_ENOUGH = math.radians(5.0)
+_DIGITS = 4
+
+
+class Aim:
+    """Fits ``tool_axes`` and ``tool_roll`` to placements.
+
+    Args:
+        robot: The slave.
+        stylus: Attitude of the stylus, quaternion (4,), when it is engaged.
+        given: Placement whose values are kept where they fit.
+    """
+
+    def __init__(self, robot: Robot, stylus: Array, given: Placement) -> None:
+        self._robot, self._given = robot, given
+        self._stylus = rotations_from_quaternions(stylus)
+
+    def wanted(self, placement: Placement) -> Array:
+        """Rotation (3, 3) from the tool's axes to the stylus' with which both turn alike."""
+        tool = self._robot.fk(np.array(placement.start))[:3, :3]
+        return np.asarray(self._stylus.T @ axis_map("axes", placement.axes).T @ tool)
+
+    def misfit(self, placement: Placement) -> float:
+        """Angle [rad] by which the axes of the tool's turns are off those of the hand's."""
+        given = axis_map("tool_axes", placement.tool_axes).T @ rotation("z", placement.tool_roll)
+        return _angle(np.trace(given.T @ self.wanted(placement)))
+
+    def aimed(self, placement: Placement) -> Placement:
+        """The placement with tool axes and roll that fit best; as given if these fit as well."""
+        left = _matrices() @ self.wanted(placement)
+        rolls = np.arctan2(left[:, 1, 0] - left[:, 0, 1], left[:, 0, 0] + left[:, 1, 1])
+        # Trace of Rz(-roll) times each of the matrices.
+        traces = np.hypot(left[:, 1, 0] - left[:, 0, 1], left[:, 0, 0] + left[:, 1, 1])
+        traces += left[:, 2, 2]
+        first = turns().index(self._given.tool_axes)
+        best = first if traces[first] >= traces.max() - 1e-9 else int(traces.argmax())
+        kept = replace(placement, tool_axes=self._given.tool_axes, tool_roll=self._given.tool_roll)
+        if self.misfit(kept) <= _angle(traces[best]) + _NEAR_ENOUGH:
+            return kept
+        roll = round(float(np.clip(rolls[best], -3.1415, 3.1415)), _DIGITS)
+        return replace(placement, tool_axes=turns()[best], tool_roll=roll)
+
+
+def _angle(trace: float) -> float:
+    """Angle [rad] of a rotation with a trace."""
+    return math.acos(min(max(0.5 * (float(trace) - 1.0), -1.0), 1.0))
+
+
+@cache
+def _matrices() -> Array:
+    """Matrices (24, 3, 3) of all maps of axes."""
+    return np.stack([axis_map("tool_axes", axes) for axes in turns()])

@@ -1,0 +1,265 @@
+"""Reach: how much of a hand's motion a slave can follow, and with what it follows most of it."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from teleop_core.api import run
+from teleop_core.bags.arms import of_arm
+from teleop_core.bags.reader import Bag
+from teleop_core.errors import ParameterError, RecordingError, UnknownNameError
+from teleop_core.exchange import as_master_bag
+from teleop_core.recording import Recording
+from teleop_core.robots.robot import Robot
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.layers import (
+    Layer,
+    config_folder,
+    list_scenarios,
+    load_file,
+    parse_setting,
+    scenario_file,
+    setting,
+)
+from teleop_core.session.runner import recorded_configuration
+from teleop_lab.planning.aim import Aim
+from teleop_lab.planning.asked import AskedPath, asked_path
+from teleop_lab.planning.placement import Placement
+from teleop_lab.planning.search import Search
+from teleop_lab.planning.walk import Walked, Walker
+
+GOAL = 0.99
+"""Share of the time that is to be followed if nothing else is said."""
+Progress = Callable[[int, int], None]
+Setting = float | str | bool | Sequence[float] | Sequence[str]
+# Samples that are walked at most: of the whole path, and of the excerpt on which the search goes.
+_WHOLE, _EXCERPT = 150_000, 6_000
+_EXCERPT_RATE = 20.0  # Hz
+# Walks that a search usually takes, for the progress.
+_USUAL_WALKS = 500
+# The excerpt is followed better than the whole path; so often the goal on it is raised.
+_ATTEMPTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A placement and what becomes of the path with it.
+
+    Attributes:
+        placement: Start, turn and gains.
+        session: As in a session: limits cut the hand's motion, joints have their speeds.
+        in_place: The path where it is, nothing cut, joints as fast as needed.
+        at_given_gain: Share of the time that a session would follow with the gains that were given.
+        misfit: Angle [rad] by which the axes of the tool's turns are off those of the hand's.
+    """
+
+    placement: Placement
+    session: Walked
+    in_place: Walked
+    at_given_gain: float
+    misfit: float
+
+    @property
+    def share(self) -> float:
+        """Share of the time in which a session would follow."""
+        return self.session.share
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """What a slave can follow of a motion.
+
+    Attributes:
+        path: What the hand did.
+        robot: The slave.
+        goal: Share of the time that was to be followed.
+        given: With the parameters as they are.
+        proposed: With the best that was found; the given one if that reaches the goal.
+        arm: Namespace of the arm; empty for the default one.
+    """
+
+    path: AskedPath
+    robot: Robot
+    goal: float
+    given: Followed
+    proposed: Followed
+    arm: str = ""
+
+    @property
+    def is_given(self) -> bool:
+        """Whether the given parameters reach the goal, so that nothing is to be changed."""
+        return self.given.placement == self.proposed.placement
+
+    def settings(self) -> dict[str, float | str | list[float] | list[str]]:
+        """Proposed parameters, as ``tc.replay(..., settings=...)`` takes them."""
+        return self.proposed.placement.settings(self.arm)
+
+    def texts(self) -> list[str]:
+        """Proposed parameters as ``key=value`` for ``--set``."""
+        return self.proposed.placement.texts(self.arm)
+
+    def parameter_file(self) -> str:
+        """Proposed parameters as a ROS 2 parameter file for ``--config``."""
+        return self.proposed.placement.parameter_file(self.arm)
+
+    def __str__(self) -> str:
+        from teleop_lab.planning.table import text
+
+        return text(self)
+
+    def __repr__(self) -> str:
+        shares = f"{self.given.share:.1%} as given, {self.proposed.share:.1%} proposed"
+        return f"Reach({self.path.name}, {self.robot.name}: {shares})"
+
+    def write_page(self, file: Path | str) -> None:
+        """Write a page with the path in space and against time, as given and as proposed.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        from teleop_lab.planning.page import write_reach_page
+
+        write_reach_page([self], Path(file))
+
+
+def _silent(done: int, total: int) -> None:
+    """Show no progress."""
+
+
+def reach(
+    source: Recording | Path | str,
+    *,
+    robot: str | None = None,
+    geometry: Iterable[str] = (),
+    share: float = GOAL,
+    arm: str = "",
+    keeps_axes: bool = False,
+    progress: Progress = _silent,
+    files: Iterable[Path | str] = (),
+    settings: Mapping[str, Setting] | None = None,
+    texts: Iterable[str] = (),
+) -> Reach:
+    """How much of a hand's motion a slave can follow, and with what it follows most of it.
+
+    Args:
+        source: A recording, its path, or the name of a scenario, which is run first. Its own
+            configuration is the start; of a recording of others, in any file that replay takes,
+            the default one.
+        robot: The slave, in place of the configuration's; its start then is the robot's own.
+        geometry: Its lengths [m, rad] as ``symbol=value``.
+        share: Share of the time that is to be followed, above 0 and at most 1.
+        arm: Namespace of the arm; empty for the default one.
+        keeps_axes: Whether the map of axes from hand to slave is to stay as it is, as where a
+            camera looks at the slave from a fixed side.
+        progress: Told how far it is.
+        files: ROS 2 parameter files over the configuration.
+        settings: Parameters over the files.
+        texts: The same as ``key=value``, over the settings.
+
+    Returns:
+        Shares and causes, and a proposal.
+
+    Raises:
+        TeleopError: The recording or scenario is missing, has no pose of a master, or a parameter
+            is wrong; the text names it.
+    """
+    if not 0.0 < share <= 1.0:
+        raise ParameterError("share", share, "above 0 and at most 1")
+    changes = _changes(robot, geometry, files, settings or {}, texts)
+    made, bag = _configured(source, changes)
+    path = asked_path(of_arm(bag, arm))
+    return _reach(path, made, share, arm, progress, keeps_axes=keeps_axes)
+
+
+def _changes(
+    robot: str | None,
+    geometry: Iterable[str],
+    files: Iterable[Path | str],
+    settings: Mapping[str, Setting],
+    texts: Iterable[str],
+) -> list[Layer]:
+    layers = []
+    if robot is not None:
+        named = {"robot": robot, "geometry": list(geometry), "slave.start": []}
+        layers = [setting(name, value) for name, value in named.items()]
+    layers += [load_file(Path(file)) for file in files]
+    layers += [setting(name, value) for name, value in settings.items()]
+    return layers + [parse_setting(text) for text in texts]
+
+
+def _configured(source: Recording | Path | str, changes: list[Layer]) -> tuple[Configuration, Bag]:
+    """Configuration with the changes, and the recording; of a scenario one that is made now."""
+    if isinstance(source, str) and not Path(source).exists():
+        if Path(source).name != source or Path(source).suffix:
+            reason = "does not exist; give a recording, or one of `teleop scenarios`"
+            raise RecordingError(source, reason)
+        if source not in list_scenarios():
+            raise UnknownNameError("recording or scenario", source, list_scenarios())
+        made = _of_scenario(source, changes)
+        return made, run(made).bag
+    bag = as_master_bag(source.bag if isinstance(source, Recording) else source)
+    layer, scenario = recorded_configuration(bag)
+    return Configuration.from_layers([layer, *changes], scenario), bag
+
+
+def _of_scenario(name: str, changes: list[Layer]) -> Configuration:
+    """Configuration of a scenario in which the hand does not feel the slave's limits."""
+    files = [config_folder() / "teleop.yaml", scenario_file(name)]
+    free = setting("motion_scaling.reach_force.is_on", False)
+    return Configuration.from_layers([*map(load_file, files), *changes, free], name)
+
+
+def _reach(
+    path: AskedPath,
+    made: Configuration,
+    goal: float,
+    arm: str,
+    progress: Progress,
+    *,
+    keeps_axes: bool,
+) -> Reach:
+    scaling, solving = made.group("motion_scaling", arm), made.group("inverse_kinematics", arm)
+    whole = Walker(path.limited(_WHOLE), scaling, solving)
+    start = made.group("slave", arm).start_of(whole.robot)
+    given = Placement.of(scaling, solving, tuple(start))
+    done = 0
+
+    def tell() -> None:
+        nonlocal done
+        done += 1
+        progress(min(done, _USUAL_WALKS - 1), _USUAL_WALKS)
+
+    aim = Aim(whole.robot, path.stylus, given)
+    as_given = _followed(whole, given, given, aim)
+    proposed = as_given
+    if as_given.share < goal:
+        excerpt = Walker(path.excerpt(_EXCERPT_RATE, _EXCERPT), scaling, solving)
+        search = Search(excerpt, given, aim, tell, keeps_axes=keeps_axes)
+        proposed = _proposed(whole, search, as_given, goal, aim)
+    progress(_USUAL_WALKS, _USUAL_WALKS)
+    return Reach(whole.path, whole.robot, goal, as_given, proposed, arm)
+
+
+def _followed(walker: Walker, placement: Placement, given: Placement, aim: Aim) -> Followed:
+    full = replace(placement, coarse_gain=given.coarse_gain, fine_gain=given.fine_gain)
+    session = walker.walk(placement)
+    return Followed(
+        placement=placement,
+        session=session,
+        in_place=walker.walk(placement, is_cut=False, is_fast=True),
+        at_given_gain=session.share if full == placement else walker.share(full),
+        misfit=aim.misfit(placement),
+    )
+
+
+def _proposed(whole: Walker, search: Search, given: Followed, goal: float, aim: Aim) -> Followed:
+    """Best placement found; the goal on the excerpt is raised until the whole path reaches it."""
+    best, wanted = (given.share, given.placement), goal
+    for _ in range(_ATTEMPTS):
+        placement = search.best(min(wanted, 1.0))[1]
+        share = whole.share(placement)
+        best = max(best, (share, placement), key=lambda found: found[0])
+        if share >= goal or wanted >= 1.0:
+            break
+        wanted += 1.5 * (goal - share)
+    return _followed(whole, best[1], given.placement, aim)

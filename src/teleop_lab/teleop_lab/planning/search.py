@@ -1,0 +1,233 @@
+"""Search: the placement, turn and gains with which a slave follows a hand's motion.
+
+The largest rotation gain that can reach the goal comes first, then the largest gain. Where the
+motion drifts against a limit the start is moved by what was cut off, which is how far from the
+middle of its room the arm began.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from teleop_core.geometry import Array, multiply_quaternions, transform_from_pose
+from teleop_core.robots.kinematics import IkStatus
+from teleop_core.robots.room import roomy_postures
+from teleop_lab.planning.aim import Aim
+from teleop_lab.planning.placement import Placement
+from teleop_lab.planning.turns import turns
+from teleop_lab.planning.walk import Walker
+
+ROTATION_GAINS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.0)
+"""Rotation gains that are tried, the largest first."""
+LEAST_GAIN = 0.1
+"""Smallest gain that is tried, as a share of the given one, before the rotation gain is lowered."""
+STARTS = 24
+"""Postures that are tried as starts."""
+CUT = 0.03
+"""By how much less of the time than a session follows the path may be followed where it is, with
+nothing cut off: a placement lives from motion that fits, not from motion that is cut to fit."""
+# Another start, which the eye, and another turn, which the hand has to get used to, must be worth
+# this factor of gain.
+_WORTH = 1.25
+_IMPROVED = 3  # of those tried, the best so many
+_ROUNDS, _BISECTIONS = 3, 6
+_MOMENTS = (0.25, 0.5, 0.75, 1.0)
+_DIGITS = 4
+Found = tuple[float, Placement]
+"""Share of the time that is followed, and with what."""
+
+
+class Search:
+    """Search for a placement.
+
+    Args:
+        walker: Walks the path, or an excerpt of it.
+        given: Placement to begin with; its gains are the largest that are tried.
+        aim: Fits the tool's axes to every start and turn.
+        tell: Called before every walk.
+        keeps_axes: Whether ``axes`` stay as they are given.
+    """
+
+    def __init__(
+        self,
+        walker: Walker,
+        given: Placement,
+        aim: Aim,
+        tell: Callable[[], None],
+        *,
+        keeps_axes: bool = False,
+    ) -> None:
+        self._turns = () if keeps_axes else turns()
+        self._walker, self._given, self._aim, self._tell = walker, given, aim, tell
+        self._goal = 1.0
+        self._known: dict[Placement, float] = {}
+        self._starts = [self._rounded(q) for q in roomy_postures(walker.robot, STARTS)]
+
+    def best(self, goal: float) -> Found:
+        """The placement with the largest gains that reach the goal, or the one that comes nearest.
+
+        Args:
+            goal: Share of the time that is to be followed.
+
+        Returns:
+            Share of the time that the walker's path is followed, and the placement.
+        """
+        self._goal, nearest = goal, (-1.0, self._given)
+        self._known.clear()
+        for rotation_gain in self._rotation_gains():
+            found = self._at_rest(rotation_gain)
+            nearest = max(nearest, found[0], key=_share)
+            if found[0][0] >= self._goal:
+                raised = self._with_other(self._raised(found), self._other_starts)
+                return self._with_other(raised, self._other_turns)
+        return nearest
+
+    def _rotation_gains(self) -> list[float]:
+        given = self._given.rotation_gain
+        return [given, *(gain for gain in ROTATION_GAINS if gain < given)]
+
+    def _at_rest(self, rotation_gain: float) -> list[Found]:
+        """The best with the least gain, the best first: with the given start and axes if these do.
+
+        Else other starts are tried, then other axes.
+        """
+        scaled = self._scaled(self._given, LEAST_GAIN, self._given)
+        least = replace(scaled, rotation_gain=rotation_gain)
+        tried = [self._improved(self._found(least))]
+        for others in (self._other_starts, self._other_turns):
+            if tried[0][0] >= self._goal:
+                break
+            more = self._sorted(others(tried[0][1]))[:_IMPROVED]
+            tried = sorted((*tried, *map(self._improved, more)), key=_share, reverse=True)
+        return tried
+
+    def _other_starts(self, placement: Placement) -> list[Placement]:
+        """The placement from everywhere else."""
+        return [replace(placement, start=start) for start in self._starts]
+
+    def _other_turns(self, placement: Placement) -> list[Placement]:
+        """The placement with every map of axes that may be taken."""
+        return [replace(placement, axes=axes) for axes in self._turns]
+
+    def _raised(self, found: Sequence[Found]) -> Found:
+        """The largest gain that reaches the goal, from what does so with the least."""
+        low, high, best = math.log(LEAST_GAIN), 0.0, found[0]
+        pool = list(found)
+        for i in range(_BISECTIONS + 1):
+            middle = high if i == 0 else 0.5 * (low + high)  # first what is given
+            tried = self._sorted(
+                self._scaled(self._given, math.exp(middle), placement) for _, placement in pool
+            )
+            reached = self._first(tried)
+            if reached is None:
+                high = middle
+                continue
+            low, best = middle, reached
+            pool = [reached, *pool[:2]]
+            if middle == high:
+                break
+        return best
+
+    def _with_other(self, best: Found, others: Callable[[Placement], Iterable[Placement]]) -> Found:
+        """One of others in its place, if they allow a gain that is worth it."""
+        while (factor := _WORTH * self._factor(best[1])) <= 1.0:
+            raised = self._scaled(self._given, factor, best[1])
+            reached = self._first(self._sorted(others(raised))[:_IMPROVED])
+            if reached is None:
+                return best
+            best = reached
+        return best
+
+    def _first(self, tried: Iterable[Found]) -> Found | None:
+        """First that reaches the goal, with its start moved if it needs that."""
+        for found in tried:
+            better = found if found[0] >= self._goal else self._improved(found)
+            if better[0] >= self._goal:
+                return better
+        return None
+
+    def _improved(self, found: Found) -> Found:
+        """The same with its start moved by what was cut off, as long as that helps."""
+        for _ in range(_ROUNDS):
+            if found[0] >= 1.0:
+                break
+            tried = self._sorted(self._moved(found[1]))
+            if not tried or tried[0][0] <= found[0]:
+                break
+            found = tried[0]
+        return found
+
+    def _moved(self, placement: Placement) -> list[Placement]:
+        """Placements that start where the path would have stood had it been cut from the start."""
+        self._tell()
+        cut = self._walker.walk(placement)
+        self._tell()
+        whole = self._walker.walk(placement, is_cut=False, is_fast=True)
+        starts = []
+        for moment in _MOMENTS:
+            at = round(moment * (len(cut.asked) - 1))
+            start = self._start_at(whole.asked, cut.asked[at], at, placement.start)
+            if start is not None:
+                starts.append(replace(placement, start=start))
+        return starts
+
+    def _start_at(
+        self, whole: Array, cut: Array, at: int, start: tuple[float, ...]
+    ) -> tuple[float, ...] | None:
+        """Joints from which the whole path passes through the pose ``cut`` at sample ``at``."""
+        pose, inverse, T = np.empty(7), whole[at, 3:] * (1.0, -1.0, -1.0, -1.0), np.empty((4, 4))
+        pose[:3] = whole[0, :3] + cut[:3] - whole[at, :3]
+        multiply_quaternions(np.ascontiguousarray(cut[3:]), inverse, pose[3:])
+        multiply_quaternions(pose[3:], np.ascontiguousarray(whole[0, 3:]), pose[3:])
+        pose[3:] /= np.linalg.norm(pose[3:])
+        transform_from_pose(pose, T)
+        answer = self._walker.robot.ik(T, np.array(start))
+        return self._rounded(answer.q) if answer.status is IkStatus.FOLLOWED else None
+
+    def _found(self, placement: Placement) -> Found:
+        placement = self._aim.aimed(placement)
+        if placement not in self._known:
+            self._known[placement] = self._share(placement)
+        return self._known[placement], placement
+
+    def _share(self, placement: Placement) -> float:
+        """Share that a session follows, or what :data:`CUT` leaves of that of the path in place."""
+        self._tell()
+        share = self._walker.share(placement, is_cut=False) + CUT
+        if share < self._goal:
+            return share
+        self._tell()
+        return min(share, self._walker.share(placement))
+
+    def _sorted(self, placements: Iterable[Placement]) -> list[Found]:
+        """Shares of placements, the best first; of equals the first."""
+        found = [self._found(placement) for placement in dict.fromkeys(placements)]
+        return sorted(found, key=_share, reverse=True)
+
+    def _rounded(self, q: Array) -> tuple[float, ...]:
+        """Joints to four digits, inside the limits."""
+        robot = self._walker.robot
+        return tuple(np.clip(np.round(q, _DIGITS), robot.lower, robot.upper).tolist())
+
+    def _factor(self, placement: Placement) -> float:
+        return placement.coarse_gain / self._given.coarse_gain
+
+    def _scaled(self, gains: Placement, factor: float, placement: Placement) -> Placement:
+        """Placement with the gains of another, times a factor, to three digits."""
+        return replace(
+            placement,
+            coarse_gain=_three_digits(gains.coarse_gain * factor),
+            fine_gain=_three_digits(gains.fine_gain * factor),
+        )
+
+
+def _share(found: Found) -> float:
+    return found[0]
+
+
+def _three_digits(value: float) -> float:
+    """Value cut to three digits, never above it; not below the least gain that parameters allow."""
+    digits = 2 - math.floor(math.log10(value))
+    return max(math.floor(value * 10.0**digits + 1e-9) / 10.0**digits, 1e-3)

@@ -1,0 +1,208 @@
+"""Walk: a hand's path through motion scaling and inverse kinematics alone.
+
+The stages of a session answer sample after sample, with a slave that is at once where it is told
+to be. So what is followed, what is cut off and why comes out as in a session, some hundred times
+faster.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.geometry import Array, pose_from_transform
+from teleop_core.kernels import bound, kernel_from_source, raise_pending, records
+from teleop_core.mapping.inverse_kinematics import (
+    InverseKinematics,
+    InverseKinematicsParameters,
+)
+from teleop_core.mapping.motion_scaling import MotionScaling
+from teleop_core.mapping.parameters import MotionScalingParameters
+from teleop_core.signals import DT, assign, copy
+from teleop_core.topics import SLAVE_REACH, Limit
+from teleop_lab.planning.asked import AskedPath
+from teleop_lab.planning.placement import Placement
+
+_COLUMN = {name: column for column, name in enumerate(SLAVE_REACH.columns)}
+# Larger than any speed limit [rad/s or m/s].
+_ANY_SPEED = 1e6
+_SOURCE = """\
+def walk(scaling, solving, s, r, fk, geometry, T, q, switch, samples, answers, dt):
+    for i in range(samples.shape[0]):
+        sample, answer = samples[i], answers[i]
+        copy(sample.pose, s.master_measured_cp)
+        copy(sample.buttons, s.master_buttons)
+        s.master_measured_cp_ns = sample.stamp_ns
+        scale({scaling}s, dt)
+        copy(s.slave_servo_cp, r.slave_servo_cp)
+        r.slave_servo_cp_ns = sample.stamp_ns
+        solve({solving}r, dt)
+        copy(r.slave_servo_jp, r.slave_setpoint_js)
+        copy(r.slave_servo_jp, q)
+        fk(q, geometry, T)
+        pose_from_transform(T, s.slave_setpoint_cp)
+        r.slave_setpoint_js_ns = s.slave_setpoint_cp_ns = sample.stamp_ns
+        if switch[0]:
+            copy(r.slave_reach, s.slave_reach)
+            s.slave_reach_ns = sample.stamp_ns
+        copy(s.slave_servo_cp, answer.command)
+        copy(s.slave_setpoint_cp, answer.reached)
+        copy(r.slave_servo_jp, answer.q)
+        copy(r.slave_reach, answer.reach)
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Walked:
+    """What became of a path.
+
+    Attributes:
+        weights: Share of the time (N,) that each sample stands for; they add up to 1.
+        asked: Poses (N, 7) [m] that the slave was asked for.
+        reached: Poses (N, 7) [m] of its answer.
+        q: Joints (N, n) [rad, m] of its answer.
+        limit: :class:`~teleop_core.topics.Limit` (N,) that kept it from following.
+        joint: Joint (N,) that was at its limit; -1 for none.
+        residual: Distance [m] and angle [rad] (N, 2) from what was asked for.
+    """
+
+    weights: Array
+    asked: Array
+    reached: Array
+    q: Array
+    limit: NDArray[np.int64]
+    joint: NDArray[np.int64]
+    residual: Array
+
+    @property
+    def share(self) -> float:
+        """Share of the time in which the slave does what it is asked for."""
+        return float(self.weights[self.limit == Limit.NONE].sum())
+
+    @property
+    def causes(self) -> dict[str, float]:
+        """Share of the time for each cause for which it does not, by its name."""
+        causes = (limit for limit in Limit if limit is not Limit.NONE)
+        return {c.name.lower(): float(self.weights[self.limit == c].sum()) for c in causes}
+
+
+class Walker:
+    """Walks a path with one placement after the other.
+
+    Args:
+        path: What the hand does.
+        scaling: Parameters of motion scaling; a placement stands over them.
+        solving: Parameters of inverse kinematics, with the robot.
+    """
+
+    def __init__(
+        self,
+        path: AskedPath,
+        scaling: MotionScalingParameters,
+        solving: InverseKinematicsParameters,
+    ) -> None:
+        self.path = path
+        self._parameters = scaling
+        self._scaling, self._solving = MotionScaling(scaling), InverseKinematics(solving)
+        self.robot = self._solving.robot
+        self._speed = self._solving.parameters["speed"].copy()
+        self.weights = _weights(path, scaling.longest_pause)
+        pauses_ns = self._pauses(scaling.longest_pause)
+        self._scaling_pause, self._solving_pause = pauses_ns
+        self._fill()
+        self._walk = self._bind()
+
+    def _pauses(self, longest: float) -> tuple[int, int]:
+        """Longest pauses [ns] of both stages; thinned samples are farther apart than real ones."""
+        usual_ns = 3 * int(np.median(np.diff(self.path.stamp_ns)))
+        solving_ns = int(self._solving.parameters["longest_ns"])
+        return max(round(longest * 1e9), usual_ns), max(solving_ns, usual_ns)
+
+    def _fill(self) -> None:
+        n, count = self.robot.n, len(self.path)
+        fields = [("stamp_ns", "i8"), ("pose", "f8", (7,)), ("buttons", "f8", (3,))]
+        self._samples = records(fields, count)
+        self._samples["stamp_ns"] = self.path.stamp_ns
+        self._samples["pose"], self._samples["buttons"] = self.path.poses, self.path.buttons
+        width = len(SLAVE_REACH.columns)
+        kinds = [("command", "f8", (7,)), ("reached", "f8", (7,)), ("q", "f8", (n,))]
+        self._answers = records([*kinds, ("reach", "f8", (width,))], count)
+        self._switch = np.zeros(1)
+
+    def _bind(self) -> Any:
+        scaling, solving, robot = self._scaling, self._solving, self.robot
+        source = _SOURCE.format(
+            scaling="".join(f"scaling[{i}], " for i in range(len(scaling.arguments))),
+            solving="".join(f"solving[{i}], " for i in range(len(solving.arguments))),
+        )
+        known = {
+            "scale": scaling.kernel, "solve": solving.kernel, "copy": copy,
+            "pose_from_transform": pose_from_transform,
+        }  # fmt: skip
+        return bound(
+            kernel_from_source(source, "walk", known),
+            scaling.arguments, solving.arguments, scaling.signals, solving.signals,
+            robot.fk_pointer, robot.geometry_row, np.zeros((4, 4)), np.zeros(robot.n),
+            self._switch, self._samples, self._answers, DT,
+        )  # fmt: skip
+
+    def share(self, placement: Placement, *, is_cut: bool = True) -> float:
+        """Share of the time that a placement follows, as in :attr:`Walked.share`; see `walk`."""
+        self._run(placement, is_cut=is_cut, is_fast=False)
+        is_followed = self._answers["reach"][:, _COLUMN["limit"]] == Limit.NONE
+        return float(self.weights[is_followed].sum())
+
+    def walk(self, placement: Placement, *, is_cut: bool = True, is_fast: bool = False) -> Walked:
+        """What becomes of the path.
+
+        Args:
+            placement: Start, turn and gains.
+            is_cut: Whether a limit cuts the hand's motion, as in a session. Else every pose of the
+                path is asked for where it is.
+            is_fast: Whether joints may be as fast as they would have to be.
+        """
+        self._run(placement, is_cut=is_cut, is_fast=is_fast)
+        answers, reach = self._answers, self._answers["reach"]
+        return Walked(
+            weights=self.weights,
+            asked=answers["command"].copy(),
+            reached=answers["reached"].copy(),
+            q=answers["q"].copy(),
+            limit=reach[:, _COLUMN["limit"]].astype(np.int64),
+            joint=reach[:, _COLUMN["joint"]].astype(np.int64),
+            residual=reach[:, _COLUMN["position_residual"] : _COLUMN["cut_x"]].copy(),
+        )
+
+    def _run(self, placement: Placement, *, is_cut: bool, is_fast: bool) -> None:
+        scaling, solving = self._scaling, self._solving
+        scaling.retune(
+            replace(
+                self._parameters,
+                axes=placement.axes,
+                coarse_gain=placement.coarse_gain,
+                fine_gain=placement.fine_gain,
+                rotation_gain=placement.rotation_gain,
+                tool_axes=placement.tool_axes,
+                tool_roll=placement.tool_roll,
+            )
+        )
+        for stage in (scaling, solving):
+            assign(stage.signals, 0)
+            stage.reset()
+        scaling.parameters["pause_ns"] = self._scaling_pause
+        solving.parameters["longest_ns"] = self._solving_pause
+        solving.parameters["speed"] = _ANY_SPEED if is_fast else self._speed
+        start = np.array(placement.start)
+        solving.signals["slave_setpoint_js"] = start
+        pose_from_transform(self.robot.fk(start), scaling.signals["slave_setpoint_cp"])
+        self._switch[0] = is_cut
+        self._walk()
+        raise_pending()
+
+
+def _weights(path: AskedPath, longest: float) -> Array:
+    """Share of the time (N,) that each sample stands for: up to the next, or the longest pause."""
+    steps = np.diff(path.time)
+    held = np.minimum(np.append(steps, np.median(steps)), max(longest, 3.0 * np.median(steps)))
+    return np.asarray(held / held.sum(), dtype=np.float64)
