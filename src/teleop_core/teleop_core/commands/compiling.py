@@ -1,10 +1,7 @@
 """``teleop compile``: kernels of the built-in parts, compiled before a session needs them."""
 
 import argparse
-import tempfile
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
 from os import sched_getaffinity
 from pathlib import Path
 
@@ -29,6 +26,9 @@ def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from multiprocessing import get_context
+
     from teleop_core.commands.progress import shown_progress
 
     phases = list(_phases(is_all=arguments.all))
@@ -68,6 +68,8 @@ def _phases(*, is_all: bool) -> Iterator[Sequence[Job]]:
 
 def _compile(job: Job, is_replayed: bool) -> int:
     """Number of kernels that were compiled to run a stage or a short session."""
+    import tempfile
+
     from teleop_core import api
     from teleop_core.kernels.progress import compiled_count
     from teleop_core.signals import DT

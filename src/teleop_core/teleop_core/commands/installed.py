@@ -7,7 +7,6 @@ A package adds a command by a function that adds its parser, as ``add`` of the m
 """
 
 import sys
-from importlib.metadata import entry_points
 from typing import Any
 
 from teleop_core.texts import one_line
@@ -22,6 +21,8 @@ RELEASED_TOGETHER = {
 
 def add(commands: Any) -> None:
     """Add the parsers of installed commands; one that cannot be loaded is named and left out."""
+    from importlib.metadata import entry_points
+
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
         if entry.name in commands.choices:
             continue

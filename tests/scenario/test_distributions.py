@@ -1,0 +1,112 @@
+"""Three distributions: the core works alone, and the others add their commands to it."""
+
+import subprocess
+import sys
+from importlib.metadata import EntryPoint, entry_points
+
+import pytest
+
+from teleop_core import cli
+from teleop_core.commands import installed
+
+ALONE = """
+import importlib.metadata, sys
+
+sys.modules["teleop_lab"] = sys.modules["teleop_drill"] = None  # cannot be imported
+found = importlib.metadata.entry_points
+importlib.metadata.entry_points = lambda **asked: () if asked else found()  # numba asks for all
+from teleop_core import cli
+
+sys.exit(cli.main(sys.argv[1:]))
+"""
+"""Command of the core, as if neither of the others were installed."""
+
+
+def alone(*words, code=0):
+    done = subprocess.run(
+        [sys.executable, "-c", ALONE, *map(str, words)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stdout + done.stderr
+    return done
+
+
+@pytest.fixture
+def entries(monkeypatch):
+    """Replace the installed commands: ``entries(polish="module:add")``."""
+
+    def replace(**places):
+        group = [EntryPoint(name, place, installed.GROUP) for name, place in places.items()]
+        monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: group)
+        cli._core.cache_clear()
+        cli._parser.cache_clear()
+
+    yield replace
+    cli._core.cache_clear()
+    cli._parser.cache_clear()
+
+
+@pytest.mark.slow
+def test_core_alone_runs_replays_and_scores_a_session(tmp_path):
+    alone("sim", "--duration", 1, "--out", tmp_path / "bag")
+    alone("replay", tmp_path / "bag", "--out", tmp_path / "again")
+    scores = tmp_path / "scores.json"
+    alone("evaluate", tmp_path / "bag", tmp_path / "again", "--json", scores)
+    assert "position_error_mm" in scores.read_text()
+
+
+@pytest.mark.parametrize(("name", "distribution"), installed.RELEASED_TOGETHER.items())
+def test_command_of_a_missing_distribution_says_what_to_install(
+    entries, capsys, name, distribution
+):
+    entries()
+    with pytest.raises(SystemExit, match="2"):
+        cli.main([name, "--list"])
+    text = f"teleop {name}: install {distribution}, which has this command\n"
+    assert capsys.readouterr().err == text
+
+
+def test_commands_of_the_other_distributions_are_where_the_advice_says():
+    found = {entry.name: entry.module for entry in entry_points(group=installed.GROUP)}
+    places = installed.RELEASED_TOGETHER.items()
+    assert found == {name: f"{package}.commands.{name}" for name, package in places}
+
+
+def test_commands_of_the_core_ask_no_installed_package(monkeypatch, capsys):
+    monkeypatch.setattr(installed, "add", lambda _: pytest.fail("looked for installed commands"))
+    cli._parser.cache_clear()
+    cli._core.cache_clear()
+    assert cli.main(["scenarios"]) == 0
+    assert "coarse_box" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (["sim", "--out", "drill"], "sim"),
+        (["--parts", "sim", "drill", "--list"], "drill"),
+        (["--parts=sim", "drill"], "drill"),
+        (["--help"], None),
+        (["--parts"], None),
+        ([], None),
+    ],
+)
+def test_command_is_the_first_word_that_is_no_option(words, name):
+    assert cli._command_of(words) == name
+
+
+def test_command_that_cannot_be_loaded_is_named_and_the_others_work(entries, capsys):
+    entries(broken="no_such_module:add", drill="teleop_drill.commands.drill:add")
+    assert cli.main(["drill", "--list"]) == 0
+    captured = capsys.readouterr()
+    assert "kill_motion_scaling" in captured.out
+    assert captured.err == (
+        "note: no command broken, from no_such_module:add: "
+        "ModuleNotFoundError: No module named 'no_such_module'\n"
+    )
+
+
+def test_installed_command_does_not_replace_one_of_the_core(entries, capsys):
+    entries(scenarios="no_such_module:add", drill="teleop_drill.commands.drill:add")
+    assert cli.main(["scenarios"]) == 0
+    assert cli.main(["drill", "--list"]) == 0
+    assert capsys.readouterr().err == ""
