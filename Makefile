@@ -27,9 +27,9 @@ $(VENV)/.tested: $(VENV)/.installed
 	$(INSTALL) -e 'src/teleop_core[test]'
 	touch $@
 
-# A wheel for every processor, and one with compiled kernels for x86-64 and the venv's Python.
+# Wheels of all distributions; of teleop_core one more, with kernels for x86-64 and the venv's Python.
 wheel: setup
-	$(BIN)/python src/teleop_core/build_wheels.py $(OUT)/wheels
+	$(BIN)/python src/build_wheels.py $(OUT)/wheels
 
 # CRTK's messages, which PyPI does not have; without a compiler they are left out, with a word.
 crtk_msgs: setup
@@ -109,7 +109,7 @@ COUNT ?= 100
 endurance: $(VENV)/.tested
 	$(BIN)/python benchmarks/endurance.py --count $(COUNT)
 
-# Copies of the package with one safety broken each: the drill must find every one, in both forms,
+# Copies of teleop_core with one safety broken each: the drill must find every one, in both forms,
 # and nothing in a sound copy; about an hour on a busy machine. MUTANTS names some of them.
 drill-mutants: setup
 	$(BIN)/python tests/mutants.py $(MUTANTS)

@@ -10,7 +10,7 @@ from llvmlite.binding import get_host_cpu_features
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.kernels.shipped import FOLDER, TIERS
 
-SOURCES = Path(__file__).parents[2] / "src/teleop_core"
+SOURCES = Path(__file__).parents[2] / "src"
 V3, V2 = TIERS
 SCRIPT = """
 import numpy as np
@@ -62,7 +62,7 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def shipped(tmp_path_factory):
     """Sources with the kernels of the script, as a wheel holds them; and what the script prints."""
-    tree = wheels.copied(tmp_path_factory.mktemp("wheel") / "tree")
+    tree = wheels.copied(wheels.CORE, tmp_path_factory.mktemp("wheel") / "tree")
     compiled = wheels.run(tree, None, SCRIPT).split()
     assert int(compiled[0]) >= 3
     for file in _kept(tree):

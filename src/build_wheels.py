@@ -1,8 +1,8 @@
-"""Build wheels of teleop_core: a pure one, and one with compiled kernels for this system's x86-64.
+"""Build wheels of all distributions; of teleop_core a second one, with kernels for x86-64.
 
 ``make wheel`` runs it. The second wheel serves one version of Python on any x86-64 processor that
 has one of the tiers; pip takes the pure one elsewhere, and kernels are compiled when they are
-first needed.
+first needed, as are the few of teleop_lab.
 """
 
 import argparse
@@ -18,7 +18,7 @@ from teleop_core.kernels.shipped import FOLDER, TIERS
 HERE = Path(__file__).resolve().parent
 PLATFORM = "manylinux_2_28_x86_64"  # as numba's own
 TAG = f"cp{sys.version_info[0]}{sys.version_info[1]}"
-OURS = ("config", "launch", "resource", "teleop_core", "package.xml", "setup.cfg", "setup.py")
+CORE, OTHERS = "teleop_core", ("teleop_lab", "teleop_drill")
 COMPILE = "import sys; from teleop_core.cli import main; sys.exit(main(['compile', '--all']))"
 RUN = """
 import hashlib
@@ -37,12 +37,14 @@ print(compiled_count(), sums.hexdigest())
 
 
 def main() -> None:
-    """Build both wheels from a copy of the sources."""
+    """Build all wheels from a copy of the sources."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path, help="folder of the wheels")
     out = parser.parse_args().out
     with tempfile.TemporaryDirectory() as folder:
-        tree = copied(Path(folder) / "tree")
+        for package in OTHERS:
+            build(copied(package, Path(folder) / package), out)
+        tree = copied(CORE, Path(folder) / CORE)
         build(tree, out)
         for tier in TIERS:
             compile_kernels(tree, tier)
@@ -50,17 +52,10 @@ def main() -> None:
         build(tree, out, f"--plat-name={PLATFORM}", f"--python-tag={TAG}")
 
 
-def copied(tree: Path) -> Path:
-    """Sources, and nothing that was made of them."""
-    skipped = shutil.ignore_patterns("__pycache__", FOLDER.name)
-    tree.mkdir()
-    for name in OURS:
-        source = HERE / name
-        if source.is_dir():
-            shutil.copytree(source, tree / name, ignore=skipped)
-        else:
-            shutil.copy(source, tree / name)
-    return tree
+def copied(package: str, tree: Path) -> Path:
+    """Sources of a distribution, and nothing that was made of them."""
+    made = ("__pycache__", "*.egg-info", "build", FOLDER.name)
+    return Path(shutil.copytree(HERE / package, tree, ignore=shutil.ignore_patterns(*made)))
 
 
 def build(tree: Path, out: Path, *options: str) -> None:
@@ -82,7 +77,7 @@ def compile_kernels(tree: Path, tier: str, script: str = COMPILE) -> None:
         script: Python source of what needs the kernels.
     """
     print(f"{tier}: {run(tree, tier, script).strip()}", flush=True)
-    package = tree / "teleop_core"
+    package = tree / CORE
     for file in package.rglob("__pycache__/*.nb?"):
         inside = file.parents[1].relative_to(package)
         place = package / "kernels" / FOLDER.name / tier / inside
