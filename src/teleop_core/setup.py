@@ -6,6 +6,7 @@ from setuptools import find_packages, setup
 
 VERSION = "0.6.0"  # released together with teleop_lab and teleop_drill
 NODES = (
+    "operator",
     "haptic_master",
     "motion_scaling",
     "inverse_kinematics",

@@ -11,7 +11,7 @@ The command line is a thin layer on this module.
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, Union
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from teleop_core.controllers import CONTROLLERS, Controller
 from teleop_core.errors import ParameterError, TeleopError
 from teleop_core.fixtures import FIXTURES, Fixture
 from teleop_core.geometry import Array
+from teleop_core.graph import DEVICE, HAND
 from teleop_core.operators import OPERATORS, Motion, Operator, following
 from teleop_core.plants import PLANTS, Plant
 from teleop_core.recording import Recording, open_recording
@@ -211,6 +212,10 @@ def run(
     return _kept(session, made, run_blocks(session, ticks), ticks, out, progress)
 
 
+_BEGINS = {"device": DEVICE, "hand": HAND}
+"""Where a replay may begin, with the stage whose output is taken from the recording."""
+
+
 def replay(
     recording: Recording | Path | str,
     *,
@@ -219,11 +224,13 @@ def replay(
     files: Iterable[Path | str] = (),
     settings: Mapping[str, Setting] | None = None,
     texts: Iterable[str] = (),
+    begin: Literal["device", "hand"] = "device",
     **parameters: Setting,
 ) -> Recording:
     """Run the recorded masters of a session through the graph again, in virtual time.
 
-    Without changes a recording of virtual time gives the same slave motion, bit for bit.
+    Without changes a recording of virtual time gives the same slave motion, bit for bit, wherever
+    it begins.
 
     Args:
         recording: What was recorded; its own configuration is the start.
@@ -232,6 +239,8 @@ def replay(
         files: Parameter files over its configuration.
         settings: Parameters over the files, as in :func:`configuration`.
         texts: As there.
+        begin: What is taken from the recording: what the device measured, or where the hand wanted
+            it, which forces of the new session then act on.
         **parameters: As in :func:`configuration`.
 
     Raises:
@@ -246,7 +255,9 @@ def replay(
     layers = [layer, *(load_file(Path(file)) for file in files), *changes]
     layers += [parse_setting(text) for text in texts]
     made = Configuration.from_layers(layers, scenario)
-    session = VirtualTime(made, is_replay=True)
+    if begin not in _BEGINS:
+        raise ParameterError("begin", begin, " or ".join(_BEGINS))
+    session = VirtualTime(made, played=_BEGINS[begin])
     blocks, ticks = replayed_blocks(session, bag)
     return _kept(session, made, blocks, ticks, out, progress)
 

@@ -145,7 +145,7 @@ def _core() -> tuple[argparse.ArgumentParser, Any]:
 def _add_sim(commands: Any) -> None:
     sim = command(commands, "sim", _sim, "run and record a session in virtual time")
     session_arguments(sim)
-    sim.add_argument("--seed", type=int, help="seed of everything random (haptic_master.seed)")
+    sim.add_argument("--seed", type=int, help="seed of everything random")
 
 
 def _add_live(commands: Any) -> None:
@@ -160,6 +160,11 @@ def _add_replay(commands: Any) -> None:
     text = "run a recorded master through the graph again, in virtual time"
     again = command(commands, "replay", _replay, text)
     again.add_argument("bag", type=Path, help="recording whose master is replayed")
+    again.add_argument(
+        "--from", dest="begin", choices=("device", "hand"), default="device",
+        help="play what the device measured (default), or where the hand wanted it: the device is "
+        "simulated again, and feels the forces of the new session",
+    )  # fmt: skip
     out_argument(again)
     setting_arguments(again)
 
@@ -233,7 +238,7 @@ def _replay(arguments: argparse.Namespace) -> int:
     with shown_progress("replaying") as progress:
         api.replay(
             arguments.bag, out=arguments.out, progress=progress,
-            files=arguments.config, texts=arguments.settings,
+            files=arguments.config, texts=arguments.settings, begin=arguments.begin,
         )  # fmt: skip
     print(done(arguments.out, f"{progress.seconds:g} s replayed"))
     return 0

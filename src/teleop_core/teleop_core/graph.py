@@ -12,10 +12,24 @@ from teleop_core.errors import ParameterError, PartError, UnknownNameError
 from teleop_core.stage import STAGES, Stage
 from teleop_core.topics import Kind, Topic
 
-__all__ = ["BUILT_IN", "RECORDER_NAME", "Delay", "Graph", "Link", "Member", "build_graph"]
+__all__ = [
+    "BUILT_IN",
+    "DEVICE",
+    "HAND",
+    "RECORDER_NAME",
+    "Delay",
+    "Graph",
+    "Link",
+    "Member",
+    "build_graph",
+]
 
-BUILT_IN = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim")
+BUILT_IN = (
+    "operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim"
+)  # fmt: skip
 """Names of the stages that every arm has."""
+HAND, DEVICE = BUILT_IN[:2]
+"""Stages with whose recorded output a replay may begin."""
 RECORDER_NAME = "recorder"
 
 
@@ -249,10 +263,14 @@ class Graph:
             ordered.append(ready)
         return tuple(ordered)
 
-    @property
-    def masters(self) -> tuple[Member, ...]:
-        """The stage of each arm at which a sample begins its way; replay plays it."""
-        return tuple(m for m in self.members if m.stage.name == BUILT_IN[0])
+    def played(self, begin: str) -> tuple[Member, ...]:
+        """Stages whose topics a replay takes from a recording, arm by arm.
+
+        Args:
+            begin: The last of them: :data:`HAND`, :data:`DEVICE`, or empty for none.
+        """
+        names = BUILT_IN[: BUILT_IN.index(begin) + 1] if begin else ()
+        return tuple(m for m in self.members if m.stage.name in names)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -280,7 +298,7 @@ class Graph:
         It begins at the first stage of the order and follows the stamps: each next stage answers
         the topic before it under its stamp.
         """
-        first = next(member for member in self.masters if member.arm == arm)
+        first = Member(next(stage for stage in self.stages if stage.name == DEVICE), arm)
         found = [(first.stage.name, first.writes[0])]
         while (nxt := self._answer(found[-1][1], {name for name, _ in found})) is not None:
             found.append(nxt)

@@ -351,6 +351,7 @@ STAGES: Registry[Stage] = Registry(
     "stage",
     "stages",
     {
+        "operator": "teleop_core.master.operator:OPERATOR",
         "haptic_master": "teleop_core.master.haptic_master:HAPTIC_MASTER",
         "motion_scaling": "teleop_core.mapping.motion_scaling:MOTION_SCALING",
         "inverse_kinematics": "teleop_core.mapping.inverse_kinematics:INVERSE_KINEMATICS",

@@ -271,14 +271,25 @@ TELEOP_STATE = Topic(
     ),
 )  # fmt: skip
 HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
-"""Where a person wants the stylus, who is the hand of ``operator=remote``; silence lets go of it.
-
-As ``hand/buttons`` it comes from outside: no stage writes it, and it is not recorded."""
-HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT)
+"""Where the operator wants the stylus; silence lets go of it."""
+HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base")
+"""Which buttons of the stylus the operator presses."""
+HAND_TREMOR = Topic(
+    "hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z")
+)  # fmt: skip
+"""By how much the tip is off [m], whatever the device's friction swallows of the hand's motion."""
+OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
+"""Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand
+there. Silence lets go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is
+not recorded."""
+OPERATOR_BUTTONS = Topic(
+    "operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT
+)  # fmt: skip
 """Buttons that this person presses and releases: each message counts, so it is sent reliably."""
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (
+    HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR,
     MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT,
     MASTER_SERVO_CF,
     SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_REACH, SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP,

@@ -9,7 +9,7 @@ from teleop_core.errors import SessionError
 from teleop_core.topics import STATE_COMMANDS
 
 if TYPE_CHECKING:
-    from teleop_core.nodes.operator import ArmState, Operator
+    from teleop_core.nodes.remote_control import ArmState, RemoteControl
 
 _STOP = """\
 stops all arms of all `teleop live` sessions of this machine, or of one ROS domain:
@@ -60,12 +60,12 @@ def _domains(arguments: argparse.Namespace) -> tuple[int, ...]:
     return found
 
 
-def _operators(arguments: argparse.Namespace) -> "list[Operator]":
+def _operators(arguments: argparse.Namespace) -> "list[RemoteControl]":
     from teleop_core.nodes.children import environment
 
-    module = ros_module("operator")
+    module = ros_module("remote_control")
     environment()
-    return [module.Operator(domain) for domain in _domains(arguments)]
+    return [module.RemoteControl(domain) for domain in _domains(arguments)]
 
 
 def _stop(arguments: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from teleop_core.geometry import Array
 from teleop_core.graph import Graph, build_graph
 from teleop_core.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
-from teleop_core.master.haptic_master import HAPTIC_MASTER
+from teleop_core.master.operator import OPERATOR
 from teleop_core.parameters import build
 from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer
 from teleop_core.slave.slave import SLAVE
@@ -31,7 +31,7 @@ class Origin:
     Attributes:
         graph: What ran; the built-in stages where nothing is known or a stage is not installed.
         axes: Rotation (3, 3) from the master's base to the slave's axes.
-        operator: What is stored of ``haptic_master.operator``, by names below it.
+        operator: What is stored of the stage ``operator``, by names.
         interpolation: How the slave goes from command to command; None if it is not told.
         plant: What the simulated slave was; "ideal" of versions that knew no other, None if no
             simulator is told of.
@@ -171,5 +171,4 @@ def _axes(layer: Layer, arm: str) -> Array:
 
 def _operator(layer: Layer, arm: str) -> Mapping[str, object]:
     """What is said of the operator."""
-    prefix, said = "operator.", _said(layer, HAPTIC_MASTER.name, arm)
-    return {k.removeprefix(prefix): v for k, v in said.items() if k.startswith(prefix)}
+    return _said(layer, OPERATOR.name, arm)

@@ -217,9 +217,8 @@ def _in_axes_of(rest: Array, turns: Array) -> Array:
 
 def _tell_stops(path: Path, samples: Samples, setting: Setting) -> None:
     """Tell a motion that leaves the device's workspace, and how it would not."""
-    if setting.device is None:
-        return
-    size, start = np.array(setting.device.workspace), np.array(setting.device.start)
+    device = setting.common.device
+    size, start = np.array(device.workspace), np.array(device.start)
     places = samples.moves + np.array(setting.common.center) + start  # from the middle
     beyond = np.abs(places) - 0.5 * size
     is_beyond = (beyond > 0.0).any(axis=1)

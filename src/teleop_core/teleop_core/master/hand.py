@@ -1,4 +1,4 @@
-"""Hand: the operator as a mass on a spring and damper that wants to follow a path, with tremor."""
+"""Hand: the operator as a mass on a spring and damper that wants to follow a path."""
 
 import math
 from dataclasses import dataclass
@@ -32,25 +32,6 @@ class HandParameters:
         source="assumed: 0.8 of critical with the masses and the stiffness here; fingertips have "
         "some 5 N·s/m (Hajian and Howe 1997), a firm grip more",
     )  # fmt: skip
-    tremor_amplitude: float = parameter(
-        0.1e-3, unit="m", lower=0.0, upper=5e-3, doc="amplitude of the wanted tremor on each axis",
-        source="assumed: within the 50 to 200 µm of microsurgery; friction swallows it at rest",
-    )  # fmt: skip
-    tremor_frequency: float = parameter(
-        10.0, unit="Hz", lower=8.0, upper=12.0, doc="middle of the tremor's band, which is ±2 Hz",
-        source="published: physiological tremor has 8 to 12 Hz (Elble and Koller 1990)",
-    )  # fmt: skip
-
-
-@inner
-def tremble(p: Any, s: Any, noise: Array, tremor: Array, dt: float) -> None:
-    """Write the wanted tremor (3,) [m]: one line per axis whose frequency wanders in its band."""
-    for i in range(3):
-        # Ornstein-Uhlenbeck process of unit variance and half a second of memory.
-        s.wander[i] += -s.wander[i] * (dt / 0.5) + noise[i] * math.sqrt(2.0 * dt / 0.5)
-        width = min(2.0, p.frequency - 8.0, 12.0 - p.frequency)
-        s.phase[i] += 2.0 * math.pi * dt * (p.frequency + width * math.tanh(s.wander[i]))
-        tremor[i] = p.tremor * math.sin(s.phase[i])
 
 
 @inner

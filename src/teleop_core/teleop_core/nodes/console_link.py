@@ -34,9 +34,9 @@ from teleop_core.operation import operation_text
 from teleop_core.robots import load_robot_set
 from teleop_core.topics import (
     DIAGNOSTICS,
-    HAND_BUTTONS,
-    HAND_SERVO_CP,
     OPERATION,
+    OPERATOR_BUTTONS,
+    OPERATOR_SERVO_CP,
     SLAVE_OPERATION,
     TELEOP_STATE,
     Topic,
@@ -344,7 +344,7 @@ class _Hand:
     """Publishers of a person's hand on one arm."""
 
     def __init__(self, node: Node, arm: str) -> None:
-        self._layout, self._pressed = layout(HAND_SERVO_CP, ()), layout(HAND_BUTTONS, ())
+        self._layout, self._pressed = layout(OPERATOR_SERVO_CP, ()), layout(OPERATOR_BUTTONS, ())
         self._lock, self._pressing = threading.Lock(), threading.Lock()
         self._publishers = [
             node.create_publisher(
@@ -352,7 +352,7 @@ class _Hand:
                 f"/{topic.of_arm(arm).name}",
                 QoSProfile(depth=10),
             )
-            for topic in (HAND_SERVO_CP, HAND_BUTTONS)
+            for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS)
         ]
 
     def hold(self, pose: Array) -> None:

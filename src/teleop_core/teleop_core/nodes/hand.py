@@ -7,14 +7,14 @@ import numpy as np
 
 from teleop_core.nodes.streams import Input
 from teleop_core.operators.remote import BUTTONS, RemoteHand
-from teleop_core.topics import HAND_BUTTONS, HAND_SERVO_CP, Topic
+from teleop_core.topics import OPERATOR_BUTTONS, OPERATOR_SERVO_CP, Topic
 
 _SELDOM = 4
 """Buttons are looked at in every so many ticks."""
 
 
 class HandInput:
-    """``hand/servo_cp`` and ``hand/buttons``, looked at in every tick: 2 µs, and no executor.
+    """``operator/servo_cp`` and ``operator/buttons``, looked at in every tick: 2 µs, no executor.
 
     They stand among the ports of the node, which reports, forgets and closes them.
 
@@ -27,8 +27,8 @@ class HandInput:
     def __init__(self, node: Any, hand: RemoteHand, *, has_poses: bool) -> None:
         self._node, self._hand, self._ticks = node, hand, 0
         self._pose, self._pressed = np.zeros(7), np.zeros(len(BUTTONS))
-        self._poses = self._open(HAND_SERVO_CP, self._pose) if has_poses else None
-        self._buttons = self._open(HAND_BUTTONS, self._pressed)
+        self._poses = self._open(OPERATOR_SERVO_CP, self._pose) if has_poses else None
+        self._buttons = self._open(OPERATOR_BUTTONS, self._pressed)
 
     def _open(self, topic: Topic, target: Any) -> Input:
         name, delay = self._node.options.feeds(topic.name)[0]
@@ -54,7 +54,7 @@ class HandInput:
         """A stylus that nobody holds."""
         if self._poses is None or self._hand.is_held:
             return []
-        return [f"waits for {HAND_SERVO_CP.name}: nobody holds the stylus"]
+        return [f"waits for {OPERATOR_SERVO_CP.name}: nobody holds the stylus"]
 
     def values(self) -> dict[str, str]:
         """Whether somebody holds the stylus, and who sends the poses."""

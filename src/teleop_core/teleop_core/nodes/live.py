@@ -11,13 +11,13 @@ import yaml
 from rich.console import Console
 
 from teleop_core.errors import RecordingError, SessionError
-from teleop_core.graph import RECORDER_NAME, Graph
+from teleop_core.graph import HAND, RECORDER_NAME, Graph
 from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.keys import Keys
 from teleop_core.nodes.leftovers import remove_leftovers
 from teleop_core.nodes.observer import WARNING, Observer, Status
-from teleop_core.nodes.operator import Operator
+from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.session.configuration import Configuration
@@ -194,8 +194,8 @@ class _Session:
 
     def _await_operator(self) -> None:
         """Wait until the hand moves; it does after a while even if nothing follows it."""
-        masters = [member.name for member in self._graph.masters]
-        while not all(self._observer.statuses[m].number("has_begun") for m in masters):
+        operators = [m.name for m in self._graph.members if m.stage.name == HAND]
+        while not all(self._observer.statuses[m].number("has_begun") for m in operators):
             self._observer.listen(0.1)
             self._check()
 
@@ -221,7 +221,7 @@ class _Session:
                 continue
             self._observer.press(is_pressed=False)
             try:
-                with Operator(int(self._env["ROS_DOMAIN_ID"])) as operator:
+                with RemoteControl(int(self._env["ROS_DOMAIN_ID"])) as operator:
                     for line in operator.go_on():
                         self.say(line)
             except SessionError as error:

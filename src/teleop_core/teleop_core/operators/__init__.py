@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, PartError
+from teleop_core.errors import PartError
 from teleop_core.geometry import Array
 from teleop_core.parameters import NoParameters
 from teleop_core.registry import Registry
@@ -19,7 +19,7 @@ from teleop_core.registry import Registry
 if TYPE_CHECKING:
     from teleop_core.devices import Device
 
-__all__ = ["OPERATORS", "Motion", "Operator", "Setting", "following", "register_operator"]
+__all__ = ["OPERATORS", "Motion", "Operator", "Seen", "Setting", "following", "register_operator"]
 
 Motion = Callable[[Array], Array]
 """Times (N,) since the start [s] to rows (N, 3), (N, 6), (N, 9) or (N, 12).
@@ -30,20 +30,40 @@ off whatever the device's friction is. What is left out is zero.
 """
 
 
+class Seen(NamedTuple):
+    """What an operator sees and feels, as it was at the end of the last tick.
+
+    Views of the signals: read them when the motion is asked for. Who answers to them is asked as
+    late as possible: ``ahead=1``. What is told of the slave comes as late as a declared delay says:
+    ``delays=["slave/measured_cp@operator=0.3"]``.
+
+    Attributes:
+        slave: Pose (7,) of the slave's tip in its base; zero before it is told.
+        stylus: Pose (7,) of the stylus in the master's base.
+        force: Force and torque (6,) that the device gives the hand.
+        state: Numbers of ``teleop/state``, as :data:`~teleop_core.topics.TELEOP_STATE` names them.
+    """
+
+    slave: Array
+    stylus: Array
+    force: Array
+    state: Array
+
+
 class Setting(NamedTuple):
     """What an operator is made with beside parameters of its own.
 
     Attributes:
-        common: The whole group ``haptic_master.operator``.
+        common: The whole group ``operator``.
         phases: Random phases (6, 4) [rad] of the session's seed, the same for every operator.
         seed: Seed of the session, for more random numbers.
-        device: The group ``haptic_master.device``; None if it is not known.
+        seen: What the operator sees and feels; None where only the length of a motion is asked for.
     """
 
     common: Any
     phases: Array
     seed: int
-    device: Any = None
+    seen: Seen | None = None
 
 
 @dataclass(frozen=True)
@@ -55,8 +75,8 @@ class Operator:
         make: ``make(parameters, setting)`` gives the :data:`Motion` of one session.
         parameters: Its parameter group, beside those that all operators share.
         ahead: Ticks for which it can be asked at once: 1 for one who answers to what happens.
-        trembles: Whether its motion has all its tremor, so that ``hand.tremor_amplitude`` is not
-            added.
+        trembles: Whether its motion has all its tremor, so that ``operator.tremor_amplitude`` is
+            not added.
         approaches: Whether it begins with a smooth move to ``operator.center`` that takes
             ``operator.approach_time``.
         length: ``length(parameters, setting)`` says how long its motion lasts [s], which a session
@@ -155,21 +175,3 @@ OPERATORS: Registry[Operator] = Registry(
 def register_operator(name: str, operator: Operator | Motion, *, replace: bool = False) -> Operator:
     """Add an operator, or a motion alone, for the rest of the program; see :meth:`Registry.add`."""
     return OPERATORS.add(name, operator, replace=replace)
-
-
-def insist_on_virtual(stage: str, group: object) -> None:
-    """Make sure that a stage's operator, if it has one, can move the hand in virtual time.
-
-    Args:
-        stage: Name of the stage.
-        group: Its parameters.
-
-    Raises:
-        ParameterError: A person must move its device; the text names who works.
-    """
-    kind = getattr(getattr(getattr(group, "operator", None), "kind", None), "kind", None)
-    if kind is None or OPERATORS.find(kind).opens is None:
-        return
-    others = ", ".join(name for name in OPERATORS.names() if OPERATORS.find(name).opens is None)
-    text = f"one of {others} in virtual time; a person moves a {kind} in teleop live"
-    raise ParameterError(f"{stage}.operator.kind", kind, text)

@@ -1,17 +1,67 @@
 """Operator parameters: which operator moves the hand, and what the smooth ones share."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 from teleop_core.errors import ParameterError
 from teleop_core.operators import OPERATORS
 from teleop_core.parameters import Choice, choice, parameter
 
+PRESS_TIME = 0.1
+"""How long the operator presses the fixture or the mode button [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ButtonParameters:
+    """When the operator uses the buttons [s]; each press of fixture or mode lasts 0.1 s."""
+
+    clutch: tuple[float, ...] = parameter(
+        (), unit="s", lower=0.0, fixed=True, doc="press, release, press, release, …"
+    )
+    fixture: tuple[float, ...] = parameter(
+        (), unit="s", lower=0.0, fixed=True, doc="presses: each toggles the box"
+    )
+    mode: tuple[float, ...] = parameter(
+        (), unit="s", lower=0.0, fixed=True, doc="presses: each toggles coarse and fine"
+    )
+
+    def __post_init__(self) -> None:
+        if len(self.clutch) % 2 or list(self.clutch) != sorted(self.clutch):
+            raise ParameterError(
+                "operator.buttons.clutch", self.clutch, "rising pairs of press, release"
+            )
+        for name, presses in (("fixture", self.fixture), ("mode", self.mode)):
+            if any(b - a < PRESS_TIME + 0.01 for a, b in pairwise(sorted(presses))):
+                raise ParameterError(f"operator.buttons.{name}", presses, "at least 0.11 s apart")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoomParameters:
+    """What the operator knows of the device: how far the stylus can go.
+
+    In a session it is that of the haptic master where nothing else is said.
+    """
+
+    workspace: tuple[float, ...] = parameter(
+        (0.16, 0.12, 0.07), unit="m", lower=0.01, upper=1.0, length=3, fixed=True,
+        doc="width, height, depth within which the tip can move; as haptic_master's",
+    )  # fmt: skip
+    start: tuple[float, ...] = parameter(
+        (0.0, 0.0, -0.03), unit="m", lower=-0.5, upper=0.5, length=3, fixed=True,
+        doc="place of the inkwell relative to the middle of it; as haptic_master's",
+    )  # fmt: skip
+
 
 @dataclass(frozen=True, kw_only=True)
 class OperatorParameters:
-    """What the hand wants to do, relative to where the stylus starts, in the master's base."""
+    """Who moves the hand; motions are relative to where the stylus starts, in its base."""
 
     kind: Choice = choice(OPERATORS, "random", fixed=True, doc="who moves the hand, and how")
+    seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
+    patience: float = parameter(
+        10.0, unit="s", lower=0.0, upper=3600.0, fixed=True,
+        doc="it begins when teleop/state says that the slave follows, or after this",
+    )  # fmt: skip
     center: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0), unit="m", lower=-0.3, upper=0.3, length=3, fixed=True,
         doc="centre of the motion, first point of a line",
@@ -45,8 +95,36 @@ class OperatorParameters:
         doc="bag, file: over longer gaps between samples the hand waits, but not below 5 periods",
     )  # fmt: skip
 
+    tremor_amplitude: float = parameter(
+        0.1e-3, unit="m", lower=0.0, upper=5e-3, doc="amplitude of the wanted tremor on each axis",
+        source="assumed: within the 50 to 200 µm of microsurgery; friction swallows it at rest",
+    )  # fmt: skip
+    tremor_frequency: float = parameter(
+        10.0, unit="Hz", lower=8.0, upper=12.0, doc="middle of the tremor's band, which is ±2 Hz",
+        source="published: physiological tremor has 8 to 12 Hz (Elble and Koller 1990)",
+    )  # fmt: skip
+    buttons: ButtonParameters = field(default_factory=ButtonParameters)
+    device: RoomParameters = field(default_factory=RoomParameters)
+
     def __post_init__(self) -> None:
         if self.kind.kind == "points" and (not self.points or len(self.points) % 3):
             raise ParameterError("operator.points", self.points, "x, y, z of at least one point")
         if self.kind.kind == "bag" and not self.bag:
             raise ParameterError("operator.bag", self.bag, "a recording, for operator.kind bag")
+
+
+def insist_on_virtual(stage: str, group: object) -> None:
+    """Make sure that a stage's operator, if it is one, can move the hand in virtual time.
+
+    Args:
+        stage: Name of the stage.
+        group: Its parameters.
+
+    Raises:
+        ParameterError: A person must move its device; the text names who works.
+    """
+    if not isinstance(group, OperatorParameters) or OPERATORS.find(group.kind.kind).opens is None:
+        return
+    others = ", ".join(name for name in OPERATORS.names() if OPERATORS.find(name).opens is None)
+    text = f"one of {others} in virtual time; a person moves a {group.kind.kind} in teleop live"
+    raise ParameterError(f"{stage}.kind", group.kind.kind, text)

@@ -313,16 +313,14 @@ def _row(name: str, pose: object) -> Array:
 def hand_of(setting: Setting) -> RemoteHand:
     """Hand for a session, within the room of its device; its parameters are ``operator.remote``."""
     p = cast(RemoteParameters, setting.common.kind.groups["remote"])
-    start, device = rest_pose(), setting.device
-    if device is None:
-        return RemoteHand(p, start)
+    start, device = rest_pose(), setting.common.device
     middle, half = start[:3] - np.array(device.start), 0.5 * np.array(device.workspace)
     low, high = np.minimum(middle - half, start[:3]), np.maximum(middle + half, start[:3])
     return RemoteHand(p, start, (low, high))
 
 
 def make_remote(_: object, setting: Setting) -> Motion:
-    """A hand, which :attr:`teleop_core.master.haptic_master.HapticMaster.hand` gives to feed it."""
+    """A hand, which :attr:`teleop_core.master.operator.RunningOperator.hand` gives to feed it."""
     return hand_of(setting)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.graph import RECORDER_NAME, Graph, Member, build_graph
+from teleop_core.graph import DEVICE, HAND, RECORDER_NAME, Graph, Member, build_graph
 from teleop_core.parameters import Value, build, specs, values_of
 from teleop_core.session.layers import (
     SESSION,
@@ -95,11 +95,22 @@ def _ordered(graph: Graph) -> list[Member]:
     return [Member(stage, arm) for arm in graph.namespaces for stage in graph.stages]
 
 
+_SHARED = ("seed", "device.workspace", "device.start")
+"""What operator and haptic master both know: said of one alone, it holds for both."""
+
+
 def _values_for(member: Member, merged: Layer, graph: Graph) -> dict[str, object]:
     """What is said of the stage, then of the stage of this arm."""
     named = dict(zip(graph.namespaces, graph.arms, strict=True))[member.arm]
-    own = merged.get(f"{named}/{member.stage.name}", {}) if named else {}
-    return merged.get(member.stage.name, {}) | own
+
+    def said(stage: str) -> dict[str, object]:
+        return merged.get(stage, {}) | (merged.get(f"{named}/{stage}", {}) if named else {})
+
+    own = said(member.stage.name)
+    if member.stage.name not in {HAND, DEVICE}:
+        return own
+    other = said(DEVICE if member.stage.name == HAND else HAND)
+    return {name: other[name] for name in _SHARED if name in other} | own
 
 
 def _check_names(merged: Layer, graph: Graph) -> None:

@@ -60,7 +60,11 @@ class SessionParameters:
 SESSION = "teleop"
 """Name of the group of the session as a whole."""
 RENAMED = {
-    "haptic_master.path.": "haptic_master.operator.",
+    "haptic_master.path.": "operator.",
+    "haptic_master.operator.": "operator.",
+    "haptic_master.buttons.": "operator.buttons.",
+    "haptic_master.patience": "operator.patience",
+    "haptic_master.hand.tremor_": "operator.tremor_",
     "motion_scaling.fixture.size": "motion_scaling.fixture.box.size",
     "slave_sim.pid.": "slave_sim.controller.pid.",
     **{

@@ -34,13 +34,12 @@ def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configur
 
 
 def _length(made: Configuration, name: str) -> float | None:
-    """How long the motion of a stage's operator lasts [s]; None without one, or without end."""
-    group = made.groups[name]
-    operator = getattr(group, "operator", None)
+    """How long the motion of an operator lasts [s]; None of other stages, or without end."""
+    operator = made.groups[name]
     if not isinstance(operator, OperatorParameters):
         return None
     part = OPERATORS.find(operator.kind.kind)
     if part.length is None:
         return None
-    setting = Setting(operator, np.zeros(PHASES), group.seed)
+    setting = Setting(operator, np.zeros(PHASES), operator.seed)
     return part.length(operator.kind.parameters, setting)

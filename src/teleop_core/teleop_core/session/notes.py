@@ -9,7 +9,7 @@ from teleop_core.session.configuration import Configuration
 from teleop_core.signals import DT
 from teleop_core.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
 
-_MASTER, _MAPPING = BUILT_IN[:2]
+_MASTER, _MAPPING = BUILT_IN[1:3]
 
 
 def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:

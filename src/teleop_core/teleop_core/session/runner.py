@@ -13,7 +13,7 @@ from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 from teleop_core.geometry import Array
-from teleop_core.graph import RECORDER_NAME, Member
+from teleop_core.graph import DEVICE, RECORDER_NAME, Member
 from teleop_core.operation import operation_level, operation_text
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
@@ -61,8 +61,11 @@ def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
         yield session.run(min(BLOCK, ticks - done))
 
 
-def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress = _silent) -> int:
-    """Run the recorded masters through the graph again, in virtual time, and record it.
+def replay(
+    bag: Bag, configuration: Configuration, out: Path, progress: Progress = _silent,
+    begin: str = DEVICE,
+) -> int:  # fmt: skip
+    """Run recorded masters, or hands, through the graph again, in virtual time, and record it.
 
     Ticks are 1 ms apart, from the first to the last recorded sample; each sample is answered once,
     at the first tick that is not before it. For a recording of virtual time every tick has its own
@@ -71,10 +74,11 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
     ready.
 
     Args:
-        bag: Recording with master/measured_cp of every arm.
+        bag: Recording with master/measured_cp of every arm, or hand/servo_cp.
         configuration: What the samples run through.
         out: Directory of the new recording, made here.
         progress: As in :func:`simulate`.
+        begin: Stage whose recorded output is played: ``haptic_master``, or ``operator``, the hand.
 
     Returns:
         Number of ticks.
@@ -82,7 +86,7 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
     Raises:
         RecordingError: The bag lacks a topic, or the directory is as in :func:`simulate`.
     """
-    session = VirtualTime(configuration, is_replay=True)
+    session = VirtualTime(configuration, played=begin)
     samples, ticks = replayed_blocks(session, bag)
     return record_blocks(session, configuration, out, samples, ticks, progress)
 
@@ -90,7 +94,7 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
 def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]:
     """Rows of a replay, a block at a time, and the number of ticks; raises as :func:`replay`."""
     played = session.played_topics
-    needed = [t for t in played if t.kind is Kind.POSE]
+    needed = session.needed_topics
     bag.require(needed)
     recorded = [topic for topic in played if topic.name in bag.topics]
     series = {name: in_order(found) for name, found in bag.read_many(recorded).items()}

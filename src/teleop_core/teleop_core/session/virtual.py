@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from teleop_core.errors import PartError
 from teleop_core.graph import BUILT_IN
 from teleop_core.kernels import records
-from teleop_core.operators import insist_on_virtual
+from teleop_core.operators.parameters import insist_on_virtual
 from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration
 from teleop_core.signals import TICK_NS, assign
 from teleop_core.stage import Runner, joints_of
-from teleop_core.topics import Topic
+from teleop_core.topics import Kind, Topic
 
 BLOCK = 1000
 """Ticks that are made at once, at most."""
@@ -28,7 +28,8 @@ class VirtualTime:
     Args:
         configuration: What runs.
         tick_ns: Length of a tick [ns].
-        is_replay: Whether the masters' topics come from recorded samples; see :meth:`replay`.
+        played: Stage up to which topics come from recorded samples, ``operator`` or
+            ``haptic_master``; see :meth:`replay`. Empty: none.
 
     Attributes:
         graph: What runs.
@@ -38,11 +39,11 @@ class VirtualTime:
     """
 
     def __init__(
-        self, configuration: Configuration, tick_ns: int = TICK_NS, *, is_replay: bool = False
+        self, configuration: Configuration, tick_ns: int = TICK_NS, *, played: str = ""
     ) -> None:
-        self.graph, self._tick_ns = configuration.graph, tick_ns
+        self.graph, self._tick_ns, self._last_played = configuration.graph, tick_ns, played
         groups, dt = configuration.groups, tick_ns / 1e9
-        self._played = frozenset(m.name for m in self.graph.masters) if is_replay else frozenset()
+        self._played = frozenset(m.name for m in self.graph.played(played))
         for member in self.graph.members:
             if member.name not in self._played:
                 insist_on_virtual(member.name, groups[member.name])
@@ -89,6 +90,12 @@ class VirtualTime:
         return self._tick.source
 
     @property
+    def needed_topics(self) -> tuple[Topic, ...]:
+        """Those of :attr:`played_topics` without which there is nothing to replay."""
+        members = [m for m in self.graph.members if m.stage.name == self._last_played]
+        return tuple(t for member in members for t in member.writes if t.kind is Kind.POSE)
+
+    @property
     def played_topics(self) -> tuple[Topic, ...]:
         """Topics that :meth:`replay` takes from samples."""
         members = [m for m in self.graph.members if m.name in self._played]
@@ -131,7 +138,7 @@ class VirtualTime:
         self.now_ns = 0
 
     def replay(self, samples: NDArray[np.void]) -> NDArray[np.void]:
-        """Ticks with recorded samples in place of the simulated masters.
+        """Ticks with recorded samples in place of the simulated hands or masters.
 
         Args:
             samples: Rows (N,) of which ``now_ns``, steps of one tick, and the fields and stamps of

@@ -94,7 +94,7 @@ def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
     """How each hand does the task; one that sees aims again, by what it missed before."""
     from teleop_core.api import configuration
 
-    made = configuration(SCENARIO).group("haptic_master").operator
+    made = configuration(SCENARIO).group("operator")
     center, p, approach = np.array(made.center), made.kind.parameters, float(made.approach_time)
     first = [visits_of(s, p, center, approach) for s in bench.sessions(SCENARIO, settings)]
     if not seeing:

@@ -1,0 +1,197 @@
+"""Remote control: stops and commands the arms of a ROS domain, and tells how they are."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from teleop_core.bags.messages import read_reports
+from teleop_core.errors import SessionError
+from teleop_core.nodes.operation import StopButton
+from teleop_core.nodes.streams import Subscription
+from teleop_core.operation import State, operation_text
+from teleop_core.operation.states import AT_REST_ONLY
+from teleop_core.topics import OPERATION, SLAVE_OPERATION
+
+_PERIOD = 0.01
+"""A stop is said again this often until every arm has answered [s]."""
+
+
+@dataclass
+class ArmState:
+    """What an arm has said last.
+
+    Attributes:
+        values: Numbers of ``slave/operation`` by name; empty before the first report.
+        text: The same in words.
+        stopped_after: Time from the first stop message to the report that it is in force [s];
+            negative before.
+    """
+
+    values: dict[str, float] = field(default_factory=dict)
+    text: str = ""
+    stopped_after: float = -1.0
+
+
+class RemoteControl:
+    """Hand on the arms of one ROS domain, to be used with ``with``.
+
+    Args:
+        domain: ROS domain.
+        patience: Time that an arm has to be found, and to answer [s].
+
+    Attributes:
+        domain: ROS domain.
+        arms: State of every arm that was found, by its namespace.
+    """
+
+    def __init__(self, domain: int, patience: float = 3.0) -> None:
+        self.domain, self._patience = domain, patience
+        self.arms: dict[str, ArmState] = {}
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain)
+        self._node = Node(
+            "teleop_remote_control", context=self._context, use_global_arguments=False,
+            enable_rosout=False,
+        )  # fmt: skip
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._button = StopButton(self._node)
+        self._reports: dict[str, Subscription] = {}
+
+    def __enter__(self) -> "RemoteControl":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def look(self) -> dict[str, ArmState]:
+        """State of every arm, by its namespace, as soon as each has reported.
+
+        Raises:
+            SessionError: There is none on this domain.
+        """
+        self._until(
+            lambda: bool(self.arms) and all(arm.values for arm in self.arms.values()), must=False
+        )
+        if not self.arms:
+            raise SessionError(
+                f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its own, "
+                "--domain N names another"
+            )
+        return self.arms
+
+    def stop(self) -> dict[str, ArmState]:
+        """Press the emergency stop until every arm has said that it is in force and that it rests.
+
+        Raises:
+            SessionError: There is no arm, or one did not answer; the stop was sent nevertheless.
+        """
+        begin = time.monotonic()
+
+        def is_stopped() -> bool:
+            self._button.say(is_pressed=True)
+            for arm in self.arms.values():
+                if arm.values.get("is_stopped") and arm.stopped_after < 0.0:
+                    arm.stopped_after = time.monotonic() - begin
+            return bool(self.arms) and all(
+                arm.values.get("is_stopped") and arm.values["rest_time"] > 0.0
+                for arm in self.arms.values()
+            )
+
+        if not self._until(is_stopped, must=False):
+            missing = [
+                name or "the arm" for name, a in self.arms.items() if not a.stopped_after >= 0
+            ]
+            what = f"{', '.join(missing)} did not confirm" if missing else "no arm confirmed"
+            raise SessionError(f"{what} the stop on ROS domain {self.domain}")
+        return self.arms
+
+    def release(self) -> None:
+        """Say that the emergency stop is not pressed; what it stopped stays stopped."""
+        self.look()
+        self._until(lambda: self._button.listeners > 0, must=False)
+        self._button.say(is_pressed=False)
+        self.listen()
+
+    def go_on(self) -> list[str]:
+        """Release the stop, and reset and enable, or resume, every arm; what they answer.
+
+        An arm that was stopped before it was homed homes then.
+        """
+        self.release()
+        told = []
+        for arm, state in self.arms.items():
+            words = ["resume"] if state.values["state"] == State.PAUSED else ["reset", "enable"]
+            if not state.values["is_homed"] and "enable" in words:
+                words.append("home")
+            told += [self._command_at_rest(word, arm) for word in words]
+        return told
+
+    def _command_at_rest(self, name: str, arm: str) -> str:
+        """Send a command again until the arm has come to rest for it; what it answers."""
+        deadline = time.monotonic() + self._patience
+        while (answer := self.command(name, arm)[1]).endswith(AT_REST_ONLY):
+            if time.monotonic() > deadline:
+                break
+            self.listen()
+        return answer
+
+    def command(self, name: str, arm: str = "") -> tuple[bool, str]:
+        """Send a state command to an arm; whether it was taken, and the arm's answer.
+
+        Args:
+            name: One of :data:`~teleop_core.operation.states.COMMANDS`.
+            arm: Its namespace.
+
+        Raises:
+            SessionError: The arm does not answer.
+        """
+        service = f"/{arm}/slave/{name}" if arm else f"/slave/{name}"
+        client = self._node.create_client(Trigger, service)
+        self._until(client.service_is_ready, f"{service} on ROS domain {self.domain}")
+        future = client.call_async(Trigger.Request())
+        self._until(future.done, f"an answer of {service}")
+        answer: Any = future.result()
+        return answer.success, answer.message
+
+    def _until(self, condition: Callable[[], Any], what: str = "", *, must: bool = True) -> bool:
+        """Wait until something is so, as long as there is patience."""
+        deadline = time.monotonic() + self._patience
+        while not condition():
+            if time.monotonic() > deadline:
+                if must:
+                    raise SessionError(f"no {what}")
+                return False
+            self.listen()
+        return True
+
+    def listen(self) -> None:
+        """Take what has come; look for arms."""
+        for name, kinds in self._node.get_topic_names_and_types():
+            if name.endswith(f"/{SLAVE_OPERATION.name}") and name not in self._reports and kinds:
+                self._reports[name] = Subscription(self._node, SLAVE_OPERATION, name)
+                self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")] = ArmState()
+        for name, reports in self._reports.items():
+            arm = self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")]
+            while (taken := reports.take()) is not None:
+                _note(arm, taken[0])
+        self._executor.spin_once(timeout_sec=_PERIOD)
+
+
+def _note(arm: ArmState, data: bytes) -> None:
+    """Take a report of an arm; bytes that are none are passed over."""
+    try:
+        report = read_reports(data)[0]
+        values = {name: float(report.values[name]) for name in OPERATION}
+    except (ValueError, KeyError, IndexError):
+        return
+    arm.values = values
+    arm.text = operation_text(values, tuple(report.values.get("joints", "").split()))
