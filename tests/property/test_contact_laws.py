@@ -2,24 +2,24 @@
 
 import math
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from held_master import HeldMaster
 from teleop_core.evaluation.metrics.contact import TOUCH_J
 from teleop_core.mapping.motion_scaling import MotionScaling
 from teleop_core.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.mapping.walls import passive_stiffness
 from teleop_core.master.haptic_master import (
     REST_POSITION,
-    ButtonParameters,
     DeviceParameters,
     HandParameters,
-    HapticMaster,
     HapticMasterParameters,
 )
 from teleop_core.operators import register_operator
-from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.operators.parameters import ButtonParameters, OperatorParameters
 from teleop_core.parameters import build
 from teleop_core.signals import TICK_NS
 
@@ -34,12 +34,15 @@ def session(motion, seconds, hand=None, device=None, seed=1, delay=0, **fixture)
     The wall's force comes ``delay`` ticks late.
     """
     register_operator("leaning", motion, replace=True)
-    master = HapticMaster(
+    person = build(
+        OperatorParameters, {"kind": "leaning", "rotation": 0.0, "seed": seed, "patience": 0.0}
+    )
+    master = HeldMaster(
+        replace(person, buttons=ButtonParameters(fixture=(0.002,))),
         HapticMasterParameters(
-            seed=seed, patience=0.0, hand=HandParameters(**(hand or {})),
-            operator=build(OperatorParameters, {"kind": "leaning", "rotation": 0.0}),
-            device=DeviceParameters(**(device or {})), buttons=ButtonParameters(fixture=(0.002,)),
-        )
+            seed=seed, hand=HandParameters(**(hand or {})),
+            device=DeviceParameters(**(device or {})),
+        ),
     )  # fmt: skip
     values = {"box.size": (2.0 * HALF,) * 3, **fixture}
     scaling = MotionScaling(MotionScalingParameters(fixture=build(FixtureParameters, values)))

@@ -55,7 +55,9 @@ def test_bare_key_sets_every_stage_that_has_it():
     assert layer == {
         name: {"robot": "mma"} for name in ("inverse_kinematics", "slave", "slave_sim")
     }
-    assert parse_setting("seed=5") == {"haptic_master": {"seed": 5}, "slave_sim": {"seed": 5}}
+    assert parse_setting("seed=5") == {
+        name: {"seed": 5} for name in ("operator", "haptic_master", "slave_sim")
+    }
 
 
 @pytest.mark.parametrize(
@@ -66,10 +68,10 @@ def test_bare_key_sets_every_stage_that_has_it():
         (" duration = 3 ", "teleop", "duration", 3.0),
         ("hand.mass=0.2", "haptic_master", "hand.mass", 0.2),
         ("haptic_master.seed=5", "haptic_master", "seed", 5),
-        ("operator.kind=circle", "haptic_master", "operator.kind", "circle"),
-        ("operator.bag=17", "haptic_master", "operator.bag", "17"),
-        ("operator.center=[0, 0.01, 1e-3]", "haptic_master", "operator.center", (0.0, 0.01, 0.001)),
-        ("buttons.clutch=[]", "haptic_master", "buttons.clutch", ()),
+        ("operator.kind=circle", "operator", "kind", "circle"),
+        ("operator.bag=17", "operator", "bag", "17"),
+        ("operator.center=[0, 0.01, 1e-3]", "operator", "center", (0.0, 0.01, 0.001)),
+        ("buttons.clutch=[]", "operator", "buttons.clutch", ()),
         ("reference_filter.is_on=false", "slave", "reference_filter.is_on", False),
     ],
 )
@@ -117,9 +119,9 @@ def test_setting_whose_value_is_no_yaml_is_refused():
         ("duration=.nan", "teleop.duration"),
         ("duration=soon", "teleop.duration"),
         ("duration=", "teleop.duration"),
-        ("seed=1.5", "haptic_master.seed"),
-        ("operator.kind=square", "haptic_master.operator.kind"),
-        ("operator.center=[0, 0]", "haptic_master.operator.center"),
+        ("seed=1.5", "operator.seed"),
+        ("operator.kind=square", "operator.kind"),
+        ("operator.center=[0, 0]", "operator.center"),
         ("fine_gain=11", "motion_scaling.fine_gain"),
     ],
 )
@@ -153,9 +155,18 @@ def test_settings_win_over_files_and_files_over_the_scenario(tmp_path):
     first = file("first.yaml", seed=11, operator={"period": 5.0, "rotation": 0.1})
     second = file("second.yaml", operator={"period": 6.0})
     groups = configure("coarse_box", [first, second], ["operator.rotation=0.3"]).groups
-    master = groups["haptic_master"]
-    assert (master.seed, master.operator.period, master.operator.rotation) == (11, 6.0, 0.3)
-    assert master.operator.tilt == (-0.5, 0.0, 0.0)
+    operator = groups["operator"]
+    assert (operator.seed, operator.period, operator.rotation) == (11, 6.0, 0.3)
+    assert operator.tilt == (-0.5, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("stage", ["operator", "haptic_master"])
+def test_what_operator_and_device_both_know_is_said_of_one_of_them(stage):
+    room = (0.1, 0.1, 0.1)
+    told = [f"{stage}.seed=7", f"{stage}.device.workspace={list(room)}"]
+    groups = configure(settings=told).groups
+    for name in ("operator", "haptic_master"):
+        assert (groups[name].seed, groups[name].device.workspace) == (7, room), name
 
 
 @pytest.mark.parametrize(
@@ -207,8 +218,10 @@ def test_groups_of_a_configuration_cannot_be_changed_behind_its_back():
 @pytest.mark.parametrize(
     ("key", "value", "stage", "name", "meant"),
     [
-        ("path.kind", "circle", "haptic_master", "operator.kind", "circle"),
-        ("haptic_master.path.period", 5.0, "haptic_master", "operator.period", 5.0),
+        ("path.kind", "circle", "operator", "kind", "circle"),
+        ("haptic_master.path.period", 5.0, "operator", "period", 5.0),
+        ("haptic_master.operator.period", 5.0, "operator", "period", 5.0),
+        ("hand.tremor_amplitude", 0.0, "operator", "tremor_amplitude", 0.0),
         ("fixture.size", "[0.1, 0.2, 0.3]", "motion_scaling", "fixture.box.size", (0.1, 0.2, 0.3)),
         ("pid.kp", "[1.0]", "slave_sim", "controller.pid.kp", (1.0,)),
         ("slave_sim.pid.bandwidth", "[1.0]", "slave_sim", "controller.pid.bandwidth", (1.0,)),
@@ -235,7 +248,8 @@ def test_file_with_former_names_gives_the_same_configuration(tmp_path):
         "teleop": {"delays": ["slave/servo_jp@slave_sim=0.02"]},
     }
     now = {
-        "haptic_master": {"operator.kind": "circle", "operator.period": 5.0, "seed": 3},
+        "operator": {"kind": "circle", "period": 5.0},
+        "haptic_master": {"seed": 3},
         "motion_scaling": {"fixture": {"box": {"size": [0.1, 0.2, 0.3]}}},
         "inverse_kinematics": {"robot": "puma560"},
         "slave": {

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from held_master import HeldMaster
 from recipes import Recipe
 from teleop_core.api import configuration
 from teleop_core.evaluation.scoring import evaluate
@@ -14,7 +15,6 @@ from teleop_core.master.haptic_master import (
     REST_POSITION,
     DeviceParameters,
     HandParameters,
-    HapticMaster,
     HapticMasterParameters,
 )
 from teleop_core.operators.parameters import OperatorParameters
@@ -23,16 +23,15 @@ from teleop_core.session.notes import notes_of, passive_note, rendered_note
 from teleop_core.topics import MASTER_CONTACT
 
 COLUMN = {name: index for index, name in enumerate(MASTER_CONTACT.columns)}
-CALM = HandParameters(tremor_amplitude=0.0)
-STILL = build(OperatorParameters, {"kind": "hold", "rotation": 0.0})
+CALM = HandParameters()
+STILL = build(
+    OperatorParameters,
+    {"kind": "hold", "rotation": 0.0, "tremor_amplitude": 0.0, "patience": 0.0},
+)
 
 
 def master(hand=CALM, **device):
-    return HapticMaster(
-        HapticMasterParameters(
-            operator=STILL, hand=hand, device=DeviceParameters(**device), patience=0.0
-        )
-    )
+    return HeldMaster(STILL, HapticMasterParameters(hand=hand, device=DeviceParameters(**device)))
 
 
 def push(device, forces):

@@ -222,7 +222,7 @@ class Perfect:
     """A session whose tip is where the points are, or off by a known way."""
 
     def __init__(self, off_mm=(0.0, 0.0, 0.0)):
-        made = configure("points24").group("haptic_master").operator
+        made = configure("points24").group("operator")
         self.p, self.center = made.kind.parameters, np.array(made.center)
         self.approach = made.approach_time
         self.time = np.arange(0.0, 50.0, 1e-2)

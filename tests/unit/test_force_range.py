@@ -10,7 +10,7 @@ MS = 1_000_000
 
 def forces(asked, **parameters):
     """Forces (N, 3) that the device gives, for those asked in each tick (N, 3) [N]."""
-    stage = HapticMaster(HapticMasterParameters(patience=0.0, **parameters))
+    stage = HapticMaster(HapticMasterParameters(**parameters))
     given = []
     for tick, force in enumerate(asked, start=1):
         stage.signals["now_ns"] = tick * MS

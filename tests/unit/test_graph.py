@@ -46,7 +46,7 @@ def feeds(graph, reader, port):
 # What follows.
 
 
-@pytest.mark.parametrize("order", list(permutations(range(5))))
+@pytest.mark.parametrize("order", list(permutations(range(6))))
 def test_order_of_a_tick_is_that_of_the_data_however_stages_are_listed(order):
     assert names(Graph(tuple(BASE[i] for i in order))) == list(BUILT_IN)
 
@@ -62,7 +62,7 @@ def test_order_of_stages_decides_where_the_data_does_not():
 def test_arms_follow_each_other_in_the_order_of_their_names():
     graph = Graph(BASE, ("right", "left"))
     assert names(graph) == [*BUILT_IN, *(f"left/{name}" for name in BUILT_IN)]
-    assert graph.topics[0] == topics.MASTER_MEASURED_CP
+    assert graph.topics[0] == topics.HAND_SERVO_CP
     assert "left/slave/servo_cp" in {topic.name for topic in graph.topics}
 
 
@@ -73,7 +73,7 @@ def test_arms_share_no_link():
 
 def test_replacing_stage_comes_between_writer_and_readers():
     graph = Graph((*BASE, limit()))
-    assert names(graph) == ["haptic_master", "motion_scaling", "limit", *BUILT_IN[2:]]
+    assert names(graph) == [*BUILT_IN[:3], "limit", *BUILT_IN[3:]]
     assert feeds(graph, "inverse_kinematics", "slave/servo_cp") == ["test/limited_cp"]
     assert feeds(graph, "limit", "slave/servo_cp") == ["slave/servo_cp"]
 
@@ -167,7 +167,7 @@ UNFED = stage(reads=(SLAVE_MEASURED_CP, UNWRITTEN))
 NOTED = stage(writes=(), notes=(("command_status", "i8"),))
 BAD_GRAPHS = {
     "reader nobody writes for": ((*BASE, UNFED), "echo", "test/unwritten, which no stage writes"),
-    "two stages of one name": ((*BASE, BASE[3]), "slave", "two have this name"),
+    "two stages of one name": ((*BASE, BASE[4]), "slave", "two have this name"),
     "two writers of a topic": (
         (*BASE, stage("a"), stage("b")), "b", "the only one that writes test/echo; a does",
     ),

@@ -1,25 +1,25 @@
 """Haptic master: the published device, a hand that gives way, tremor, buttons, same bits again."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import periodogram
 from scipy.spatial.transform import Rotation
 
+from held_master import HeldMaster
 from teleop_core.errors import ParameterError
 from teleop_core.kernels import records
 from teleop_core.master.haptic_master import (
     REST_POSITION,
     REST_TILT,
-    ButtonParameters,
     DeviceParameters,
     HandParameters,
-    HapticMaster,
     HapticMasterParameters,
 )
 from teleop_core.operators import OPERATORS, Setting, register_operator
-from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.operators.parameters import ButtonParameters, OperatorParameters
 from teleop_core.operators.shapes import PHASES
 from teleop_core.parameters import build
 
@@ -37,11 +37,21 @@ def operator(**values):
 STILL = operator(kind="hold", rotation=0.0)
 
 
+def held(given):
+    """Device and operator of given parameters."""
+    return HeldMaster(*given)
+
+
 def parameters(*, seed=1, device=None, hand=None, operator=STILL, buttons=None):
-    return HapticMasterParameters(
-        seed=seed, device=DeviceParameters(**(device or {})), hand=HandParameters(**(hand or {})),
-        operator=operator, buttons=ButtonParameters(**(buttons or {})), patience=0.0,
-    )  # fmt: skip
+    """Those of the operator and of the device; ``tremor_…`` of the hand are the operator's."""
+    own = {k: v for k, v in (hand or {}).items() if k.startswith("tremor")}
+    rest = {k: v for k, v in (hand or {}).items() if k not in own}
+    person = replace(
+        operator, seed=seed, patience=0.0, buttons=ButtonParameters(**(buttons or {})), **own
+    )
+    return person, HapticMasterParameters(
+        seed=seed, device=DeviceParameters(**(device or {})), hand=HandParameters(**rest)
+    )
 
 
 def wanted_places(wanted, ticks, seed=1):
@@ -74,7 +84,7 @@ def wobble(signals):
 
 @pytest.mark.parametrize("force", [(3.0, 0, 0), (5.0, 0, 0), (3, -3, 3), (0, 0, -1e6), (0, 0, 0)])
 def test_applied_force_is_the_commanded_one_up_to_the_peak_and_in_its_direction(force):
-    applied = run(HapticMaster(parameters()), 1, force)["master_measured_cf"][0]
+    applied = run(held(parameters()), 1, force)["master_measured_cf"][0]
     size = np.linalg.norm(force)
     expected = np.array(force) * min(1.0, PEAK / size if size else 1.0)
     assert np.allclose(applied[:3], expected, rtol=1e-15, atol=0)
@@ -82,14 +92,14 @@ def test_applied_force_is_the_commanded_one_up_to_the_peak_and_in_its_direction(
 
 
 def test_hand_feels_no_more_than_the_peak_force():
-    at_peak = places(run(HapticMaster(parameters()), 500, (PEAK, 0, 0)))
-    beyond = places(run(HapticMaster(parameters()), 500, (100.0, 0, 0)))
+    at_peak = places(run(held(parameters()), 500, (PEAK, 0, 0)))
+    beyond = places(run(held(parameters()), 500, (100.0, 0, 0)))
     assert np.allclose(at_peak, beyond, rtol=0, atol=1e-12)
 
 
 def test_place_readings_are_multiples_of_the_resolution():
     path = operator(kind="random", approach_time=0.5)
-    counts = places(run(HapticMaster(parameters(operator=path)), 3000)) / RESOLUTION
+    counts = places(run(held(parameters(operator=path)), 3000)) / RESOLUTION
     # A reading of 0.1 m is 2000 steps, known to 1e-12 of a step.
     assert np.abs(counts - np.round(counts)).max() < 1e-10
     assert len(np.unique(np.round(counts))) > 100
@@ -97,14 +107,14 @@ def test_place_readings_are_multiples_of_the_resolution():
 
 def test_reading_is_within_half_a_step_of_the_tip():
     path = operator(kind="random", approach_time=0.5)
-    master = HapticMaster(parameters(operator=path))
+    master = held(parameters(operator=path))
     for _ in range(1000):
         reading = places(run(master, 1))[0]
         assert np.abs(reading - master.state["position"]).max() <= 0.5 * RESOLUTION + 1e-15
 
 
 def test_gimbal_noise_fills_its_bounds_and_never_leaves_them():
-    turns = wobble(run(HapticMaster(parameters()), 5000))
+    turns = wobble(run(held(parameters()), 5000))
     # Turns about three axes of 2e-3 rad mix by their product, 4e-6 rad.
     assert np.abs(turns).max() < NOISE + 4e-6
     assert (np.abs(turns).max(axis=0) > 0.99 * NOISE).all()
@@ -114,7 +124,7 @@ def test_gimbal_noise_fills_its_bounds_and_never_leaves_them():
 
 
 def test_gimbal_noise_is_white():
-    turns = wobble(run(HapticMaster(parameters()), 5000))[:, 0]
+    turns = wobble(run(held(parameters()), 5000))[:, 0]
     lagged = np.corrcoef(turns[1:], turns[:-1])[0, 1]
     assert abs(lagged) < 4.0 / math.sqrt(5000)
 
@@ -132,7 +142,7 @@ def hand_gain(hertz, hand, device, axis):
 def test_tremor_has_its_peak_in_the_band_with_the_wanted_amplitude(middle):
     hand = {"tremor_amplitude": 0.5e-3, "tremor_frequency": middle}
     device = {**QUIET, "friction": 0.0}
-    signals = run(HapticMaster(parameters(device=device, hand=hand)), 20_000)
+    signals = run(held(parameters(device=device, hand=hand)), 20_000)
     motion = places(signals)[1000:] - REST_POSITION
     for axis in range(3):
         frequency, power = periodogram(motion[:, axis], 1000.0)
@@ -147,7 +157,7 @@ def test_tremor_has_its_peak_in_the_band_with_the_wanted_amplitude(middle):
 
 def test_axes_tremble_independently():
     hand = {"tremor_amplitude": 0.5e-3}
-    motion = places(run(HapticMaster(parameters(device=QUIET, hand=hand)), 20_000))[1000:]
+    motion = places(run(held(parameters(device=QUIET, hand=hand)), 20_000))[1000:]
     between = np.corrcoef(motion.T)[np.triu_indices(3, 1)]
     # Lines that wander over ±2 Hz forget their phase in about 0.2 s: 100 independent pieces.
     assert np.abs(between).max() < 0.4
@@ -155,7 +165,7 @@ def test_axes_tremble_independently():
 
 def test_without_tremor_and_noise_a_still_hand_is_perfectly_still():
     device = {"gimbal_noise": 0.0}
-    signals = run(HapticMaster(parameters(device=device, hand={"tremor_amplitude": 0.0})), 500)
+    signals = run(held(parameters(device=device, hand={"tremor_amplitude": 0.0})), 500)
     assert not np.diff(signals["master_measured_cp"], axis=0).any()
     assert not signals["master_measured_cv"].any()
 
@@ -165,19 +175,19 @@ def test_without_tremor_and_noise_a_still_hand_is_perfectly_still():
 def test_hand_and_device_give_way_by_force_over_stiffness_but_for_friction(stiffness, force):
     hand = {"tremor_amplitude": 0.0, "stiffness": stiffness}
     device = {**QUIET, "start": (0.0, 0.0, 0.0), **COLD}
-    master = HapticMaster(parameters(device=device, hand=hand))
+    master = held(parameters(device=device, hand=hand))
     run(master, 5000, force)
     given, structure = master.state["hand"] - REST_POSITION, np.array(DeviceParameters().stiffness)
-    held = stiffness * given
-    assert np.linalg.norm(np.array(force) - held) <= FRICTION * (1.0 + 1e-6)
+    pull = stiffness * given
+    assert np.linalg.norm(np.array(force) - pull) <= FRICTION * (1.0 + 1e-6)
     bend = master.state["position"] - master.state["hand"]
-    assert np.allclose(bend, held / structure, rtol=1e-6, atol=1e-9)
+    assert np.allclose(bend, pull / structure, rtol=1e-6, atol=1e-9)
     assert np.abs(master.state["speed"]).max() < 1e-12
 
 
 def test_without_friction_the_hand_gives_way_by_force_over_stiffness_and_returns():
     device = {**QUIET, "friction": 0.0, **COLD}
-    master = HapticMaster(parameters(device=device, hand={"tremor_amplitude": 0.0}))
+    master = held(parameters(device=device, hand={"tremor_amplitude": 0.0}))
     moved = places(run(master, 3000, (2.0, 0, 0)))[-1] - REST_POSITION
     assert np.allclose(moved, (2.0 / 300.0 + 2.0 / 1260.0, 0.0, 0.0), rtol=0, atol=1e-9)
     moved = places(run(master, 3000))[-1] - REST_POSITION
@@ -186,7 +196,7 @@ def test_without_friction_the_hand_gives_way_by_force_over_stiffness_and_returns
 
 def test_wanted_path_is_followed():
     path = operator(kind="circle", center=(0.0, 0.0, 0.03), approach_time=1.0, period=8.0)
-    master = HapticMaster(parameters(operator=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
+    master = held(parameters(operator=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
     wanted = wanted_places(path, 10_000)
     off = np.linalg.norm(places(run(master, 10_000)) - wanted, axis=1)
     # Backdrive friction of 0.26 N against the hand's 300 N/m.
@@ -195,7 +205,7 @@ def test_wanted_path_is_followed():
 
 def test_tip_stops_at_the_ends_of_the_workspace():
     far = operator(kind="hold", center=(0.2, -0.2, 0.2), approach_time=0.5, rotation=0.0)
-    last = run(HapticMaster(parameters(operator=far, device=QUIET)), 2000)[-1:]
+    last = run(held(parameters(operator=far, device=QUIET)), 2000)[-1:]
     middle = np.subtract(REST_POSITION, (0.0, 0.0, -0.03))
     expected = middle + 0.5 * np.array((0.16, -0.12, 0.07))
     assert np.allclose(places(last)[0], expected, rtol=0, atol=1e-15)
@@ -205,7 +215,7 @@ def test_tip_stops_at_the_ends_of_the_workspace():
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_tip_at_its_stop_is_at_rest(sign):
     far = operator(kind="hold", center=(0.2 * sign,) * 3, approach_time=0.5, rotation=0.0)
-    master = HapticMaster(parameters(operator=far, device=QUIET, hand={"tremor_amplitude": 0.0}))
+    master = held(parameters(operator=far, device=QUIET, hand={"tremor_amplitude": 0.0}))
     run(master, 2000)
     # The hand still pulls with 20 N; what it would gather against the stop is not kept.
     assert not master.state["speed"].any()
@@ -214,13 +224,13 @@ def test_tip_at_its_stop_is_at_rest(sign):
 def test_tip_leaves_its_stop_again():
     points = (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
     path = operator(kind="points", points=points, approach_time=0.1, period=1.5)
-    signals = run(HapticMaster(parameters(operator=path, device=QUIET)), 4000)
+    signals = run(held(parameters(operator=path, device=QUIET)), 4000)
     assert math.isclose(places(signals)[:, 0].max(), 0.08, abs_tol=1e-12)
     assert abs(places(signals)[-1, 0]) < 1e-3
 
 
 def test_master_starts_at_rest_in_the_inkwell():
-    master = HapticMaster(parameters(operator=operator(), device={"gimbal_noise": 0.0}))
+    master = held(parameters(operator=operator(), device={"gimbal_noise": 0.0}))
     start = master.signals["master_measured_cp"].copy()
     assert np.allclose(start[3:], REST.as_quat(scalar_first=True), rtol=0, atol=1e-15)
     first = run(master, 20)
@@ -230,7 +240,7 @@ def test_master_starts_at_rest_in_the_inkwell():
 
 
 def test_first_reading_is_the_start_itself_and_reports_no_motion():
-    master = HapticMaster(parameters(device={"gimbal_noise": 0.0}))
+    master = held(parameters(device={"gimbal_noise": 0.0}))
     start = master.signals["master_measured_cp"].copy()
     assert np.abs(start[:3] - REST_POSITION).max() <= 0.5 * RESOLUTION
     first = run(master, 1)
@@ -240,7 +250,7 @@ def test_first_reading_is_the_start_itself_and_reports_no_motion():
 
 def test_twist_is_the_filtered_rate_of_the_readings():
     path = operator(kind="circle", center=(0.0, 0.0, 0.03), approach_time=1.0, period=4.0)
-    master = HapticMaster(parameters(operator=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
+    master = held(parameters(operator=path, device=QUIET, hand={"tremor_amplitude": 0.0}))
     signals = run(master, 4000)
     rate = np.gradient(places(signals), 1e-3, axis=0)[2000:3990]
     # 5 ms late and half a tick early: 4.5 ms of the rate's own change.
@@ -251,7 +261,7 @@ def test_twist_is_the_filtered_rate_of_the_readings():
 
 def test_turning_rate_is_that_of_the_stylus_in_base_axes():
     path = operator(kind="hold", tilt=(0.0, 0.0, 1.0), approach_time=2.0, rotation=0.0)
-    signals = run(HapticMaster(parameters(operator=path, device=QUIET)), 1500)
+    signals = run(held(parameters(operator=path, device=QUIET)), 1500)
     about_stylus_z = REST.apply((0.0, 0.0, 1.0))
     measured = signals["master_measured_cv"][1000, 3:]
     # Peak of the smooth step in its middle: 1.875 times the mean of 0.5 rad/s.
@@ -267,7 +277,7 @@ def test_turning_rate_does_not_see_that_opposite_quaternions_are_one_attitude(ow
 
     register_operator("turning", wrapped)
     device = {**QUIET, "position_resolution": 0.0}
-    signals = run(HapticMaster(parameters(operator=operator(kind="turning"), device=device)), 3000)
+    signals = run(held(parameters(operator=operator(kind="turning"), device=device)), 3000)
     # The stylus goes on turning where its rotation vector jumps by a revolution: twice here.
     readings = signals["master_measured_cp"][:, 3:]
     assert np.count_nonzero((readings[1:] * readings[:-1]).sum(axis=1) < 0.0) >= 1
@@ -278,7 +288,7 @@ def test_turning_rate_does_not_see_that_opposite_quaternions_are_one_attitude(ow
 
 def test_buttons_are_pressed_at_their_times():
     buttons = {"clutch": (0.1, 0.3), "fixture": (0.2,), "mode": (0.05, 0.4)}
-    pressed = run(HapticMaster(parameters(buttons=buttons)), 600)["master_buttons"]
+    pressed = run(held(parameters(buttons=buttons)), 600)["master_buttons"]
     at = [np.flatnonzero(column) + 1 for column in pressed.T]  # tick k has the time k ms
     assert np.array_equal(at[0], np.arange(100, 300))
     for column, starts in ((1, (200,)), (2, (50, 400))):
@@ -292,7 +302,7 @@ def test_buttons_are_pressed_at_their_times():
 def test_clutch_times_that_are_no_rising_pairs_are_refused(clutch):
     with pytest.raises(ParameterError) as error:
         ButtonParameters(clutch=clutch)
-    assert error.value.name == "buttons.clutch"
+    assert error.value.name == "operator.buttons.clutch"
 
 
 @pytest.mark.parametrize("button", ["fixture", "mode"])
@@ -300,11 +310,11 @@ def test_clutch_times_that_are_no_rising_pairs_are_refused(clutch):
 def test_presses_that_would_run_into_one_are_refused(button, presses):
     with pytest.raises(ParameterError) as error:
         ButtonParameters(**{button: presses})
-    assert error.value.name == f"buttons.{button}"
+    assert error.value.name == f"operator.buttons.{button}"
 
 
 def test_presses_need_no_order():
-    pressed = run(HapticMaster(parameters(buttons={"mode": (0.3, 0.05)})), 400)["master_buttons"]
+    pressed = run(held(parameters(buttons={"mode": (0.3, 0.05)})), 400)["master_buttons"]
     assert np.count_nonzero(np.diff(pressed[:, 2]) > 0) == 2
 
 
@@ -313,7 +323,7 @@ RANDOM = operator(kind="random", approach_time=0.5)
 
 def test_same_seed_gives_the_same_bits_and_another_seed_others():
     first, again, other = (
-        run(HapticMaster(parameters(seed=seed, operator=RANDOM)), 1500) for seed in (5, 5, 6)
+        run(held(parameters(seed=seed, operator=RANDOM)), 1500) for seed in (5, 5, 6)
     )
     for topic in TOPICS:
         assert np.array_equal(first[topic], again[topic])
@@ -321,7 +331,7 @@ def test_same_seed_gives_the_same_bits_and_another_seed_others():
 
 
 def test_reset_repeats_the_session_to_the_bit():
-    master = HapticMaster(parameters(operator=RANDOM))
+    master = held(parameters(operator=RANDOM))
     first = run(master, 1200)
     master.reset()
     again = run(master, 1200)
@@ -332,8 +342,8 @@ def test_reset_repeats_the_session_to_the_bit():
 @pytest.mark.parametrize("sizes", [(1,) * 50, (7, 993, 1000), (1000,) * 3, (999, 1)])
 def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(sizes):
     buttons = {"clutch": (0.5, 1.0), "mode": (0.02,)}
-    one_by_one = run(HapticMaster(parameters(operator=RANDOM, buttons=buttons)), sum(sizes))
-    master = HapticMaster(parameters(operator=RANDOM, buttons=buttons))
+    one_by_one = run(held(parameters(operator=RANDOM, buttons=buttons)), sum(sizes))
+    master = held(parameters(operator=RANDOM, buttons=buttons))
     blocks = []
     for size in sizes:
         master.prepare(size)
@@ -343,10 +353,10 @@ def test_what_the_operator_wants_does_not_depend_on_the_blocks_it_is_drawn_in(si
 
 
 def test_new_hand_is_felt_from_the_next_tick_and_does_not_jump():
-    master = HapticMaster(parameters(operator=RANDOM, device=QUIET))
+    master = held(parameters(operator=RANDOM, device=QUIET))
     before = places(run(master, 1000))
     stiff = HandParameters(stiffness=2000.0, damping=30.0)
-    master.retune(HapticMasterParameters(hand=stiff, device=DeviceParameters(**QUIET)))
+    master.device.retune(HapticMasterParameters(hand=stiff, device=DeviceParameters(**QUIET)))
     after = places(run(master, 200))
     assert np.abs(after[0] - before[-1]).max() < 2e-4
     off = after - wanted_places(RANDOM, 1200)[1000:]
@@ -368,7 +378,7 @@ EXTREMES = [
 def test_hand_at_the_edge_of_its_parameters_stays_where_it_wants_to_be(hand, friction):
     device = {**QUIET, "apparent_mass": 1e-3, "friction": friction}
     calm = {"stiffness": 300.0, **hand, "tremor_amplitude": 0.0}
-    master = HapticMaster(parameters(device=device, hand=calm))
+    master = held(parameters(device=device, hand=calm))
     push, width = 0.5, 0.16
     moved = np.empty((1030, 3))
     for i in range(1030):

@@ -6,8 +6,9 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
+from held_master import HeldMaster
 from teleop_core.errors import ParameterError
-from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.master.haptic_master import HapticMasterParameters
 from teleop_core.operators import OPERATORS, Setting
 from teleop_core.operators.human import HumanParameters, Submovement, submovements, tremor
 from teleop_core.operators.parameters import OperatorParameters
@@ -146,9 +147,9 @@ def test_tremor_has_its_size_in_its_band_and_a_spectrum_that_falls_off_smoothly_
 
 def resting(kind, **device):
     """Reading (N, 3) [m] of ten seconds of a hand that rests in the device."""
-    operator = {"operator.kind": kind, "operator.size": (0.0, 0.0, 0.0)}
-    values = {**operator, "operator.rotation": 0.0, "patience": 0.0, **device}
-    master = HapticMaster(build(HapticMasterParameters, values))
+    values = {"kind": kind, "size": (0.0, 0.0, 0.0), "rotation": 0.0, "patience": 0.0}
+    person = build(OperatorParameters, values)
+    master = HeldMaster(person, build(HapticMasterParameters, device))
     out = np.empty((10_000, 3))
     for tick in range(len(out)):
         master.prepare(1)

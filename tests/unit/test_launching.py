@@ -12,7 +12,7 @@ from teleop_core.errors import ParameterError
 from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, processes
 
 LAUNCH = Path(__file__).resolve().parents[2] / "src" / "teleop_core" / "launch"
-STAGES = {"haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim"}
+STAGES = {"operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim"}
 
 
 def given(own=ONE_ARM, **values):
@@ -76,7 +76,7 @@ def test_an_argument_of_no_meaning_is_refused(name, value):
 
 
 @pytest.mark.parametrize(
-    ("file", "own", "count"), [("teleop", ONE_ARM, 6), ("two_arms", TWO_ARMS, 11)]
+    ("file", "own", "count"), [("teleop", ONE_ARM, 7), ("two_arms", TWO_ARMS, 13)]
 )
 def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(monkeypatch, file, own, count):
     # Stand-ins for launch and launch_ros, which PyPI does not have, as far as they are used.

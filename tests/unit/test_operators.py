@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from held_master import HeldMaster
 from teleop_core.errors import ParameterError, PartError
-from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.operators import OPERATORS, Operator, Setting, following, register_operator
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.shapes import PHASES, minimum_jerk
@@ -232,8 +232,7 @@ def test_samples_that_are_no_motion_are_refused(case):
 
 
 def master_of(name, **values):
-    wanted = build(OperatorParameters, {"kind": name, **values})
-    return HapticMaster(HapticMasterParameters(operator=wanted, patience=0.0))
+    return HeldMaster(build(OperatorParameters, {"kind": name, "patience": 0.0, **values}))
 
 
 def poses(master, ticks):

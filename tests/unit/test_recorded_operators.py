@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
 from teleop_core.bags.writer import BagWriter
-from teleop_core.master.device import DeviceParameters
 from teleop_core.operators import OPERATORS, Setting
 from teleop_core.operators.parameters import OperatorParameters
 from teleop_core.operators.rest import REST_TILT
@@ -43,8 +42,9 @@ def bag(path, times=T, pressed=None):
 def operator(path, kind="bag", device=None, **values):
     """Operator, parameters and setting."""
     key = "bag" if kind == "bag" else "file.path"
-    parameters = build(OperatorParameters, {"kind": kind, key: str(path), **values})
-    setting = Setting(parameters, np.zeros(PHASES), 1, device)
+    room = {f"device.{name}": value for name, value in (device or {}).items()}
+    parameters = build(OperatorParameters, {"kind": kind, key: str(path), **room, **values})
+    setting = Setting(parameters, np.zeros(PHASES), 1)
     return OPERATORS.find(kind), parameters.kind.parameters, setting
 
 
@@ -150,7 +150,7 @@ def test_operators_without_end_leave_the_duration_alone():
 
 
 def test_a_motion_beyond_the_stops_is_told_with_its_share_and_what_helps(tmp_path):
-    device = DeviceParameters(workspace=(0.04, 0.04, 0.04), start=(0.0, 0.0, 0.0))
+    device = {"workspace": (0.04, 0.04, 0.04), "start": (0.0, 0.0, 0.0)}
     path = bag(tmp_path / "bag")
     shifted = (0.025, 0.0, 0.0)
     with pytest.warns(UserWarning, match="leaves the device's workspace") as notes:
@@ -167,7 +167,7 @@ def test_a_motion_beyond_the_stops_is_told_with_its_share_and_what_helps(tmp_pat
 
 
 def test_a_motion_larger_than_the_device_is_told_with_a_scale(tmp_path):
-    device = DeviceParameters(workspace=(0.01, 0.01, 0.01))
+    device = {"workspace": (0.01, 0.01, 0.01)}
     with pytest.warns(UserWarning, match="--scale 0.49"):
         motion(bag(tmp_path / "bag"), device=device)
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.errors import ShapeError, UnknownNameError
 from teleop_core.mapping.plausibility import PlausibilityParameters
-from teleop_core.master.haptic_master import HapticMaster
+from teleop_core.master.operator import RunningOperator
 from teleop_core.operators.remote import AHEAD, RemoteHand, RemoteParameters
 from teleop_core.operators.rest import rest_pose
 from teleop_core.parameters import specs
@@ -30,7 +30,7 @@ def pose(way=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
 
 
 class Run:
-    """A hand that is asked as the haptic master asks it, some ticks at a time."""
+    """A hand that is asked as the operator asks it, some ticks at a time."""
 
     def __init__(self, hand=None, **parameters):
         self.hand = hand or RemoteHand(RemoteParameters(**parameters))
@@ -281,8 +281,8 @@ def test_poses_may_come_from_another_thread():
     assert run.hand.refused == 0
 
 
-def test_the_haptic_master_gives_the_hand_within_the_workspace_of_its_device():
-    master = HapticMaster(configure(settings=["operator=remote"]).groups["haptic_master"])
+def test_the_operator_gives_the_hand_within_the_workspace_of_its_device():
+    master = RunningOperator(configure(settings=["operator=remote"]).groups["operator"])
     assert master.ahead == AHEAD
     hand, device = master.hand, master._fixed.device
     assert isinstance(hand, RemoteHand)
@@ -295,11 +295,11 @@ def test_the_haptic_master_gives_the_hand_within_the_workspace_of_its_device():
 
 
 def test_an_operator_that_is_no_person_has_no_hand():
-    assert HapticMaster(configure(settings=["operator=hold"]).groups["haptic_master"]).hand is None
+    assert RunningOperator(configure(settings=["operator=hold"]).groups["operator"]).hand is None
 
 
-def test_a_hand_draws_for_the_haptic_master_what_its_motion_says():
-    master = HapticMaster(configure(settings=["operator=remote"]).groups["haptic_master"])
+def test_a_hand_draws_for_the_operator_what_its_motion_says():
+    master = RunningOperator(configure(settings=["operator=remote"]).groups["operator"])
     twin = RemoteHand(room=master.hand.room)
     for k in range(200):
         for hand in (master.hand, twin):

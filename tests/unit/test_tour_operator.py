@@ -95,6 +95,6 @@ def test_points_that_are_not_triples_are_refused_and_none_at_all_too():
 
 def test_scenario_has_24_different_points_and_takes_the_published_time():
     made = configure("points24")
-    p = made.group("haptic_master").operator.kind.parameters
+    p = made.group("operator").kind.parameters
     assert len({tuple(stop) for stop in p.stops.tolist()}) == 24
     assert p.visit_time + p.trace_time == pytest.approx(45.0)

@@ -80,12 +80,15 @@ class Ports:
         # Bound once: a tick goes through them a thousand times a second.
         self._ports = [(p.name, f"{p.field}_ns", self.inputs[p.name]) for p in stage.reads]
         self._stamped: list[tuple[Output, str]] = []
+        self._passed_on: dict[Output, int] = {}  # stamps that went out last
         for topic in stage.writes:
             if topic.kind is not Kind.REPORT:
                 form = layout(topic.of_arm(arm), joint_names)
                 output = Output(publisher(topic), form, signals[topic.field])
                 self.outputs[topic.of_arm(arm)] = output
                 self._stamped.append((output, self._stamp_field(topic)))
+                if topic.stamp.of and not topic.stamp.is_in_force:
+                    self._passed_on[output] = 0
 
     def _stamp_field(self, written: Topic) -> str:
         """Field of the stamp that an output passes on; empty for the time of sampling."""
@@ -122,14 +125,19 @@ class Ports:
     def send(self, now_ns: int) -> None:
         """Send what the stage wrote, each under the stamp that its topic says.
 
-        A stage that is not of this package may write anything: what is not finite is not sent.
+        What passes on a stamp that went out already is no new answer, and is not sent. A stage that is not of this package may write anything: what is not finite is not sent.
         """
         row = self.row
         if self._must_check and not all(output.is_sound() for output, _ in self._stamped):
             self.refused += 1
             return
         for output, stamp_field in self._stamped:
-            output.send(int(row[stamp_field]) if stamp_field else now_ns)
+            stamp_ns = int(row[stamp_field]) if stamp_field else now_ns
+            if output in self._passed_on:
+                if self._passed_on[output] == stamp_ns:
+                    continue
+                self._passed_on[output] = stamp_ns
+            output.send(stamp_ns)
 
     def concerns(self) -> list[str]:
         """What is wrong with what the stage writes, in words."""

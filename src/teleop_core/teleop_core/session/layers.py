@@ -64,7 +64,8 @@ RENAMED = {
     "haptic_master.operator.": "operator.",
     "haptic_master.buttons.": "operator.buttons.",
     "haptic_master.patience": "operator.patience",
-    "haptic_master.hand.tremor_": "operator.tremor_",
+    "haptic_master.hand.tremor_amplitude": "operator.tremor_amplitude",
+    "haptic_master.hand.tremor_frequency": "operator.tremor_frequency",
     "motion_scaling.fixture.size": "motion_scaling.fixture.box.size",
     "slave_sim.pid.": "slave_sim.controller.pid.",
     **{
