@@ -7,9 +7,8 @@ import pytest
 
 import teleop_core as tc
 from teleop_core.bodies import Bodies, Joint, Solid, bodies_of
-from teleop_core.bodies.serial import serial_bodies
+from teleop_core.bodies.describe import serial_bodies, unknown_bodies
 from teleop_core.bodies.solids import along, capsule
-from teleop_core.bodies.unknown import unknown_bodies
 from teleop_core.errors import ParameterError, ShapeError
 from teleop_core.geometry import rotations_from_quaternions
 from teleop_core.robots import Robot

@@ -1,12 +1,26 @@
-"""Describing robots: which description of its bodies a robot has."""
+"""Describing robots: which description of its bodies a robot has, and that of serial robots.
+
+Serial robots are described from kinematics alone, by the product of exponentials: the Jacobian at
+home gives every joint's screw axis; the placement of link i is the product of the motions of joints
+1 to i, exact for every robot whose joints are a chain. What is neither serial nor described is a
+base, a dotted line to the tip, and the tip.
+
+Source:
+    Lynch and Park 2017, chapter 4.
+"""
 
 from collections.abc import Callable
 from importlib import import_module
 from weakref import WeakKeyDictionary
 
-from teleop_core.bodies.body import Bodies
-from teleop_core.bodies.serial import serial_bodies
-from teleop_core.bodies.unknown import unknown_bodies
+import numpy as np
+
+from teleop_core.bodies.body import HERE, Bodies, Body, Joint
+from teleop_core.bodies.chain import axes_of, chain, places, tip_of
+from teleop_core.bodies.frames import pose_of, tips
+from teleop_core.bodies.solids import ball, cylinder
+from teleop_core.geometry import Array, rotations_from_quaternions
+from teleop_core.portable import length
 from teleop_core.robots.robot import Robot
 
 # Robots whose joints are no chain, by the module of their kernels, with what describes them.
@@ -44,3 +58,61 @@ def _described(robot: Robot) -> Bodies:
         )
         return describe(robot)
     return serial_bodies(robot) or unknown_bodies(robot)
+
+
+_TRIALS = 5
+# How far, over the size of the robot, the tip may be off for joints to count as a chain.
+_EXACT = 1e-6
+
+
+def serial_bodies(robot: Robot) -> Bodies | None:
+    """Bodies of a robot whose joints are a chain; None if they are not."""
+    if robot.kernels.assemble is not None:
+        return None
+    home = robot.fk(robot.home)
+    axes = axes_of(robot.jacobian(robot.home), home[:3, 3])
+    if axes is None:
+        return None
+    tip, strokes = pose_of(home), robot.upper - robot.lower
+    chained = places(axes, robot.home - robot.lower, tip[:3])
+    joints = range(robot.n)
+    bodies, reach = chain(
+        chained, [f"link{i + 1}" for i in joints], joints, robot.home, strokes, tip
+    )
+    frames = Bodies(tuple(bodies), robot.n, None, (), reach).poses(robot.home)
+    bodies.append(tip_of(bodies, frames[-1], tip, reach))
+    found = Bodies(tuple(bodies), robot.n, None, tuple(i + 1 for i in joints), reach)
+    return found if has_tip_of(found, robot) else None
+
+
+def has_tip_of(bodies: Bodies, robot: Robot) -> bool:
+    """Whether the last body is where the robot's tip is, for joints drawn within the limits."""
+    draws = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_TRIALS, robot.n))
+    tips, expected = bodies.poses(draws)[:, -1], robot.fk(draws)
+    off = np.abs(tips[:, :3] - expected[:, :3, 3]).max() / bodies.size
+    turned = np.abs(rotations_from_quaternions(tips[:, 3:]) - expected[:, :3, :3]).max()
+    return bool(off < _EXACT and turned < _EXACT)
+
+
+_DOTS = 12
+
+
+def unknown_bodies(robot: Robot) -> Bodies:
+    """Bodies of a robot of which only its tip is known; no joint has a body of its own."""
+    home = robot.solve_fk(robot.home).T[:3, 3]
+    size = max(float(length(home)), 1e-3)
+    up = np.array([0.0, 0.0, 1.0])
+    base = Body("base", (cylinder(-0.015 * size * up, up, 0.09 * size, 0.03 * size, "base"),), -1)
+    dot, end = ball(np.zeros(3), 0.012 * size, "link"), ball(np.zeros(3), 0.03 * size, "tool")
+    dots = [Body(f"dot{i + 1}", (dot,), 0, Joint.FREE, HERE, i) for i in range(_DOTS)]
+    tip = Body("tip", (end,), 0, Joint.FREE, HERE, _DOTS)
+    shares = np.append(np.arange(1, _DOTS + 1) / (_DOTS + 1.0), 1.0)
+
+    def coordinates(q: Array) -> tuple[Array, Array]:
+        _, poses = tips(robot, q)
+        free = np.repeat(poses[:, None], _DOTS + 1, axis=1)
+        free[..., :3] *= shares[:, None]
+        return q, free
+
+    last = _DOTS + 1
+    return Bodies((base, *dots, tip), robot.n, coordinates, (last,) * robot.n, size)

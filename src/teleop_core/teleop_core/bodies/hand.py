@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from teleop_core.bodies.body import HERE, Bodies, Body, Joint
-from teleop_core.bodies.frames import pose
+from teleop_core.bodies.frames import pose, tips
 from teleop_core.bodies.planar import pivoted
 from teleop_core.bodies.solids import ball, capsule, rim
-from teleop_core.bodies.tips import tips
 from teleop_core.geometry import Array
 from teleop_core.robots.hand_grasp import FINGERS
 from teleop_core.robots.robot import Robot

@@ -5,11 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.bodies.body import HERE, Bodies, Body, Coordinates, Joint
-from teleop_core.bodies.frames import pose
-from teleop_core.bodies.legs import Telescope, plate
+from teleop_core.bodies.frames import pose, tips
+from teleop_core.bodies.parallel import Telescope, plate
 from teleop_core.bodies.planar import pivoted
 from teleop_core.bodies.solids import ball, capsule, cylinder
-from teleop_core.bodies.tips import tips
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 from teleop_core.portable import product

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from teleop_core.bodies.axes import axes_of, places
 from teleop_core.bodies.body import Bodies, Body, Joint
-from teleop_core.bodies.chain import chain, tip_of
+from teleop_core.bodies.chain import axes_of, chain, places, tip_of
 from teleop_core.bodies.frames import moved, pose, pose_of
 from teleop_core.bodies.planar import pivoted
 from teleop_core.geometry import Array
