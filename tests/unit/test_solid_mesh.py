@@ -5,8 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from teleop_core.bodies import Solid, bodies_of
+from teleop_core.bodies.meshes import mesh_of
 from teleop_core.evaluation.packing import pack_to
-from teleop_core.evaluation.solid_mesh import _shape, mesh_of, posed
+from teleop_core.evaluation.replay import posed, robot_mesh
 from teleop_core.robots import load_robot
 
 HERE = np.array([0.1, -0.2, 0.3, np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])
@@ -20,7 +21,7 @@ VOLUMES = {
 
 @pytest.mark.parametrize("solid", VOLUMES, ids=lambda solid: solid.kind)
 def test_triangles_of_a_solid_face_outwards_and_enclose_its_volume_about_its_centre(solid):
-    points, faces = _shape(solid, 64)
+    points, faces = mesh_of(solid, 64)
     a, b, c = points[faces].transpose(1, 0, 2) - HERE[:3]
     volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0  # of pyramids over the centre
     assert volumes.sum() == pytest.approx(VOLUMES[solid], rel=0.01)
@@ -39,7 +40,7 @@ def test_points_are_posed_as_by_rotations():
 
 def test_mesh_of_a_robot_has_all_solids_in_the_order_of_its_bodies():
     bodies = bodies_of(load_robot("rcrt1"))
-    mesh = mesh_of(bodies)
+    mesh = robot_mesh(bodies)
     assert set(mesh.body) == {i for i, body in enumerate(bodies.bodies) if body.solids}
     assert (np.diff(mesh.body) >= 0).all()
     assert mesh.faces.max() == len(mesh.points) - 1

@@ -1,4 +1,4 @@
-"""Chains: joint axes from a Jacobian, points between which links run, and the bodies of the links."""
+"""Chains: joint axes from a Jacobian, the points between which links run, and their bodies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Frames: poses (7,) put together in plain NumPy, and the tips of robots whose loops may be open."""
+"""Frames: poses (7,) put together in plain NumPy, and tips of robots whose loops may be open."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Parallel robots: bodies of the Stewart platform and of the 3-RPS, on legs of telescoping tubes."""
+"""Parallel robots: bodies of the Stewart platform and of the 3-RPS, on telescoping legs."""
 
 import math
 from dataclasses import dataclass

@@ -7,8 +7,8 @@ import numpy as np
 import viser
 
 from teleop_core.bodies import Bodies, Role, Solid
+from teleop_core.bodies.meshes import merged, mesh_of
 from teleop_core.console.look import WANTED, WRONG, Color
-from teleop_core.console.meshes import merged, mesh_of
 from teleop_core.console.poses import moved, set_pose
 from teleop_core.geometry import Array, rotations_from_quaternions
 

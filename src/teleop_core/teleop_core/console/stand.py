@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from teleop_core.bodies.meshes import mesh_of
 from teleop_core.bodies.solids import Solid
-from teleop_core.console.meshes import mesh_of
 from teleop_core.geometry import Array, quaternion_from_rotation
 from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
 

@@ -4,17 +4,61 @@ The page places the bodies itself, from the coordinates of the tree that they ar
 few numbers for each moment instead of all corners, or the pose of each body.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from teleop_core.bodies import Bodies, bodies_of
+from teleop_core.bodies import Bodies, Role, bodies_of
+from teleop_core.bodies.meshes import merged, mesh_of
 from teleop_core.evaluation.figure import FIXTURE, MEASURED, SURROUNDING, Figure, Numbers, along
 from teleop_core.evaluation.outlines import Outline, largest
 from teleop_core.evaluation.packing import Packed, pack_to
-from teleop_core.evaluation.solid_mesh import ROLES, Mesh, mesh_of, posed
 from teleop_core.geometry import Array
 from teleop_core.robots.robot import Robot
+
+ROLES: tuple[Role, ...] = ("base", "link", "joint", "leg", "platform", "tool")
+_MANY = 30  # solids, of which fewer sides are enough
+Indices = NDArray[np.int64]
+
+
+class Mesh(NamedTuple):
+    """Triangles of all bodies of a robot.
+
+    Attributes:
+        points: Corners (V, 3) [m], each in the frame of its body.
+        faces: Corners of each triangle (F, 3).
+        body: Body of each corner (V,).
+        role: Index among :data:`ROLES` of what each corner is part of (V,).
+    """
+
+    points: Array
+    faces: Indices
+    body: Indices
+    role: Indices
+
+
+def robot_mesh(bodies: Bodies) -> Mesh:
+    """Triangles of all solids; those of a body stand together, in the order of the bodies."""
+    owned = [(number, solid) for number, body in enumerate(bodies.bodies) for solid in body.solids]
+    sides = 8 if len(owned) > _MANY else 12
+    shapes = [mesh_of(solid, sides) for _, solid in owned]
+    counts = [len(points) for points, _ in shapes]
+    return Mesh(
+        *merged(shapes),
+        np.repeat([number for number, _ in owned], counts),
+        np.repeat([ROLES.index(solid.role) for _, solid in owned], counts),
+    )
+
+
+def posed(points: Array, poses: Array) -> Array:
+    """Points (V, 3) that poses (V, 7) of their own bring elsewhere."""
+    w, v = poses[:, 3:4], poses[:, 4:]
+    # Rodrigues' formula with quaternions: p + 2 v × (v × p + w p).
+    return np.asarray(
+        poses[:, :3] + points + 2.0 * np.cross(v, np.cross(v, points) + w * points), dtype=float
+    )
+
 
 ROOM = 400_000
 """Bytes for the motion in one replay; longer ones have fewer moments."""
@@ -45,7 +89,7 @@ def replay_figure(
         outlines: Fixtures.
     """
     bodies = bodies_of(robot)
-    mesh, motion, every = mesh_of(bodies), *_motion(bodies, joints)
+    mesh, motion, every = robot_mesh(bodies), *_motion(bodies, joints)
     tree = {
         "parents": [body.parent for body in bodies.bodies],
         "kinds": [int(body.joint) for body in bodies.bodies],

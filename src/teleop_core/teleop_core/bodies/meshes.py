@@ -1,24 +1,26 @@
 """Meshes: the triangles of solids, with sharp edges where a solid has them."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.bodies import Solid
+from teleop_core.bodies.solids import Solid
 from teleop_core.geometry import Array, rotations_from_quaternions
 
 Faces = NDArray[np.int64]
 Mesh = tuple[Array, Faces]
 """Vertices (V, 3) [m] and the three of each triangle (F, 3), seen from outside anticlockwise."""
-_AROUND, _ARC = 20, 6
-"""Sides of what is round, and steps of a quarter of its profile."""
+AROUND = 20
+"""Sides of what is round, unless fewer are asked for; a multiple of four."""
 
 
-def mesh_of(solid: Solid) -> Mesh:
-    """Triangles of a solid in its body's frame."""
-    vertices, faces = _MADE[solid.kind](*solid.size)
+def mesh_of(solid: Solid, around: int = AROUND) -> Mesh:
+    """Triangles of a solid in its body's frame; what is round has so many sides."""
+    if solid.kind == "box":
+        vertices, faces = _box(*solid.size)
+    else:
+        vertices, faces = _revolved(_profiles(solid, around // 4), around)
     turn = rotations_from_quaternions(solid.pose[None, 3:])[0]
     return vertices @ turn.T + solid.pose[:3], faces
 
@@ -42,48 +44,39 @@ def _box(x: float, y: float, z: float) -> Mesh:
     return vertices, np.concatenate([corners + 4 * quad for quad in range(6)])
 
 
-def _capsule(radius: float, length: float) -> Mesh:
-    angle = np.linspace(0.0, 0.5 * math.pi, _ARC + 1)
-    low = np.stack((radius * np.sin(angle), -0.5 * length - radius * np.cos(angle)), axis=1)
-    high = low[::-1] * (1.0, -1.0)
-    return _revolved([np.concatenate((low, high))])
+def _profiles(solid: Solid, arc: int) -> list[Array]:
+    """Radii and heights (N, 2) [m] from below upwards; a sharp edge is where a profile ends.
+
+    Args:
+        solid: Capsule, cylinder or sphere.
+        arc: Steps of a quarter of a circle.
+    """
+    radius, top = solid.size[0], 0.5 * sum(solid.size[1:])
+    if solid.kind == "cylinder":
+        corners = np.array([(0.0, -top), (radius, -top), (radius, top), (0.0, top)])
+        return [corners[i : i + 2] for i in range(3)]
+    angle = np.linspace(0.0, 0.5 * math.pi, arc + 1)
+    low = np.stack((radius * np.sin(angle), -top - radius * np.cos(angle)), axis=1)
+    return [np.concatenate((low, low[::-1] * (1.0, -1.0)))]
 
 
-def _sphere(radius: float) -> Mesh:
-    return _capsule(radius, 0.0)
-
-
-def _cylinder(radius: float, length: float) -> Mesh:
-    top = 0.5 * length
-    corners = np.array([(0.0, -top), (radius, -top), (radius, top), (0.0, top)])
-    return _revolved([corners[i : i + 2] for i in range(3)])
-
-
-def _revolved(profiles: list[Array]) -> Mesh:
+def _revolved(profiles: list[Array], around: int) -> Mesh:
     """What profiles of radius and height (N, 2), from below upwards, sweep about z."""
-    angle = 2.0 * math.pi * np.arange(_AROUND) / _AROUND
+    angle = 2.0 * math.pi * np.arange(around) / around
     meshes = []
     for profile in profiles:
-        rings = np.empty((len(profile), _AROUND, 3))
+        rings = np.empty((len(profile), around, 3))
         rings[..., 0] = profile[:, :1] * np.cos(angle)
         rings[..., 1] = profile[:, :1] * np.sin(angle)
         rings[..., 2] = profile[:, 1:]
-        here = np.arange(_AROUND)
+        here = np.arange(around)
         beside = np.roll(here, -1)
         strips = [
-            _AROUND * ring + np.concatenate((
-                np.stack((here, beside, beside + _AROUND), axis=1),
-                np.stack((here, beside + _AROUND, here + _AROUND), axis=1),
+            around * ring + np.concatenate((
+                np.stack((here, beside, beside + around), axis=1),
+                np.stack((here, beside + around, here + around), axis=1),
             ))
             for ring in range(len(profile) - 1)
         ]  # fmt: skip
         meshes.append((rings.reshape(-1, 3), np.concatenate(strips)))
     return merged(meshes)
-
-
-_MADE: dict[str, Callable[..., Mesh]] = {
-    "box": _box,
-    "capsule": _capsule,
-    "sphere": _sphere,
-    "cylinder": _cylinder,
-}
