@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from teleop_core.console.port import free_port, listen, owner
+from teleop_core.console.server import free_port, listen, owner
 from teleop_core.errors import ParameterError, SessionError
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 import teleop_core as tc
 from teleop_core.console.recorded_arms import parameters_of
-from teleop_core.console.targets import targets_of
+from teleop_core.console.scene import targets_of
 from teleop_core.topics import MASTER_MEASURED_CP
 
 

@@ -13,8 +13,8 @@ from teleop_core.errors import EvaluationError
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.reported_fixture import ReportedFixture
+from teleop_core.evaluation.rows import summary
 from teleop_core.evaluation.scoring import evaluate, study
-from teleop_core.evaluation.summary import summary
 from teleop_core.fixtures import Fixture, register_fixture
 from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.parameters import parameter

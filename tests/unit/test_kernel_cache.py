@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from teleop_core.kernels import IS_COMPILED
-from teleop_core.kernels.versions import SUPPORTED, check_version
+from teleop_core.kernels import IS_COMPILED, SUPPORTED, check_version
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="nothing is kept of what is not compiled")
 

@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 
 from teleop_core.evaluation.bands import Band
-from teleop_core.evaluation.density import is_long, time_spent
-from teleop_core.evaluation.figure import Figure, is_against_time, line, stacked_axes, time_axis
+from teleop_core.evaluation.figure import (
+    Figure,
+    is_against_time,
+    is_long,
+    line,
+    stacked_axes,
+    time_axis,
+    time_spent,
+)
 from teleop_core.evaluation.preview import preview
 
 

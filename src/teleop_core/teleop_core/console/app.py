@@ -9,7 +9,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from teleop_core.console.answers import Situation
-from teleop_core.console.insets import Insets
 from teleop_core.console.link import Link, Parameters
 from teleop_core.console.panel import Panel
 from teleop_core.console.recorded import RecordedLink
@@ -17,10 +16,8 @@ from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
 from teleop_core.console.settings import Renew
 from teleop_core.console.status import situation
-from teleop_core.console.steps import Steps
-from teleop_core.console.stylus import Stylus
-from teleop_core.console.view_tab import ViewTab, theme
-from teleop_core.console.visitors import Visitors
+from teleop_core.console.stylus import Steps, Stylus
+from teleop_core.console.view_tab import Insets, ViewTab, Visitors, theme
 
 RATE = 30.0
 """How often the page is drawn [1/s]."""

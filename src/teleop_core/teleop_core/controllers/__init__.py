@@ -17,23 +17,22 @@ from teleop_core.errors import ParameterError, PartError
 from teleop_core.geometry import Array
 from teleop_core.kernels import pointer
 from teleop_core.registry import Registry
+from teleop_core.robots.drives import Drives
 from teleop_core.robots.robot import Robot
 from teleop_core.signals import DT
 from teleop_core.trials import fenced, is_whole
 
-__all__ = ["CONTROLLERS", "Controller", "per_joint", "register_controller"]
+__all__ = ["CONTROLLERS", "Controller", "drives_and_poles", "per_joint", "register_controller"]
 
 _PLACE = "teleop_core.controllers"
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
 CONTROL = types.void(_TABLE, _TABLE, _ROW, _ROW, _ROW, _ROW, types.float64, _ROW)
 """Signature of a control kernel, so that one compiled slave serves every law."""
+Begin = Callable[[Array, Array, Array], None]
+Shift = Callable[[Array, Array], None]
 
 
-def _nothing(memory: Array, measured: Array, effort: Array) -> None:
-    """Keep the memory as it is."""
-
-
-def _no_shift(memory: Array, effort: Array) -> None:
+def _nothing(*_: Array) -> None:
     """Keep the memory as it is."""
 
 
@@ -67,8 +66,8 @@ class Controller:
     gains: Callable[[Any, Robot, Array], Array]
     control: Callable[[Array, Array, Array, Array, Array, Array, float, Array], None]
     memory: int = 0
-    begin: Callable[[Array, Array, Array], None] = _nothing
-    shift: Callable[[Array, Array], None] = _no_shift
+    begin: Begin = _nothing
+    shift: Shift = _nothing
     uses_model: bool = False
 
     def feedforward(self, n: int) -> int:
@@ -92,6 +91,17 @@ def per_joint(robot: Robot, name: str, values: tuple[float, ...], default: Array
     if len(values) != robot.n:
         raise ParameterError(f"slave_sim.{name}", values, f"empty or {robot.n} values")
     return np.array(values)
+
+
+def drives_and_poles(robot: Robot, law: str, bandwidth: tuple[float, ...]) -> tuple[Drives, Array]:
+    """Drive table of a robot, and the closed-loop poles (n,) [rad/s] of a law: given, or its own.
+
+    Raises:
+        ParameterError: The poles are more or fewer than joints.
+    """
+    drives = robot.drives
+    assert drives is not None
+    return drives, per_joint(robot, f"controller.{law}.bandwidth", bandwidth, drives.bandwidth)
 
 
 def _checked(name: str, part: object) -> Controller:

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.controllers import Controller, fields, per_joint
+from teleop_core.controllers import Controller, drives_and_poles, fields
 from teleop_core.controllers.motion import (
     MEMORY,
     approach,
-    begin_motion,
     beyond,
     closeness,
     fading_of,
     follow_motion,
     friction_of_setpoint,
+    holding,
     known_friction,
     linear_range,
 )
@@ -114,9 +114,8 @@ def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array)
     Raises:
         ParameterError: The list has another length than the robot has joints.
     """
-    drives, p = robot.drives, parameters
-    assert drives is not None
-    pole = per_joint(robot, "controller.adaptive.bandwidth", p.bandwidth, drives.bandwidth)
+    p = parameters
+    drives, pole = drives_and_poles(robot, "adaptive", p.bandwidth)
     fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
     friction, count = p.friction_share * known_friction(robot), drives.encoder_step
     columns = (
@@ -128,17 +127,6 @@ def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array)
     return np.stack(columns, axis=1)
 
 
-def begin(memory: Array, measured: Array, effort: Array) -> None:
-    """Start at rest, with the table's parameters and the load that holds the arm."""
-    begin_motion(memory, measured)
-    memory[:, _LOAD] = effort
-
-
-def shift(memory: Array, effort: Array) -> None:
-    """Let the load take over what the feedforward no longer gives."""
-    memory[:, _LOAD] += effort
-
-
 ADAPTIVE = Controller(
-    "adaptive", AdaptiveParameters, adaptive_gains, adaptive_control, MEMORY + 4, begin, shift
+    "adaptive", AdaptiveParameters, adaptive_gains, adaptive_control, MEMORY + 4, *holding(_LOAD)
 )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.controllers import Controller, fields, per_joint
+from teleop_core.controllers import Controller, drives_and_poles, fields
 from teleop_core.controllers.motion import (
     MEMORY,
     approach,
@@ -86,20 +86,14 @@ def computed_torque_gains(
     Raises:
         ParameterError: The list has another length than the robot has joints.
     """
-    drives, p = robot.drives, parameters
-    assert drives is not None
-    pole = per_joint(robot, "controller.computed_torque.bandwidth", p.bandwidth, drives.bandwidth)
+    p = parameters
+    drives, pole = drives_and_poles(robot, "computed_torque", p.bandwidth)
     fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
     linear = linear_range(robot, pole, 3.0)
     return np.stack((pole, fading, viscous, p.dead_band * drives.encoder_step, linear), axis=1)
 
 
-def begin(memory: Array, measured: Array, effort: Array) -> None:
-    """Start at rest; the model holds the arm."""
-    begin_motion(memory, measured)
-
-
 COMPUTED_TORQUE = Controller(
     "computed_torque", ComputedTorqueParameters, computed_torque_gains, computed_torque_control,
-    MEMORY + 2, begin, uses_model=True,
+    MEMORY + 2, begin_motion, uses_model=True,
 )  # fmt: skip

@@ -14,16 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.controllers import Controller, fields, per_joint
+from teleop_core.controllers import Controller, drives_and_poles, fields
 from teleop_core.controllers.motion import (
     MEMORY,
     approach,
-    begin_motion,
     beyond,
     closeness,
     fading_of,
     follow_motion,
     friction_of_setpoint,
+    holding,
     known_friction,
     linear_range,
 )
@@ -85,11 +85,8 @@ def disturbance_observer_gains(
     Raises:
         ParameterError: The list has another length than the robot has joints.
     """
-    drives, p = robot.drives, parameters
-    assert drives is not None
-    pole = per_joint(
-        robot, "controller.disturbance_observer.bandwidth", p.bandwidth, drives.bandwidth
-    )
+    p = parameters
+    drives, pole = drives_and_poles(robot, "disturbance_observer", p.bandwidth)
     fading = fading_of(
         robot, pole, p.observer_ratio, stiffness=1.0, damping=2.0, rejection=1.0
     )  # fmt: skip
@@ -102,18 +99,7 @@ def disturbance_observer_gains(
     return np.stack(columns, axis=1)
 
 
-def begin(memory: Array, measured: Array, effort: Array) -> None:
-    """Start at rest, holding what the arm weighs there."""
-    begin_motion(memory, measured)
-    memory[:, _HELD] = effort
-
-
-def shift(memory: Array, effort: Array) -> None:
-    """Hold what the feedforward no longer gives."""
-    memory[:, _HELD] += effort
-
-
 DISTURBANCE_OBSERVER = Controller(
     "disturbance_observer", DisturbanceObserverParameters, disturbance_observer_gains,
-    disturbance_observer_control, MEMORY + 1, begin, shift,
+    disturbance_observer_control, MEMORY + 1, *holding(_HELD),
 )  # fmt: skip

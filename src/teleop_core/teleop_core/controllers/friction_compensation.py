@@ -14,16 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.controllers import Controller, fields, per_joint
+from teleop_core.controllers import Controller, drives_and_poles, fields
 from teleop_core.controllers.motion import (
     MEMORY,
     approach,
-    begin_motion,
     beyond,
     closeness,
     fading_of,
     follow_motion,
     friction_of_setpoint,
+    holding,
     known_friction,
     linear_range,
 )
@@ -91,11 +91,8 @@ def friction_compensation_gains(
     Raises:
         ParameterError: The list has another length than the robot has joints.
     """
-    drives, p = robot.drives, parameters
-    assert drives is not None
-    pole = per_joint(
-        robot, "controller.friction_compensation.bandwidth", p.bandwidth, drives.bandwidth
-    )
+    p = parameters
+    drives, pole = drives_and_poles(robot, "friction_compensation", p.bandwidth)
     kp, ki, kd = critically_damped_gains(drives.inertia, viscous, pole)
     fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
     friction, count = p.friction_share * known_friction(robot), drives.encoder_step
@@ -106,18 +103,7 @@ def friction_compensation_gains(
     return np.stack(columns, axis=1)
 
 
-def begin(memory: Array, measured: Array, effort: Array) -> None:
-    """Start at rest; the integrals hold the arm where it is."""
-    begin_motion(memory, measured)
-    memory[:, _INTEGRAL] = effort
-
-
-def shift(memory: Array, effort: Array) -> None:
-    """Let the integrals take over what the feedforward no longer gives."""
-    memory[:, _INTEGRAL] += effort
-
-
 FRICTION_COMPENSATION = Controller(
     "friction_compensation", FrictionCompensationParameters, friction_compensation_gains,
-    friction_compensation_control, MEMORY + 1, begin, shift,
+    friction_compensation_control, MEMORY + 1, *holding(_INTEGRAL),
 )  # fmt: skip

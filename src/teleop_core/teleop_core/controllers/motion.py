@@ -23,6 +23,7 @@ import math
 
 import numpy as np
 
+from teleop_core.controllers import Begin, Shift
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 from teleop_core.portable import exponential
@@ -125,9 +126,26 @@ def beyond(value: float, room: float) -> float:
     return value - min(max(value, -room), room)
 
 
-def begin_motion(memory: Array, measured: Array) -> None:
+def begin_motion(memory: Array, measured: Array, _effort: Array) -> None:
     """Let the estimates of all joints (n, m) begin at rest at ``measured`` (n,)."""
     memory[:, 0] = memory[:, 3] = memory[:, 7] = measured
+
+
+def holding(column: int) -> tuple[Begin, Shift]:
+    """``begin`` and ``shift`` of a law one column of whose memory holds the arm at rest.
+
+    It starts at rest with all the effort that the arm needs there, and takes over what the
+    feedforward no longer gives.
+    """
+
+    def begin(memory: Array, measured: Array, effort: Array) -> None:
+        begin_motion(memory, measured, effort)
+        memory[:, column] = effort
+
+    def shift(memory: Array, effort: Array) -> None:
+        memory[:, column] += effort
+
+    return begin, shift
 
 
 def linear_range(robot: Robot, pole: Array, stiffness: float) -> Array:

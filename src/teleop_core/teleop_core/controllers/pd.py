@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.controllers import Controller, per_joint
+from teleop_core.controllers import Controller, drives_and_poles
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 from teleop_core.parameters import parameter
@@ -49,9 +49,7 @@ def pd_gains(parameters: PdParameters, robot: Robot, viscous: Array) -> Array:
     Raises:
         ParameterError: The list has another length than the robot has joints.
     """
-    drives = robot.drives
-    assert drives is not None
-    bandwidth = per_joint(robot, "controller.pd.bandwidth", parameters.bandwidth, drives.bandwidth)
+    drives, bandwidth = drives_and_poles(robot, "pd", parameters.bandwidth)
     kd = (2.0 * bandwidth * drives.inertia - viscous).clip(min=0.0)
     return np.stack((bandwidth**2 * drives.inertia, kd), axis=1)
 

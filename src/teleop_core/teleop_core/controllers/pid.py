@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.controllers import Controller, per_joint
+from teleop_core.controllers import Controller, drives_and_poles, per_joint
 from teleop_core.controllers.motion import approach
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
@@ -165,9 +165,7 @@ def pid_gains(parameters: PidParameters, robot: Robot, viscous: Array) -> Array:
     Raises:
         ParameterError: A list has another length than the robot has joints.
     """
-    drives = robot.drives
-    assert drives is not None
-    bandwidth = per_joint(robot, "controller.pid.bandwidth", parameters.bandwidth, drives.bandwidth)
+    drives, bandwidth = drives_and_poles(robot, "pid", parameters.bandwidth)
     designed = critically_damped_gains(drives.inertia, viscous, bandwidth)
     given = (("kp", parameters.kp), ("ki", parameters.ki), ("kd", parameters.kd))
     columns = [

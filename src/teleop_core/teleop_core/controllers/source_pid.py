@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.controllers import Controller, per_joint
+from teleop_core.controllers import Controller, drives_and_poles, per_joint
 from teleop_core.controllers.pid import critically_damped_gains
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
@@ -81,11 +81,7 @@ def source_pid_gains(parameters: SourcePidParameters, robot: Robot, viscous: Arr
     Raises:
         ParameterError: A list has another length than the robot has joints.
     """
-    drives = robot.drives
-    assert drives is not None
-    pole = per_joint(
-        robot, "controller.source_pid.bandwidth", parameters.bandwidth, drives.bandwidth
-    )
+    drives, pole = drives_and_poles(robot, "source_pid", parameters.bandwidth)
     double = pole**2 * drives.inertia, np.zeros(robot.n), 2.0 * pole * drives.inertia - viscous
     triple = critically_damped_gains(drives.inertia, viscous, pole)
     loaded = loaded_axes(robot)

@@ -6,9 +6,8 @@ from typing import Protocol, TypeVar, cast
 from teleop_core.bags.reader import Bag
 from teleop_core.errors import EvaluationError
 from teleop_core.evaluation.origin import Origin
-from teleop_core.evaluation.span import Span
 from teleop_core.evaluation.state_history import StateHistory
-from teleop_core.evaluation.windows import Window
+from teleop_core.evaluation.windows import Span, Window
 from teleop_core.topics import Topic
 
 

@@ -6,8 +6,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from teleop_core.evaluation.published import published_for
-from teleop_core.evaluation.rows import Row
-from teleop_core.evaluation.summary import Line, side_by_side
+from teleop_core.evaluation.rows import Line, Row, side_by_side
 
 if TYPE_CHECKING:
     from teleop_core.evaluation.score import Score

@@ -4,11 +4,13 @@ from abc import ABC, abstractmethod
 from itertools import product
 from typing import ClassVar, NamedTuple
 
+from teleop_core.evaluation.accumulators import Moments, Spread
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.plain import Leaf, Values, leaves, plain
-from teleop_core.evaluation.rows import Row, row
+from teleop_core.evaluation.rows import Row, error_rows, row
 from teleop_core.evaluation.windows import Window
+from teleop_core.geometry import Array
 from teleop_core.topics import Topic
 
 SPREAD_MEANING = "rms, sample S.D. (n − 1), largest"
@@ -103,3 +105,37 @@ def _row(name: str, label: str, unit: str, value: Leaf) -> Row:
     if isinstance(value, float) or value is None:
         return row(group, text, unit, value)
     return Row(group, text, unit, str(value))
+
+
+class SpreadMetric(Metric):
+    """Spread of an error that every sample has.
+
+    Attributes:
+        group: Of its rows.
+        label: What is off.
+        unit: Of the error.
+    """
+
+    group: ClassVar[str]
+    label: ClassVar[str] = "position"
+    unit: ClassVar[str] = "mm"
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._error = Moments()
+
+    @abstractmethod
+    def errors(self, window: Window) -> Array:
+        """Errors (N,) of the samples of a window."""
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        self._error.add(self.errors(window))
+
+    def values(self) -> Spread:
+        """Spread so far, in the metric's unit."""
+        return self._error.spread()
+
+    def rows(self) -> list[Row]:
+        """Root mean square and maximum."""
+        return error_rows(self.group, self.label, self.unit, self.values())

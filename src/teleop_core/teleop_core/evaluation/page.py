@@ -18,9 +18,9 @@ from teleop_core.evaluation.packing import bits_within, deflated, pack
 from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_core.evaluation.preview import preview
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE
+from teleop_core.evaluation.rows import is_compared, side_by_side
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.scoring import Study
-from teleop_core.evaluation.summary import is_compared, side_by_side
 from teleop_core.evaluation.traces import spacing_s
 
 _ROOM = 6_800_000

@@ -79,7 +79,7 @@ METRICS: Registry[type[Metric]] = Registry(
     "metric",
     "metrics",
     {
-        "samples": f"{_FOLDER}.samples:SamplesMetric",
+        "samples": f"{_FOLDER}.counts:SamplesMetric",
         "replay": f"{_FOLDER}.replay:ReplayMetric",
         "path": f"{_FOLDER}.path:PathMetric",
         "reach": f"{_FOLDER}.reach:ReachMetric",
@@ -87,8 +87,8 @@ METRICS: Registry[type[Metric]] = Registry(
         "asked_error_deg": f"{_FOLDER}.asked_error:AskedTurnMetric",
         "position_error_mm": f"{_FOLDER}.position_error:PositionErrorMetric",
         "orientation_error_deg": f"{_FOLDER}.orientation_error:OrientationErrorMetric",
-        "true_error_mm": f"{_FOLDER}.true_error:TrueErrorMetric",
-        "command_error_mm": f"{_FOLDER}.command_error:CommandErrorMetric",
+        "true_error_mm": f"{_FOLDER}.position_error:TrueErrorMetric",
+        "command_error_mm": f"{_FOLDER}.position_error:CommandErrorMetric",
         "command_orientation_error_deg":
             f"{_FOLDER}.orientation_error:CommandOrientationErrorMetric",
         "fixture": f"{_FOLDER}.fixture:FixtureMetric",
@@ -96,9 +96,9 @@ METRICS: Registry[type[Metric]] = Registry(
         "contact": f"{_FOLDER}.contact:ContactMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",
         "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
-        "ticks": f"{_FOLDER}.ticks:TicksMetric",
-        "nodes": f"{_FOLDER}.nodes:NodesMetric",
-        "topics": f"{_FOLDER}.topics:TopicsMetric",
+        "ticks": f"{_FOLDER}.counts:TicksMetric",
+        "nodes": f"{_FOLDER}.counts:NodesMetric",
+        "topics": f"{_FOLDER}.counts:TopicsMetric",
     },
     check_metric,
 )  # fmt: skip

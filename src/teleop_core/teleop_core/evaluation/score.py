@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, NoReturn, TypeVar, cast
 from teleop_core.errors import EvaluationError, UnknownNameError
 from teleop_core.evaluation.accumulators import Delay, Spread
 from teleop_core.evaluation.metric import Key
+from teleop_core.evaluation.metrics.counts import Counts, Samples, Ticks, TopicScore
 from teleop_core.evaluation.metrics.fixture import FixtureScore
-from teleop_core.evaluation.metrics.nodes import Counts
 from teleop_core.evaluation.metrics.orientation_error import OrientationError
 from teleop_core.evaluation.metrics.reach import ReachScore
-from teleop_core.evaluation.metrics.samples import Samples
-from teleop_core.evaluation.metrics.ticks import Ticks
-from teleop_core.evaluation.metrics.topics import TopicScore
 from teleop_core.evaluation.plain import Leaf, Plain, Values, leaves, plain
 from teleop_core.evaluation.registry import METRICS, SESSION
 from teleop_core.evaluation.rows import Row, number

@@ -23,9 +23,16 @@ from teleop_core.evaluation.plain import Plain, leaves, plain
 from teleop_core.evaluation.registry import all_metrics
 from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Result, Score, Session
-from teleop_core.evaluation.span import Seconds, Span, span_of
 from teleop_core.evaluation.state_history import StateHistory, read_history
-from teleop_core.evaluation.windows import DisorderError, Window, whole, windows
+from teleop_core.evaluation.windows import (
+    DisorderError,
+    Seconds,
+    Span,
+    Window,
+    span_of,
+    whole,
+    windows,
+)
 from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)

@@ -8,9 +8,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE, published_for
-from teleop_core.evaluation.rows import MISSING, Row
+from teleop_core.evaluation.rows import MISSING, Row, is_compared, side_by_side
 from teleop_core.evaluation.score import Score, Session
-from teleop_core.evaluation.summary import is_compared, side_by_side
 from teleop_core.texts import printable
 
 MET, NOT_MET = "✓", "✗"

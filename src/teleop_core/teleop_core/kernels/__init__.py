@@ -19,7 +19,8 @@ through them, coverage counts their lines, and everything is some hundred times 
 """
 
 import linecache
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from difflib import get_close_matches
 from functools import partial
 from types import FunctionType
 from typing import Any, ParamSpec, Protocol, TypeVar
@@ -29,8 +30,67 @@ import numpy as np
 
 from teleop_core.kernels.callables import raise_pending
 from teleop_core.kernels.dependencies import Tokens, hexdigest
-from teleop_core.kernels.fields import record_dtype
-from teleop_core.kernels.versions import check_version
+
+_NUMPY_RECORD: Any = np.record  # numpy's types call its parents final
+
+
+class Record(_NUMPY_RECORD):
+    """One record, whose attributes are its fields first of all.
+
+    With :class:`numpy.record` a field named ``size``, ``min`` or ``data`` gives what every NumPy
+    number has under that name; compiled kernels know fields only.
+    """
+
+    def __getattribute__(self, name: str) -> Any:
+        """Value of a field, else what NumPy has of that name."""
+        fields = np.void.__getattribute__(self, "dtype").fields
+        if name in fields:
+            return self[name]
+        try:
+            return super().__getattribute__(name)
+        except AttributeError:
+            raise AttributeError(_missing(name, fields)) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set a field; there is nothing else to set."""
+        fields = np.void.__getattribute__(self, "dtype").fields
+        if name not in fields:
+            raise AttributeError(_missing(name, fields))
+        self[name] = value
+
+
+def _missing(name: str, fields: Iterable[str]) -> str:
+    """What is wrong with a name, as the compiler's messages have it."""
+    known = list(fields)
+    near = get_close_matches(name, known, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"record has no field {name!r}{hint} (fields: {', '.join(known)})"
+
+
+def record_dtype(fields: Any) -> np.dtype[Any]:
+    """Type of records whose fields are attributes.
+
+    Args:
+        fields: What :class:`numpy.dtype` takes: pairs of name and type, or a dtype.
+    """
+    return np.dtype((Record, np.dtype(fields)))
+
+
+SUPPORTED = ((0, 68), (0, 69))
+"""The first that will do, and the first beyond it that may differ; the same as in setup.py."""
+
+
+def check_version(found: str = numba.__version__) -> None:
+    """Refuse other versions of numba.
+
+    Raises:
+        ImportError: That version is installed; the text says which will do.
+    """
+    first, beyond = SUPPORTED
+    if not first <= tuple(int(part) for part in found.split(".")[:2]) < beyond:
+        lower, upper = (".".join(map(str, version)) for version in SUPPORTED)
+        raise ImportError(f"numba is {found}, must be >= {lower} and < {upper}")
+
 
 __all__ = [
     "IS_COMPILED",
@@ -178,7 +238,7 @@ def records(fields: Any, count: int = 1) -> Any:
         count: Number of records.
 
     Returns:
-        Array of :class:`~teleop_core.kernels.fields.Record`; take ``[0]`` for one record that
+        Array of :class:`~teleop_core.kernels.Record`; take ``[0]`` for one record that
         shares its memory.
     """
     return np.zeros(count, record_dtype(fields))

@@ -1,75 +1,154 @@
 """Asked error: how far the slave's tip is from where the hand would have brought it."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from teleop_core.evaluation.accumulators import Moments, Spread
-from teleop_core.evaluation.asked import ASKED_TOPICS, Asked
+from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
+from teleop_core.evaluation.metric import SPREAD_MEANING, Key, SpreadMetric
+from teleop_core.evaluation.pairing import NONE, latest, same_stamp
 from teleop_core.evaluation.pose_errors import angles_between
-from teleop_core.evaluation.rows import Row, error_rows
 from teleop_core.evaluation.windows import Window
-from teleop_core.topics import SLAVE_MEASURED_CP
+from teleop_core.geometry import Array, quaternion_products
+from teleop_core.signals import STATE
+from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
 
-GROUP = "against what was asked for"
+ASKED_TOPICS = (MASTER_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_MEASURED_CP)
+"""Topics that :class:`Asked` reads."""
+_FIRST_NS = -(2**62)
+
+
+class Asked:
+    """Accumulator of the poses that the hand asks for, window by window.
+
+    The hand asks for where the slave was when it was last engaged or the clutch let go, plus all
+    that the hand has moved since, by the gain, and turned since.
+    """
+
+    def __init__(self, context: Context) -> None:
+        context.read(ASKED_TOPICS)
+        self._history, self._origin = context.history, context.origin
+        self._until_ns = _FIRST_NS
+        # Of the last command: the hand [m] in the slave's axes, the command [m], what was cut off,
+        # and the alignment that was latched last.
+        self._hand, self._command, self._cut = np.zeros(3), np.zeros(3), np.full(3, np.nan)
+        self._alignment, self._pose = np.full(4, np.nan), np.full(7, np.nan)
+        self._stamps, self._asked = np.empty(0, np.int64), np.empty((0, 7))
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        # The last command of the window before is in force until the first of this one.
+        before_ns, before = self._until_ns, self._pose
+        stamps, asked = self._poses(window)
+        self._stamps = np.concatenate(([before_ns], stamps))
+        self._asked = np.concatenate((before[None], asked))
+
+    def at(self, stamp_ns: Integers) -> Array:
+        """Poses (N, 7) asked for at stamps (N,) [ns] of this window; NaN where nothing is."""
+        at = latest(stamp_ns, self._stamps)
+        found: Array = np.where((at == NONE)[:, None], np.nan, self._asked[at])
+        return found
+
+    def _poses(self, window: Window) -> tuple[Integers, Array]:
+        """Stamps (N,) and asked poses (N, 7) of a window's commands; NaN if nothing is."""
+        hand, command = window.around(MASTER_MEASURED_CP), window.samples(SLAVE_SERVO_CP)
+        is_new = command.stamp_ns > self._until_ns
+        stamps, commands = command.stamp_ns[is_new], command.values[is_new]
+        partner = same_stamp(stamps, hand.stamp_ns)
+        stamps, commands = stamps[partner != NONE], commands[partner != NONE]
+        if not len(stamps):
+            return stamps, np.empty((0, 7))
+        hands = hand.values[partner[partner != NONE]]
+        rows = self._history.at(stamps).rows
+        is_held = (rows[:, STATE["is_following"]] == 0.0) | (rows[:, STATE["is_clutched"]] > 0.0)
+        # A stretch begins with the sample after one that is held, which only latches.
+        was_held = np.concatenate(([np.isnan(self._cut).any()], is_held[:-1]))
+        asked = np.empty((len(stamps), 7))
+        places = hands[:, :3] @ self._origin.axes.T
+        cut = self._cuts(rows[:, STATE["gain"], None], places, commands[:, :3], is_held | was_held)
+        asked[:, :3] = commands[:, :3] - cut
+        asked[:, 3:] = self._turned(hands[:, 3:], commands[:, 3:], is_held | was_held)
+        asked[is_held] = np.nan
+        self._until_ns, self._pose = int(stamps[-1]), asked[-1]
+        self._hand, self._command = places[-1], commands[-1, :3]
+        self._cut = np.where(is_held[-1], np.nan, cut[-1])
+        return stamps, asked
+
+    def _cuts(self, gain: Array, hands: Array, commands: Array, begins: NDArray[np.bool_]) -> Array:
+        """What was cut off each command since the slave was last engaged (N, 3) [m]."""
+        moved = np.diff(hands, axis=0, prepend=self._hand[None])
+        cut = np.diff(commands, axis=0, prepend=self._command[None]) - gain * moved
+        cut[begins] = 0.0
+        total = np.cumsum(cut, axis=0)
+        last = _last(begins)
+        before = np.where((last >= 0)[:, None], total[last], -np.nan_to_num(self._cut))
+        found: Array = total - before
+        return found
+
+    def _turned(self, stylus: Array, commands: Array, begins: NDArray[np.bool_]) -> Array:
+        """Asked orientations (N, 4): the tool turns as the stylus since it was engaged."""
+        if self._origin.tool is None:
+            return np.full((len(stylus), 4), np.nan)
+        slave_master, stylus_tool = self._origin.tool
+        tools = quaternion_products(quaternion_products(slave_master, stylus), stylus_tool)
+        latched = quaternion_products(commands, tools * (1.0, -1.0, -1.0, -1.0))
+        last = _last(begins)
+        alignment = np.where((last >= 0)[:, None], latched[last], self._alignment)
+        self._alignment = alignment[-1]
+        return quaternion_products(alignment, tools)
+
+
+def _last(begins: NDArray[np.bool_]) -> Integers:
+    """Index of the last one of the samples (N,) that begins a stretch; -1 before the first."""
+    found: Integers = np.maximum.accumulate(np.where(begins, np.arange(len(begins)), -1))
+    return found
+
+
+_GROUP = "against what was asked for"
 _MEANING = (
     "slave/measured_cp to where the hand has asked it to be since it was engaged or the clutch let "
     "go"
 )
 
 
-class AskedErrorMetric(Metric):
+class AskedErrorMetric(SpreadMetric):
     """Spread of the distance between tip and asked place, [mm].
 
     What limits cut off stays in the error until the next clutch stroke, and the lag of filters and
     interpolation is in it.
     """
 
-    name = "asked_error_mm"
+    name, group = "asked_error_mm", _GROUP
     keys = (Key("asked_error_mm.rms|sd|max", "mm", f"{_MEANING}: {SPREAD_MEANING}"),)
     topics = ASKED_TOPICS
 
     def __init__(self, context: Context) -> None:
-        self._error, self._asked = Moments(), context.shared(Asked)
+        super().__init__(context)
+        self._asked = context.shared(Asked)
 
-    def add(self, window: Window) -> None:
-        """Take one window."""
+    def errors(self, window: Window) -> Array:
+        """Distances (N,) [mm]."""
         measured = window.samples(SLAVE_MEASURED_CP)
         off = measured.values[:, :3] - self._asked.at(measured.stamp_ns)[:, :3]
-        self._error.add(np.linalg.norm(off, axis=1) * 1e3)
-
-    def values(self) -> Spread:
-        """Spread so far, [mm]."""
-        return self._error.spread()
-
-    def rows(self) -> list[Row]:
-        """Root mean square and maximum."""
-        return error_rows(GROUP, "position", "mm", self.values())
+        return np.asarray(np.linalg.norm(off, axis=1) * 1e3)
 
 
-class AskedTurnMetric(Metric):
+class AskedTurnMetric(SpreadMetric):
     """Spread of the angle between the tool and its asked orientation, [deg].
 
     None where ``rotation_gain`` is not 1: the tool then has no orientation that is asked for.
     """
 
-    name = "asked_error_deg"
+    name, group, label, unit = "asked_error_deg", _GROUP, "rotation", "deg"
     keys = (Key("asked_error_deg.rms|sd|max", "deg", f"angle of {_MEANING}: {SPREAD_MEANING}"),)
     topics = ASKED_TOPICS
 
     def __init__(self, context: Context) -> None:
-        self._error, self._asked = Moments(), context.shared(Asked)
+        super().__init__(context)
+        self._asked = context.shared(Asked)
 
-    def add(self, window: Window) -> None:
-        """Take one window."""
+    def errors(self, window: Window) -> Array:
+        """Angles (N,) [deg]."""
         measured = window.samples(SLAVE_MEASURED_CP)
         asked = self._asked.at(measured.stamp_ns)[:, 3:]
-        self._error.add(np.degrees(angles_between(measured.values[:, 3:], asked)))
-
-    def values(self) -> Spread:
-        """Spread so far, [deg]."""
-        return self._error.spread()
-
-    def rows(self) -> list[Row]:
-        """Root mean square and maximum."""
-        return error_rows(GROUP, "rotation", "deg", self.values())
+        return np.degrees(angles_between(measured.values[:, 3:], asked))

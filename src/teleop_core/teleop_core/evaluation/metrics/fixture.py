@@ -7,7 +7,6 @@ import numpy as np
 
 from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.fixture_depth import fixture_depth
 from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.evaluation.published import BOX_OVERSHOOT_MM
@@ -19,6 +18,26 @@ from teleop_core.evaluation.windows import Window
 from teleop_core.fixtures.box import BOX
 from teleop_core.geometry import Array
 from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Topic
+
+
+def fixture_depth(positions: Array, states: States, axes: Array) -> Array:
+    """Distance (N,) [m] of points outside of their fixture to the nearest point of it; zero inside.
+
+    It is NaN for points that are no numbers, and where the fixture's shape is not known here.
+
+    Args:
+        positions: Points in the slave's base, shape (N, 3), [m].
+        states: State at the time of each point, with the fixture on.
+        axes: Rotation (3, 3) from the master's base to the slave's axes.
+    """
+    offsets, gain = positions - states.center, states.column("gain")
+    depth = np.full(len(positions), np.nan)
+    for fixture, count in states.fixture_counts().items():
+        if not fixture.fault:
+            here = states.is_told(fixture) if count < len(positions) else slice(None)
+            depth[here] = fixture.depths(offsets[here], gain[here], axes)
+    return depth
+
 
 GROUP = "virtual fixture"
 

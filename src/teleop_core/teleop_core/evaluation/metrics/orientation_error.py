@@ -15,10 +15,10 @@ from teleop_core.evaluation.figure import (
 )
 from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
-from teleop_core.evaluation.metrics import command_error, position_error
+from teleop_core.evaluation.metrics.position_error import COMMAND_GROUP, GROUP
 from teleop_core.evaluation.pose_errors import PoseErrors
 from teleop_core.evaluation.published import ANGLE_FACTOR, agrees_by_factor
-from teleop_core.evaluation.rows import Row, number, row, spread_rows
+from teleop_core.evaluation.rows import Row, error_rows, number, spread_rows
 from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, tracked
 from teleop_core.evaluation.windows import Window
 
@@ -96,7 +96,7 @@ class OrientationErrorMetric(Metric):
 
     def rows(self) -> list[Row]:
         """The spreads beside the published figures of the mode."""
-        error, mode, group = self.values(), self._gains.published, position_error.GROUP
+        error, mode, group = self.values(), self._gains.published, GROUP
         published = (mode.roll_deg, mode.pitch_deg, mode.yaw_deg) if mode else (None, None, None)
         is_judged = mode is not None and self._gains.is_source
         spreads = (error.roll, error.pitch, error.yaw)
@@ -163,8 +163,4 @@ class CommandOrientationErrorMetric(Metric):
 
     def rows(self) -> list[Row]:
         """Root mean square and maximum of the one rotation."""
-        angle, group = self.values().angle, command_error.GROUP
-        return [
-            row(group, "rotation, RMS", "deg", angle.rms),
-            row(group, "rotation, max", "deg", angle.max),
-        ]
+        return error_rows(COMMAND_GROUP, "rotation", "deg", self.values().angle)

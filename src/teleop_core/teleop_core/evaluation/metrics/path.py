@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.density import is_long, time_spent
 from teleop_core.evaluation.figure import (
     COMMAND,
     DRAWN_FIXTURES,
@@ -17,9 +16,11 @@ from teleop_core.evaluation.figure import (
     Numbers,
     along,
     axis_suffix,
+    is_long,
     line,
     span,
     stacked_axes,
+    time_spent,
 )
 from teleop_core.evaluation.metric import Metric
 from teleop_core.evaluation.metrics.fixture import FixtureMetric

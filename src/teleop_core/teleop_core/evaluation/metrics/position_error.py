@@ -1,23 +1,70 @@
-"""Position error: how far the slave's tip is from its reference of the same tick."""
+"""Position error: how far the slave's tip is from reference and command, and how far it really is.
 
-from teleop_core.evaluation.accumulators import Moments, Spread
+The reference is that of the same tick; the newest command is ahead of it by the filters' lag; the
+true tip is behind what the encoders see.
+"""
+
+import numpy as np
+
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.gains import Gains
-from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
-from teleop_core.evaluation.metrics.command_error import CommandErrorMetric
+from teleop_core.evaluation.metric import SPREAD_MEANING, Key, SpreadMetric
+from teleop_core.evaluation.pairing import same_stamp
+from teleop_core.evaluation.pose_errors import pose_errors
 from teleop_core.evaluation.published import POSITION_SHARE, agrees
 from teleop_core.evaluation.rows import Row, number, spread_rows
-from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, tracked
+from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, rows_of, tracked
 from teleop_core.evaluation.windows import Window
+from teleop_core.geometry import Array
+from teleop_core.topics import SLAVE_TRUE_CP
 
-GROUP = "against filtered reference"
+GROUP, COMMAND_GROUP = "against filtered reference", "against unfiltered command"
 
 
-class PositionErrorMetric(Metric):
+class CommandErrorMetric(SpreadMetric):
+    """Spread of the distance between tip and command, [mm]."""
+
+    name, group = "command_error_mm", COMMAND_GROUP
+    keys = (
+        Key("command_error_mm.rms|sd|max", "mm",
+            f"slave/measured_cp to the latest slave/servo_cp at its stamp: {SPREAD_MEANING}"),
+    )  # fmt: skip
+    topics = TRACKED
+
+    def errors(self, window: Window) -> Array:
+        """Distances (N,) [mm]."""
+        return tracked(window).behind.position_mm
+
+
+class TrueErrorMetric(SpreadMetric):
+    """Spread of the distance between the true tip and the reference, [mm]."""
+
+    name, group = "true_error_mm", "true tip, behind the encoders"
+    keys = (
+        Key("true_error_mm.rms|sd|max", "mm",
+            "slave/true_cp to slave/setpoint_cp of the same tick, null if nobody tells the true "
+            f"tip: {SPREAD_MEANING}"),
+    )  # fmt: skip
+    topics = TRACKED
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        context.read((SLAVE_TRUE_CP,))
+
+    def errors(self, window: Window) -> Array:
+        """Distances (N,) [mm]; none where no true tip was recorded."""
+        found, true = tracked(window), window.around(SLAVE_TRUE_CP)
+        if not len(true):
+            return np.empty(0)
+        tips = rows_of(true, same_stamp(found.stamp_ns, true.stamp_ns))
+        return pose_errors(tips, found.setpoints).position_mm
+
+
+class PositionErrorMetric(SpreadMetric):
     """Spread of the distance between tip and reference, [mm]."""
 
-    name = "position_error_mm"
+    name, group = "position_error_mm", GROUP
     keys = (
         Key("position_error_mm.rms|sd|max", "mm",
             f"slave/measured_cp to slave/setpoint_cp of the same tick: {SPREAD_MEANING}"),
@@ -25,16 +72,13 @@ class PositionErrorMetric(Metric):
     topics = TRACKED
 
     def __init__(self, context: Context) -> None:
-        self._error, self._gains = Moments(), context.shared(Gains)
-        self._trace, self._command = context.shared(ErrorTrace), context.shared(CommandErrorMetric)
+        super().__init__(context)
+        self._gains, self._trace = context.shared(Gains), context.shared(ErrorTrace)
+        self._command = context.shared(CommandErrorMetric)
 
-    def add(self, window: Window) -> None:
-        """Take one window."""
-        self._error.add(tracked(window).against.position_mm)
-
-    def values(self) -> Spread:
-        """Spread so far, [mm]."""
-        return self._error.spread()
+    def errors(self, window: Window) -> Array:
+        """Distances (N,) [mm]."""
+        return tracked(window).against.position_mm
 
     def rows(self) -> list[Row]:
         """The spread beside the published figures of the mode."""

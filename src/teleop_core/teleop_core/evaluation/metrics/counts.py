@@ -1,0 +1,189 @@
+"""Counts: samples that were scored, ticks, messages, and what nodes of a live session counted."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.bags.reader import Bag
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Key, Metric
+from teleop_core.evaluation.rows import MISSING, Row
+from teleop_core.evaluation.stamps import StampTallies
+from teleop_core.evaluation.tracking import TRACKED, tracked
+from teleop_core.evaluation.windows import Window
+from teleop_core.topics import DIAGNOSTICS, SLAVE_MEASURED_CP
+
+Counts = dict[str, dict[str, int]]
+
+
+class NodesMetric(Metric):
+    """Counts that each node reported last; none in virtual time, where no node reports."""
+
+    name = "nodes"
+    keys = (
+        Key("nodes.<node>.<name>", "1", "counts that the nodes reported last on diagnostics"),
+    )  # fmt: skip
+
+    def __init__(self, context: Context) -> None:
+        self._counts = _read_counts(context.bag)
+
+    def add(self, window: Window) -> None:
+        """Nothing: reports are no streams."""
+
+    def values(self) -> Counts:
+        """Counts per node and name."""
+        return self._counts
+
+    def rows(self) -> list[Row]:
+        """None: they are for JSON."""
+        return []
+
+
+def _read_counts(bag: Bag) -> Counts:
+    """Counts per node and name; empty without diagnostics."""
+    counts: Counts = {}
+    info = bag.topics.get(DIAGNOSTICS.name)
+    for report in bag.reports(DIAGNOSTICS) if info is not None and info.count else ():
+        found = {key: int(text) for key, text in report.values.items() if _is_whole(text)}
+        counts.setdefault(report.name.strip("/"), {}).update(found)
+    return counts
+
+
+def _is_whole(text: str) -> bool:
+    return text.isascii() and text.removeprefix("-").isdigit()
+
+
+GROUP = "counts"
+_FORMER = "slave_sim"  # which counted the ticks before the slave had a server
+
+
+@dataclass(frozen=True)
+class Ticks:
+    """Control ticks of the slave.
+
+    Attributes:
+        executed: Ticks executed.
+        late: Ticks begun late; None if nobody counted them (virtual time, foreign slaves).
+        missed: Ticks that were due and never executed.
+    """
+
+    executed: int
+    late: int | None
+    missed: int
+
+
+class TicksMetric(Metric):
+    """Ticks from the slave's own report if there is one, else from the samples it published."""
+
+    name = "ticks"
+    keys = (
+        Key("ticks.executed|late|missed", "1",
+            "control ticks of the slave; late is null if uncounted"),
+    )  # fmt: skip
+    topics = (SLAVE_MEASURED_CP,)
+
+    def __init__(self, context: Context) -> None:
+        self._nodes, self._stamps = context.shared(NodesMetric), context.shared(StampTallies)
+        self._samples = context.expected(SLAVE_MEASURED_CP)
+        self._slave = context.origin.writer(SLAVE_MEASURED_CP)
+
+    def add(self, window: Window) -> None:
+        """Nothing: stamps and reports are counted by others."""
+
+    def values(self) -> Ticks:
+        """Ticks of the whole recording."""
+        nodes = self._nodes.values()
+        own = nodes.get(self._slave) or nodes.get(_FORMER) or {}
+        gaps = self._stamps.of[SLAVE_MEASURED_CP.name].gaps()
+        return Ticks(own.get("ticks", self._samples), own.get("late"), own.get("missed", gaps))
+
+    def rows(self) -> list[Row]:
+        """All three in one row."""
+        ticks = self.values()
+        late = MISSING if ticks.late is None else str(ticks.late)
+        text = f"{ticks.executed}/{late}/{ticks.missed}"
+        return [Row(GROUP, "ticks done/late/missed", "", text)]
+
+
+@dataclass(frozen=True)
+class TopicScore:
+    """Messages of a topic, and how many are missing by their stamps (None if not a stream)."""
+
+    count: int
+    gaps: int | None
+
+
+class TopicsMetric(Metric):
+    """Counts and gaps of everything that was recorded."""
+
+    name = "topics"
+    keys = (
+        Key("topics.<name>.count", "1", "messages"),
+        Key("topics.<name>.gaps", "1",
+            "messages missing by their stamps, lost or passed over by a stage that takes only the "
+            "newest; null if not a stream"),
+    )  # fmt: skip
+
+    def __init__(self, context: Context) -> None:
+        self._infos, self._stamps = context.bag.topics, context.shared(StampTallies)
+
+    def add(self, window: Window) -> None:
+        """Nothing: stamps are counted by others too."""
+
+    def values(self) -> dict[str, TopicScore]:
+        """Score of each topic, in the order of their names."""
+        stamps = self._stamps.of
+        return {
+            name: TopicScore(info.count, stamps[name].gaps() if name in stamps else None)
+            for name, info in sorted(self._infos.items())
+        }
+
+    def rows(self) -> list[Row]:
+        """Sums over all topics."""
+        topics = self.values().values()
+        return [
+            Row(GROUP, "messages", "", str(sum(topic.count for topic in topics))),
+            Row(GROUP, "messages missing", "", str(sum(topic.gaps or 0 for topic in topics))),
+        ]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """How many slave poses were scored, and why others were not."""
+
+    scored: int
+    unpaired: int
+    invalid: int
+
+
+class SamplesMetric(Metric):
+    """Counts the poses that the errors are of."""
+
+    name = "samples"
+    keys = (
+        Key("samples.scored", "1", "slave poses with their reference"),
+        Key("samples.unpaired", "1", "slave poses whose reference was lost on the way"),
+        Key("samples.invalid", "1",
+            "slave poses or references with NaN or without a direction"),
+    )  # fmt: skip
+    topics = TRACKED
+
+    def __init__(self, context: Context) -> None:
+        self._scored = self._unpaired = self._invalid = 0
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        found = tracked(window)
+        has_angle = np.isfinite(found.against.angle_deg)
+        is_valid = np.isfinite(found.against.position_mm) & has_angle
+        self._scored += int(has_angle.sum())
+        self._unpaired += int((~found.is_paired).sum())
+        self._invalid += int((~is_valid & found.is_paired).sum())
+
+    def values(self) -> Samples:
+        """Counts so far."""
+        return Samples(self._scored, self._unpaired, self._invalid)
+
+    def rows(self) -> list[Row]:
+        """None: tables count messages and ticks."""
+        return []
