@@ -31,50 +31,20 @@ import numpy as np
 from teleop_core.kernels.callables import raise_pending
 from teleop_core.kernels.dependencies import Tokens, hexdigest
 
-_NUMPY_RECORD: Any = np.record  # numpy's types call its parents final
-
-
-class Record(_NUMPY_RECORD):
-    """One record, whose attributes are its fields first of all.
-
-    With :class:`numpy.record` a field named ``size``, ``min`` or ``data`` gives what every NumPy
-    number has under that name; compiled kernels know fields only.
-    """
-
-    def __getattribute__(self, name: str) -> Any:
-        """Value of a field, else what NumPy has of that name."""
-        fields = np.void.__getattribute__(self, "dtype").fields
-        if name in fields:
-            return self[name]
-        try:
-            return super().__getattribute__(name)
-        except AttributeError:
-            raise AttributeError(_missing(name, fields)) from None
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        """Set a field; there is nothing else to set."""
-        fields = np.void.__getattribute__(self, "dtype").fields
-        if name not in fields:
-            raise AttributeError(_missing(name, fields))
-        self[name] = value
-
-
-def _missing(name: str, fields: Iterable[str]) -> str:
-    """What is wrong with a name, as the compiler's messages have it."""
-    known = list(fields)
-    near = get_close_matches(name, known, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"record has no field {name!r}{hint} (fields: {', '.join(known)})"
-
-
-def record_dtype(fields: Any) -> np.dtype[Any]:
-    """Type of records whose fields are attributes.
-
-    Args:
-        fields: What :class:`numpy.dtype` takes: pairs of name and type, or a dtype.
-    """
-    return np.dtype((Record, np.dtype(fields)))
-
+__all__ = [
+    "IS_COMPILED",
+    "Kernel",
+    "bare",
+    "bound",
+    "inner",
+    "is_kernel",
+    "kernel",
+    "kernel_from_source",
+    "pointer",
+    "raise_pending",
+    "record_dtype",
+    "records",
+]
 
 SUPPORTED = ((0, 68), (0, 69))
 """The first that will do, and the first beyond it that may differ; the same as in setup.py."""
@@ -91,21 +61,6 @@ def check_version(found: str = numba.__version__) -> None:
         lower, upper = (".".join(map(str, version)) for version in SUPPORTED)
         raise ImportError(f"numba is {found}, must be >= {lower} and < {upper}")
 
-
-__all__ = [
-    "IS_COMPILED",
-    "Kernel",
-    "bare",
-    "bound",
-    "inner",
-    "is_kernel",
-    "kernel",
-    "kernel_from_source",
-    "pointer",
-    "raise_pending",
-    "record_dtype",
-    "records",
-]
 
 _config: Any = numba.config
 IS_COMPILED = not _config.DISABLE_JIT
@@ -270,3 +225,48 @@ def bare(value: Any) -> Any:
     if isinstance(value, np.record):
         return value.view(np.dtype((np.void, value.dtype)))
     return value
+
+
+_NUMPY_RECORD: Any = np.record  # numpy's types call its parents final
+
+
+class Record(_NUMPY_RECORD):
+    """One record, whose attributes are its fields first of all.
+
+    With :class:`numpy.record` a field named ``size``, ``min`` or ``data`` gives what every NumPy
+    number has under that name; compiled kernels know fields only.
+    """
+
+    def __getattribute__(self, name: str) -> Any:
+        """Value of a field, else what NumPy has of that name."""
+        fields = np.void.__getattribute__(self, "dtype").fields
+        if name in fields:
+            return self[name]
+        try:
+            return super().__getattribute__(name)
+        except AttributeError:
+            raise AttributeError(_missing(name, fields)) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set a field; there is nothing else to set."""
+        fields = np.void.__getattribute__(self, "dtype").fields
+        if name not in fields:
+            raise AttributeError(_missing(name, fields))
+        self[name] = value
+
+
+def _missing(name: str, fields: Iterable[str]) -> str:
+    """What is wrong with a name, as the compiler's messages have it."""
+    known = list(fields)
+    near = get_close_matches(name, known, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"record has no field {name!r}{hint} (fields: {', '.join(known)})"
+
+
+def record_dtype(fields: Any) -> np.dtype[Any]:
+    """Type of records whose fields are attributes.
+
+    Args:
+        fields: What :class:`numpy.dtype` takes: pairs of name and type, or a dtype.
+    """
+    return np.dtype((Record, np.dtype(fields)))
