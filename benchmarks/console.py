@@ -63,7 +63,7 @@ def _watched(
     )
     assert process.stdout is not None
     for line in process.stdout:
-        if "haptic_master is ready" in line:
+        if "operator is ready" in line:
             break
     page = _open() if has_browser else None
     time.sleep(_START)

@@ -50,7 +50,7 @@ def run_session(kind: str, folder: Path, duration: float) -> End:
     temporary.mkdir(parents=True)
     command = [sys.executable, "-m", "teleop_core.cli", "live", "--out", str(folder / "bag")]
     command += ["--duration", f"{duration}", "--set", "operator.approach_time=0.1"]
-    command += ["--set", "haptic_master.patience=0.0", *KINDS[kind]]
+    command += ["--set", "operator.patience=0.0", *KINDS[kind]]
     begin = time.monotonic()
     done = subprocess.run(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,

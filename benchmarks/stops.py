@@ -28,7 +28,7 @@ from std_msgs.msg import Bool
 from teleop_core.bags.layouts import layout
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.operation import STOP_TOPIC
-from teleop_core.nodes.operator import Operator
+from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.streams import Subscription
 from teleop_core.robots import load_robot
 from teleop_core.topics import SLAVE_SETPOINT_JS
@@ -114,7 +114,7 @@ def session(folder: Path, domain: str, priority: int, is_composed: bool) -> subp
     for setting in (
         f"real_time.priority={priority}",
         "operator.approach_time=1.0",
-        "haptic_master.patience=0.0",
+        "operator.patience=0.0",
     ):
         command += ["--set", setting]
     return subprocess.Popen(
@@ -131,7 +131,7 @@ def measure(count: int, priority: int, is_composed: bool) -> list[float]:
         running = session(Path(folder), domain, priority, is_composed)
         tap, found = Tap(int(domain)), []
         try:
-            with Operator(int(domain), patience=_PATIENCE) as operator:
+            with RemoteControl(int(domain), patience=_PATIENCE) as operator:
                 while not operator.look()[""].values["is_homed"]:
                     operator.listen()
                 for _ in range(count):

@@ -19,7 +19,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.nodes.chances import Chances
 
 TIMEOUT = 90.0
-QUICK = ("operator.approach_time=1.0", "haptic_master.patience=0.0")
+QUICK = ("operator.approach_time=1.0", "operator.patience=0.0")
 
 
 class LiveProcess:

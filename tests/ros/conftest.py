@@ -144,6 +144,11 @@ def _is_of_arm(key: str) -> bool:
     return name in its - mine
 
 
+def _is_of_hand(key: str) -> bool:
+    """Whether a parameter, with double underscores for dots, is that of the operator alone."""
+    return key == "patience" or key.startswith(("operator__", "buttons__"))
+
+
 class Peer:
     """A ROS node of the test beside the nodes under test, on a domain of its own."""
 
@@ -191,13 +196,27 @@ class Peer:
         """Start a node; double underscores in names stand for dots.
 
         A slave starts at home unless it is told otherwise, so that it follows at once. With one
-        that is to work, its simulated arm is started, which gets the parameters that are its own.
+        that is to work, its simulated arm is started, which gets the parameters that are its own,
+        and with a haptic master the operator who holds it.
         """
-        if name == "slave_sim" and not parameters and (running := self._simulator(arm)):
+        if name == "haptic_master":
+            own = {key: parameters.pop(key) for key in set(parameters) if _is_of_hand(key)}
+            if (
+                has_arm
+                and parameters.get("autostart", True)
+                and self._runs("operator", arm) is None
+            ):
+                named = {key.removeprefix("operator__"): value for key, value in own.items()}
+                self.start("operator", wait, arm=arm, env=env, **named)
+        if name == "slave_sim" and not parameters and (running := self._runs(name, arm)):
             return running
         if name == "slave":
             own = {key: parameters.pop(key) for key in set(parameters) if _is_of_arm(key)}
-            if has_arm and parameters.get("autostart", True) and self._simulator(arm) is None:
+            if (
+                has_arm
+                and parameters.get("autostart", True)
+                and self._runs("slave_sim", arm) is None
+            ):
                 robot = {key: parameters[key] for key in ("robot",) if key in parameters}
                 self.start("slave_sim", wait, arm=arm, env=env, **robot, **own)
             home = load_robot(parameters.get("robot", "rcrt1")).home.tolist()
@@ -210,9 +229,9 @@ class Peer:
             self.wait_state(node.name, wait)
         return node
 
-    def _simulator(self, arm: str) -> NodeProcess | None:
-        """Simulated arm of a namespace that runs."""
-        name = f"{arm}/slave_sim" if arm else "slave_sim"
+    def _runs(self, stage: str, arm: str) -> NodeProcess | None:
+        """Node of a stage in a namespace that runs."""
+        name = f"{arm}/{stage}" if arm else stage
         found = (n for n in self.nodes if n.name == name and n.process.poll() is None)
         return next(found, None)
 

@@ -20,12 +20,12 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 def live(tmp_path_factory):
     """A session behind a page, its link, and where it is recorded."""
     out = tmp_path_factory.mktemp("console") / "bag"
-    texts = ["operator=remote", "teleop.duration=3600.0", "haptic_master.patience=0.0"]
+    texts = ["operator=remote", "teleop.duration=3600.0", "operator.patience=0.0"]
     said = []
     with ConsoleSession(api.configuration(None, texts=texts), out, said.append) as session:
         link = session.link()
         with link:
-            wait_until(lambda: any("haptic_master is ready" in line for line in said), "nodes")
+            wait_until(lambda: any("operator is ready" in line for line in said), "nodes")
             view = link.view()
             wait_until(lambda: link.view().arms[""].state and view.recording, "reports")
             wait_until(lambda: len(link.view().arms[""].streams) == len(SEEN), "streams")

@@ -22,7 +22,7 @@ PULLED = 0.012  # m
 # Software draws the page with the processors that the session needs: a small one.
 SIZE = (1000, 560)  # px
 # A browser that waits for a processor sends late, which is no reason to let go of the stylus.
-PATIENT = "haptic_master.operator.remote.timeout=1.5"  # s
+PATIENT = "operator.remote.timeout=1.5"  # s
 # The hand's mass swings a little.
 SHARE, STILL = 0.15, 2e-4  # m
 

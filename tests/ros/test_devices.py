@@ -12,7 +12,7 @@ from teleop_core.errors import SessionError
 from teleop_core.nodes.device_hand import DeviceHand
 from teleop_core.operators import OPERATORS
 from teleop_core.operators.remote import AHEAD, RemoteHand
-from teleop_core.topics import MASTER_BUTTONS
+from teleop_core.topics import HAND_BUTTONS
 
 pytestmark = pytest.mark.ros
 NODE = SimpleNamespace(get_logger=lambda: get_logger("devices"))
@@ -102,7 +102,7 @@ def test_no_gamepad_is_an_error_of_whoever_opens_it():
 
 @pytest.mark.parametrize("name", ["gamepad", "spacemouse"])
 def test_a_node_without_its_device_says_so_in_one_line_and_ends(peer, name):
-    node = peer.start("haptic_master", wait="", operator__kind=name, operator__remote__delay=0.1)
+    node = peer.start("operator", wait="", kind=name, remote__delay=0.1)
     assert node.wait() == 2
     said = node.stderr.read_text()
     assert "configure refused: no " in said
@@ -111,7 +111,7 @@ def test_a_node_without_its_device_says_so_in_one_line_and_ends(peer, name):
 
 
 def test_a_node_with_a_hand_ends_in_order(peer):
-    buttons = peer.listen(MASTER_BUTTONS)
-    node = peer.start("haptic_master", operator__kind="remote", patience=0.0)
+    buttons = peer.listen(HAND_BUTTONS)
+    node = peer.start("operator", kind="remote", patience=0.0)
     peer.wait(lambda: buttons.take() > 100, "samples")
     assert node.end(signal.SIGINT) == 0

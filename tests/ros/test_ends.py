@@ -90,7 +90,7 @@ def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer):
 @pytest.fixture
 def composed(compose):
     """Process of the composed session, all its nodes active."""
-    return compose(haptic_master={"operator": {"approach_time": 1.0}, "patience": 0.0})
+    return compose(operator={"approach_time": 1.0, "patience": 0.0})
 
 
 @pytest.mark.parametrize("name", ["slave", "recorder"])

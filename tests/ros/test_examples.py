@@ -7,7 +7,7 @@ import pytest
 
 from example_runs import EXAMPLES, numbers, run
 from teleop_core.nodes.children import environment, free_domain
-from teleop_core.nodes.operator import Operator
+from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.operation import State
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
@@ -53,7 +53,7 @@ def test_a_crtk_client_moves_the_tip_and_comes_back_whatever_the_drives(tmp_path
     nodes = [subprocess.Popen([sys.executable, *command], env=env) for command in commands]
     try:
         text = run("crtk_client", tmp_path, **env)
-        with Operator(int(env["ROS_DOMAIN_ID"]), patience=30.0) as operator:
+        with RemoteControl(int(env["ROS_DOMAIN_ID"]), patience=30.0) as operator:
             assert operator.stop()[""].values["state"] == State.FAULT
     finally:
         for node in nodes:

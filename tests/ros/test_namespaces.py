@@ -18,7 +18,7 @@ from teleop_core.robots import load_robot
 
 pytestmark = pytest.mark.ros
 
-PATIENCE = {"patience": 0.0, "operator": {"approach_time": 1.0}}
+PATIENCE = {"patience": 0.0, "approach_time": 1.0}
 PUMA, RCRT1 = ({"start": load_robot(name).home.tolist()} for name in ("puma560", "rcrt1"))
 """Slaves that follow at once."""
 MEASURED = topics.SLAVE_MEASURED_CP.name
@@ -66,7 +66,7 @@ def recorded(peer, process, tmp_path, *slaves):
 def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
     peer, start, tmp_path
 ):
-    groups = {"haptic_master": PATIENCE, "slave": RCRT1 | {"command_timeout": 0.25}}
+    groups = {"operator": PATIENCE, "slave": RCRT1 | {"command_timeout": 0.25}}
     process = start(groups, "-r", "__ns:=/left", "-r", "__node:=arm")
     peer.wait_state("left/slave", "active")
     assert parameter(peer, "/left/slave", "command_timeout").double_value == 0.25
@@ -75,9 +75,9 @@ def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
         names = peer.node.get_node_names_and_namespaces()
         return {name for name, where in names if where == "/left"}
 
-    peer.wait(lambda: len(inside()) >= 6, "all nodes to be found")
+    peer.wait(lambda: len(inside()) >= 7, "all nodes to be found")
     assert inside() == {
-        "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim",
+        "operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim",
         "recorder",
     }  # fmt: skip
     bag = recorded(peer, process, tmp_path, "left/slave")
@@ -93,7 +93,7 @@ def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(peer, start, tmp_p
     puma = {"robot": "puma560"}
     groups = {
         "teleop": {"arms": ["left", "right"]},
-        "haptic_master": PATIENCE,
+        "operator": PATIENCE,
         "slave": RCRT1,
         "right/slave": puma | PUMA,
         "right/slave_sim": puma,

@@ -366,7 +366,7 @@ def test_a_refused_configure_leaves_the_node_usable_by_the_supervisor(peer, tmp_
         ("slave", "command_timeout: 50.0", "between 0.002 and 5 s"),
         ("slave_sim", "integration_steps: 1.5", "of type int"),
         ("slave", "robot: nobot", "rcrt1"),
-        ("haptic_master", "operator: {kind: bag, bag: /no/such/bag}", "No such file"),
+        ("operator", "{kind: bag, bag: /no/such/bag}", "No such file"),
         ("recorder", "out: /tmp", "exists already"),
         ("slave", "bad: [1.0", "is not YAML"),
     ],

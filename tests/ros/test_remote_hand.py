@@ -7,10 +7,10 @@ import pytest
 
 from teleop_core.operators.rest import rest_pose
 from teleop_core.topics import (
-    HAND_BUTTONS,
-    HAND_SERVO_CP,
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
+    OPERATOR_BUTTONS,
+    OPERATOR_SERVO_CP,
     SLAVE_MEASURED_CP,
 )
 
@@ -27,7 +27,7 @@ class Person:
 
     def __init__(self, peer):
         self.peer = peer
-        peer.publisher(HAND_SERVO_CP)
+        peer.publisher(OPERATOR_SERVO_CP)
 
     def hold(self, place, until, what):
         """Want the stylus at a place from the inkwell [m] until something is so."""
@@ -35,7 +35,7 @@ class Person:
         pose[:3] += place
 
         def turn():
-            self.peer.send(HAND_SERVO_CP, time.time_ns(), pose)
+            self.peer.send(OPERATOR_SERVO_CP, time.time_ns(), pose)
             time.sleep(0.02)  # the rate of poses, not a wait
             return until()
 
@@ -51,15 +51,15 @@ class Person:
 def session(compose):
     """Composed session whose hand is a person's; a machine that stands still is no outage here."""
     return compose(
-        haptic_master={"operator": {"kind": "remote", "remote": {"timeout": PATIENT}}}
-        | {"device": {"friction": 0.0, "gimbal_noise": 0.0}},
+        operator={"kind": "remote", "remote": {"timeout": PATIENT}},
+        haptic_master={"device": {"friction": 0.0, "gimbal_noise": 0.0}},
         motion_scaling={"reach_force": {"is_on": False}, "coarse_gain": GAIN},
         slave={"starts_at_home": True, "operation": {"longest_outage": 0.0}},
     )
 
 
 def is_held(peer):
-    return lambda: peer.status("haptic_master").values.get("hand.is_held") == "1"
+    return lambda: peer.status("operator").values.get("hand.is_held") == "1"
 
 
 def at_rest(listener, count=1000):
@@ -76,8 +76,8 @@ def at_rest(listener, count=1000):
 @pytest.mark.slow
 @pytest.mark.alone
 def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(peer, session):
-    peer.wait(lambda: "nobody holds" in peer.status("haptic_master").message, "a hand that waits")
-    peer.wait_value("haptic_master", "has_begun", lambda n: n == 1)
+    peer.wait(lambda: "nobody holds" in peer.status("operator").message, "a hand that waits")
+    peer.wait_value("operator", "has_begun", lambda n: n == 1)
     tips, person = peer.listen(SLAVE_MEASURED_CP), Person(peer)
     person.hold([0.0, 0.0, 0.0], is_held(peer), "a grip")
     person.hold([0.0, 0.0, 0.0], at_rest(tips), "rest")
@@ -125,13 +125,13 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
     buttons.take()
     assert buttons.values[-1][0] == 0.0
     person.hold([np.nan, 0.0, 0.0], lambda: not is_held(peer)(), "NaN to be no hand")
-    peer.wait_value("haptic_master", "refused.hand/servo_cp.not_finite", lambda n: n > 0)
+    peer.wait_value("operator", "refused.operator/servo_cp.not_finite", lambda n: n > 0)
 
     buttons.forget()
-    deep = peer.publisher(HAND_BUTTONS, readers=0)
+    deep = peer.publisher(OPERATOR_BUTTONS, readers=0)
     peer.wait(deep.get_subscription_count, "a reader of the buttons")
     for pressed in ([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]):
-        peer.send(HAND_BUTTONS, time.time_ns(), pressed)
+        peer.send(OPERATOR_BUTTONS, time.time_ns(), pressed)
 
     def presses():
         is_there = buttons.take() > 1

@@ -42,8 +42,8 @@ def short_session(peer, session_until):
 
         def has_led():
             nonlocal begin
-            master, slave = peer.status("haptic_master"), peer.status("slave")
-            if begin is None and master and slave and master.number("has_begun"):
+            operator, slave = peer.status("operator"), peer.status("slave")
+            if begin is None and operator and slave and operator.number("has_begun"):
                 begin = slave.number("ticks")
             return begin is not None and slave.number("ticks") > begin + 2000
 

@@ -202,11 +202,11 @@ def test_the_hand_rests_until_the_slave_follows(peer):
     peer.start("haptic_master", patience=3600.0, **STEADY)
     peer.wait(lambda: poses.take() > 1000, "samples")
     assert np.ptp(poses.values, axis=0).max() == 0.0
-    assert "waits" in peer.status("haptic_master").message
+    assert "waits" in peer.status("operator").message
     for name in ("slave", "inverse_kinematics", "motion_scaling"):
         peer.start(name, wait="")
     peer.wait(lambda: poses.take() and np.ptp(poses.values[-1000:], axis=0).max() > 1e-3, "motion")
-    peer.wait_value("haptic_master", "has_begun", lambda n: n == 1)
+    peer.wait_value("operator", "has_begun", lambda n: n == 1)
 
 
 def rest(peer, listener):

@@ -32,7 +32,7 @@ TIMEOUT = 90.0
 
 
 SETTINGS = {
-    "haptic_master": {"operator": {"approach_time": 1.0}, "patience": 0.0},
+    "operator": {"approach_time": 1.0, "patience": 0.0},
     "motion_scaling": {"reach_force": {"is_on": False}},
 }
 

@@ -11,7 +11,7 @@ from teleop_core.stage import STAGES
 pytestmark = pytest.mark.ros
 
 GARBAGE = b"\0\1\0\0" + bytes(range(200, 256))
-NODES = ("haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim")
+NODES = ("operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim")
 
 
 @pytest.mark.parametrize("name", NODES)

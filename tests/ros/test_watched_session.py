@@ -10,9 +10,9 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 @pytest.fixture(scope="module")
 def watched(composed_session):
     """Peer of a session that goes on while tests look at it."""
-    master = {"operator": {"approach_time": 1.0}, "patience": 0.0}
+    operator = {"approach_time": 1.0, "patience": 0.0}
     scaling = {"reach_force": {"is_on": False}}
-    with composed_session(haptic_master=master, motion_scaling=scaling) as (peer, _, _):
+    with composed_session(operator=operator, motion_scaling=scaling) as (peer, _, _):
         yield peer
 
 

@@ -18,7 +18,15 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 ROOT = Path(__file__).resolve().parents[2]
 CAN_COMPILE = all(map(shutil.which, ("cc", "c++", "cmake")))
 COLCON = Path(sys.executable).with_name("colcon")
-NODES = {"haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim", "recorder"}
+NODES = {
+    "operator",
+    "haptic_master",
+    "motion_scaling",
+    "inverse_kinematics",
+    "slave",
+    "slave_sim",
+    "recorder",
+}
 
 
 @pytest.fixture(scope="module")

@@ -49,6 +49,7 @@ _DOUBT_NS = 1_000_000_000
 _GRIP_NS = 300_000_000
 """Time for which the clutch stays pressed after a hand that had let go is there again [ns]; it has
 brought the stylus to where it wants it by then."""
+_FASTEST = 3.0  # a hand that is farther than so fast a one gets [m/s] is another grip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,8 +105,15 @@ def _is_sound(p: Any, s: Any, force: Array, now_ns: int) -> bool:
 
 @inner
 def _holds(p: Any, s: Any, row: Any) -> bool:
-    """Whether a hand holds the stylus; takes where it is wanted from who does."""
+    """Whether a hand holds the stylus; takes where it is wanted from who does.
+
+    A hand that is suddenly elsewhere, as after a silence, is another grip: it brings the stylus
+    there before the clutch is released.
+    """
     if row.hand_servo_cp_ns != s.told_ns:
+        elapsed = 1e-9 * (row.now_ns - s.heard_ns) if s.told_ns > 0 else 0.0
+        if distance(s.aim, row.hand_servo_cp) > _FASTEST * max(elapsed, 1e-3):
+            s.free_ns = row.now_ns
         s.told_ns, s.heard_ns = row.hand_servo_cp_ns, row.now_ns
         for i in range(7):
             s.aim[i] = row.hand_servo_cp[i]

@@ -125,7 +125,8 @@ class Ports:
     def send(self, now_ns: int) -> None:
         """Send what the stage wrote, each under the stamp that its topic says.
 
-        What passes on a stamp that went out already is no new answer, and is not sent. A stage that is not of this package may write anything: what is not finite is not sent.
+        What passes on a stamp that went out already is no new answer, and is not sent. A stage
+        that is not of this package may write anything: what is not finite is not sent.
         """
         row = self.row
         if self._must_check and not all(output.is_sound() for output, _ in self._stamped):

@@ -46,6 +46,7 @@ class TeleopSession:
         last = self._stages[-1]
         self._schedule = Schedule(time.monotonic_ns, time.sleep, last.options.max_catch_up)
         self._at_work: tuple[bool, ...] = ()
+        self._seen: set[CoreNode] = set()
         self._pending: list[tuple[Output, int, int]] = []
         self._ticks = 0
         self._loop = Loop("session", self._turn, last.fail, patience=last.patience)
@@ -69,7 +70,7 @@ class TeleopSession:
 
     def _turn(self) -> None:
         """All ticks that are due, each through all stages."""
-        if not self._loop.is_ready and any(node.is_at_work for node in self.nodes):
+        if not self._loop.is_ready and self._are_all_there():
             self._stages[-1].prepare()  # now that all kernels are there
             self._schedule.start()  # what passed meanwhile is not to be made up for
             self._loop.is_ready = True
@@ -86,6 +87,12 @@ class TeleopSession:
             if not self._loop.is_running:  # there may be a thousand ticks to make up for
                 return
             self._tick(tick_ns)
+
+    def _are_all_there(self) -> bool:
+        """Whether every node has been at work that was to begin by itself: no sample is missed."""
+        self._seen |= {node for node in self.nodes if node.is_at_work}
+        waited_for = {node for node in self.nodes if node.options.autostart}
+        return bool(self._seen) and waited_for <= self._seen
 
     def _tick(self, tick_ns: int) -> None:
         """One tick [ns, monotonic]; the gate keeps all nodes open until all is published."""

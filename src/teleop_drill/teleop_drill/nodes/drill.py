@@ -28,7 +28,7 @@ _BEFORE = 0.2  # motion that is seen before a fault [s]
 _FOLLOWS = 90.0  # until it follows after the start [s]
 _CIRCLE = (
     "operator.kind=circle", f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
-    f"operator.period={hand.ROUND}", "operator.approach_time=1.0", "haptic_master.patience=0.0",
+    f"operator.period={hand.ROUND}", "operator.approach_time=1.0", "operator.patience=0.0",
     "operator.rotation=0.0",
 )  # fmt: skip
 _MEASURED = 2.0  # time in which this machine's own lateness is measured [s]

@@ -25,7 +25,7 @@ from teleop_drill.drill.exercise import Master
 
 _NEVER_NS = 2**62
 START_TIMEOUT = 180.0
-_MASTER, _SIMULATOR = "haptic_master", "slave_sim"
+_HAND, _MASTER, _SIMULATOR = "operator", "haptic_master", "slave_sim"
 _BUSY = "while True: pass"
 _BYSTANDER = "from teleop_drill.nodes.drill_tap import stand_by; stand_by()"
 _MIDDLEWARE = ("FASTRTPS_", "FASTDDS_", "ROS_AUTOMATIC", "ROS_LOCALHOST", "ROS_STATIC")
@@ -61,7 +61,7 @@ class DrillSession:
         self.recordings: list[Path] = []
         self._begun_ns: list[int] = []
         names = [member.name for member in configuration.graph.members]
-        self._nodes = [n for n in names if self._has_device or n != _MASTER]
+        self._nodes = [n for n in names if self._has_device or n not in {_HAND, _MASTER}]
 
     # -- start and end ---------------------------------------------------------------------------
 
@@ -106,7 +106,8 @@ class DrillSession:
         if self._has_device:
             return text
         content = yaml.safe_load(text)
-        content[f"/{_MASTER}"]["ros__parameters"]["autostart"] = False
+        for name in (_HAND, _MASTER):
+            content[f"/{name}"]["ros__parameters"]["autostart"] = False
         return str(yaml.safe_dump(content, allow_unicode=True))
 
     def _await(self, nodes: list[str]) -> None:
