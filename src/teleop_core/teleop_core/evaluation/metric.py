@@ -1,8 +1,10 @@
 """Metric: one thing that is measured on a recording; each is one file, ours or a user's."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import Field, field, fields
 from itertools import product
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from teleop_core.evaluation.accumulators import Moments, Spread
 from teleop_core.evaluation.context import Context
@@ -42,6 +44,32 @@ class Key(NamedTuple):
 
     def _choices(self) -> list[list[str]]:
         return [part.split("|") for part in self.path.split(".")]
+
+
+def figure(unit: str, meaning: str, **default: object) -> Any:
+    """Field of a metric's values, with a ``default`` if wanted; :func:`keys_of` makes its key."""
+    return field(metadata={"unit": unit, "meaning": meaning}, **default)  # type: ignore[call-overload]
+
+
+def keys_of(path: str, values: type[Any] | Sequence[Field[Any]], said: str = "") -> tuple[Key, ...]:
+    """Keys of a dataclass all whose fields are :func:`figure`, below a path.
+
+    A field that is a :class:`Spread` has the keys ``rms``, ``sd`` and ``max``.
+
+    Args:
+        path: What stands before the names of the fields, without the dot.
+        values: The dataclass, or some of its fields.
+        said: What stands before the meaning of each.
+    """
+    found = fields(values) if isinstance(values, type) else values
+    return tuple(
+        Key(
+            f"{path}.{one.name}{'.rms|sd|max' if one.type is Spread else ''}",
+            one.metadata["unit"],
+            said + one.metadata["meaning"],
+        )
+        for one in found
+    )
 
 
 class Metric(ABC):

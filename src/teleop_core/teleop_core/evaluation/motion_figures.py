@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.errors import ShapeError
+from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.motion import (
     IDLE_SPEED,
     RATE,
@@ -31,48 +32,58 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class MotionFigures:
-    """How something moved; None where there is too little motion to say.
+    """How something moved; None where there is too little motion to say."""
 
-    Attributes:
-        time_s: Time that was looked at, [s].
-        path_mm: Way, [mm].
-        speed_median_mm_s: Median speed, [mm/s].
-        speed_p95_mm_s: Speed that is exceeded for 5 % of the time, [mm/s].
-        acceleration_p95_m_s2: The same of the acceleration, [m/s²].
-        idle_share: Share of the time below 5 mm/s.
-        submovements: Peaks of speed that stand at least 10 mm/s above the valleys beside them.
-        peaks_per_s: Such peaks per second, [1/s].
-        reversals: Turning points of x, y and z with at least 2 mm on both sides.
-        frequency_50_hz: Half of the power of velocity is below, [Hz].
-        frequency_95_hz: 95 % of it are below, [Hz].
-        power_1_3: Share of it in 1 to 3 Hz.
-        sparc: Spectral arc length of speed, median of windows of 5 s.
-        ldlj: Log dimensionless jerk, median of windows of 5 s.
-        tremor_um: Root mean square of the motion in 8 to 12 Hz over three axes, [µm]; None for
-            recordings below 60 Hz.
-        tremor_at_rest_um: The same of the seconds in which the whole motion is less than 1 mm.
-        turn_median_deg_s: Median angular speed, [deg/s].
-        turn_p95_deg_s: Angular speed that is exceeded for 5 % of the time, [deg/s].
-    """
-
-    time_s: float
-    path_mm: float
-    speed_median_mm_s: float | None = None
-    speed_p95_mm_s: float | None = None
-    acceleration_p95_m_s2: float | None = None
-    idle_share: float | None = None
-    submovements: int = 0
-    peaks_per_s: float | None = None
-    reversals: int = 0
-    frequency_50_hz: float | None = None
-    frequency_95_hz: float | None = None
-    power_1_3: float | None = None
-    sparc: float | None = None
-    ldlj: float | None = None
-    tremor_um: float | None = None
-    tremor_at_rest_um: float | None = None
-    turn_median_deg_s: float | None = None
-    turn_p95_deg_s: float | None = None
+    time_s: float = figure(
+        "s", "time without the approach; in_fixture: hand while a fixture was on"
+    )
+    path_mm: float = figure("mm", "way of the tip")
+    speed_median_mm_s: float | None = figure(
+        "mm/s", "median speed, at 30 Hz as all but the tremor", default=None
+    )
+    speed_p95_mm_s: float | None = figure(
+        "mm/s", "speed that is exceeded for 5 % of the time", default=None
+    )
+    acceleration_p95_m_s2: float | None = figure(
+        "m/s^2", "acceleration that is exceeded for 5 % of the time", default=None
+    )
+    idle_share: float | None = figure("1", "share of the time below 5 mm/s", default=None)
+    submovements: int = figure(
+        "1", "peaks of speed with a prominence of 10 mm/s or more", default=0
+    )
+    peaks_per_s: float | None = figure("1/s", "the same per second", default=None)
+    reversals: int = figure(
+        "1", "turning points of x, y and z with 2 mm or more on both sides", default=0
+    )
+    frequency_50_hz: float | None = figure(
+        "Hz", "half of the velocity's power is below (Welch, bins of 0.12 Hz)", default=None
+    )
+    frequency_95_hz: float | None = figure(
+        "Hz", "95 % of the velocity's power are below", default=None
+    )
+    power_1_3: float | None = figure(
+        "1", "share of the velocity's power in 1 to 3 Hz", default=None
+    )
+    sparc: float | None = figure(
+        "1",
+        "spectral arc length of speed, median of windows of 5 s (Balasubramanian 2015)",
+        default=None,
+    )
+    ldlj: float | None = figure(
+        "1", "log dimensionless jerk, median of windows of 5 s (Balasubramanian 2015)", default=None
+    )
+    tremor_um: float | None = figure(
+        "um", "RMS of the motion in 8 to 12 Hz over three axes; null below 60 Hz", default=None
+    )
+    tremor_at_rest_um: float | None = figure(
+        "um", "the same of the seconds in which the tip stays within 1 mm", default=None
+    )
+    turn_median_deg_s: float | None = figure(
+        "deg/s", "median angular speed, with the noise of the device's gimbal", default=None
+    )
+    turn_p95_deg_s: float | None = figure(
+        "deg/s", "angular speed that is exceeded for 5 % of the time", default=None
+    )
 
 
 NAMES = tuple(field.name for field in fields(MotionFigures))

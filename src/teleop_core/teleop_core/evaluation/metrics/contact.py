@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Key, Metric
+from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.metrics.fixture import GROUP
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.windows import Window
@@ -21,54 +21,36 @@ _NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns)
 
 @dataclass(frozen=True)
 class ContactScore:
-    """Energy of the contacts of the hand with walls; None where there was none, or none is known.
+    """Energy of the contacts of the hand with walls; None where there is none, or none known."""
 
-    Attributes:
-        count: Contacts: stretches of time in which the device pushed, and that took 14 µJ or more.
-        touches: Those that took less.
-        returned_max: Largest share of what a contact took that it gave back; above 1 it fed the
-            hand.
-        feeding: Contacts whose wall gave back more than it took.
-        feeding_device: Contacts that gave back more than wall and dry friction of the device took:
-            only then the hand gets more energy than it spent.
-        gain_max_uj: Largest energy that a contact or touch gave beyond what it took; negative where
-            each took more, [µJ].
-        taken_max_mj: Largest energy that one took, [mJ].
-        worst_s: When the contact with ``returned_max`` began, from the start of the recording, [s].
-        largest_force_min_n: Least of the forces that the warmth of the motors allowed, [N].
-    """
-
-    count: int | None
-    touches: int | None
-    returned_max: float | None
-    feeding: int | None
-    feeding_device: int | None
-    gain_max_uj: float | None
-    taken_max_mj: float | None
-    worst_s: float | None
-    largest_force_min_n: float | None
+    count: int | None = figure(
+        "1", "stretches in which the device pushed and took 14 µJ or more; null if not recorded"
+    )
+    touches: int | None = figure("1", "those that took less")
+    returned_max: float | None = figure(
+        "1", "largest share of the energy taken that a contact gave back; above 1 it fed the hand"
+    )
+    feeding: int | None = figure("1", "contacts whose wall gave back more than it took")
+    feeding_device: int | None = figure(
+        # Only then the hand gets more energy than it spent.
+        "1",
+        "contacts that gave back more than wall and dry friction of the device took",
+    )
+    gain_max_uj: float | None = figure(
+        "uJ", "most that a contact or touch gave beyond what it took; negative: each took more"
+    )
+    taken_max_mj: float | None = figure("mJ", "most energy that one took")
+    worst_s: float | None = figure("s", "when the one with returned_max began, after the start")
+    largest_force_min_n: float | None = figure(
+        "N", "least force that the warmth of the device's motors allowed"
+    )
 
 
 class ContactMetric(Metric):
     """Returned beside taken energy of each contact, as the simulated device tells it."""
 
     name = "contact"
-    keys = (
-        Key("contact.count", "1",
-            "stretches in which the device pushed and took 14 µJ or more; null if not recorded"),
-        Key("contact.touches", "1", "those that took less"),
-        Key("contact.returned_max", "1",
-            "largest share of the energy taken that a contact gave back; above 1 it fed the hand"),
-        Key("contact.feeding", "1", "contacts whose wall gave back more than it took"),
-        Key("contact.feeding_device", "1",
-            "contacts that gave back more than wall and dry friction of the device took"),
-        Key("contact.gain_max_uj", "uJ",
-            "most that a contact or touch gave beyond what it took; negative: each took more"),
-        Key("contact.taken_max_mj", "mJ", "most energy that one took"),
-        Key("contact.worst_s", "s", "when the one with returned_max began, after the start"),
-        Key("contact.largest_force_min_n", "N",
-            "least force that the warmth of the device's motors allowed"),
-    )  # fmt: skip
+    keys = keys_of("contact", ContactScore)
     topics = (MASTER_CONTACT,)
 
     def __init__(self, context: Context) -> None:

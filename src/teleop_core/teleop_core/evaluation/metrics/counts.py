@@ -6,7 +6,7 @@ import numpy as np
 
 from teleop_core.bags.reader import Bag
 from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import Key, Metric
+from teleop_core.evaluation.metric import Key, Metric, figure, keys_of
 from teleop_core.evaluation.rows import MISSING, Row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.tracking import TRACKED, tracked
@@ -151,21 +151,16 @@ class TopicsMetric(Metric):
 class Samples:
     """How many slave poses were scored, and why others were not."""
 
-    scored: int
-    unpaired: int
-    invalid: int
+    scored: int = figure("1", "slave poses with their reference")
+    unpaired: int = figure("1", "slave poses whose reference was lost on the way")
+    invalid: int = figure("1", "slave poses or references with NaN or without a direction")
 
 
 class SamplesMetric(Metric):
     """Counts the poses that the errors are of."""
 
     name = "samples"
-    keys = (
-        Key("samples.scored", "1", "slave poses with their reference"),
-        Key("samples.unpaired", "1", "slave poses whose reference was lost on the way"),
-        Key("samples.invalid", "1",
-            "slave poses or references with NaN or without a direction"),
-    )  # fmt: skip
+    keys = keys_of("samples", Samples)
     topics = TRACKED
 
     def __init__(self, context: Context) -> None:

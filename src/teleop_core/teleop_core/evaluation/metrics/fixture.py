@@ -8,7 +8,7 @@ import numpy as np
 from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.gains import Gains
-from teleop_core.evaluation.metric import Key, Metric
+from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.published import BOX_OVERSHOOT_MM
 from teleop_core.evaluation.reported_fixture import ReportedFixture
 from teleop_core.evaluation.rows import MISSING, Row, row
@@ -44,44 +44,28 @@ GROUP = "virtual fixture"
 
 @dataclass(frozen=True)
 class FixtureScore:
-    """What happened while a fixture was on; None where none ever was.
+    """What happened while a fixture was on; None where none ever was."""
 
-    Attributes:
-        on_s: Time with a fixture on, [s].
-        outside_share: Share of that time during which the slave's tip was outside, 0 to 1.
-        penetration_max_mm: Largest distance of the slave's tip from the fixture, [mm].
-        penetration_rms_mm: Root mean square of it, zero inside, [mm].
-        hand_penetration_max_mm: Largest distance of the hand from its fixture, on the master, [mm].
-        kind: Kind of the fixture; those that were on, with "and" between them.
-        unscored: Those of them whose shape is not known here, each with the reason. Their time
-            counts in ``on_s`` only.
-    """
-
-    on_s: float
-    outside_share: float | None
-    penetration_max_mm: float | None
-    penetration_rms_mm: float | None
-    hand_penetration_max_mm: float | None
-    kind: str | None
-    unscored: str | None
+    on_s: float = figure("s", "time with the fixture on")
+    outside_share: float | None = figure("1", "share of that time with the slave's tip outside")
+    penetration_max_mm: float | None = figure(
+        "mm", "largest distance of the slave's tip from the fixture"
+    )
+    penetration_rms_mm: float | None = figure("mm", "root mean square of it, zero inside")
+    hand_penetration_max_mm: float | None = figure(
+        "mm", "largest distance of the hand from its fixture"
+    )
+    kind: str | None = figure("1", "kinds of fixture that were on; null if none was")
+    unscored: str | None = figure(
+        "1", "those whose shape is not known here, for which there is only on_s; null if none"
+    )
 
 
 class FixtureMetric(Metric):
     """Penetration of the slave's tip, and of the hand, which is that of the command by the gain."""
 
     name = "fixture"
-    keys = (
-        Key("fixture.on_s", "s", "time with the fixture on"),
-        Key("fixture.outside_share", "1", "share of that time with the slave's tip outside"),
-        Key("fixture.penetration_max_mm", "mm",
-            "largest distance of the slave's tip from the fixture"),
-        Key("fixture.penetration_rms_mm", "mm", "root mean square of it, zero inside"),
-        Key("fixture.hand_penetration_max_mm", "mm",
-            "largest distance of the hand from its fixture"),
-        Key("fixture.kind", "1", "kinds of fixture that were on; null if none was"),
-        Key("fixture.unscored", "1",
-            "those whose shape is not known here, for which there is only on_s; null if none"),
-    )  # fmt: skip
+    keys = keys_of("fixture", FixtureScore)
     topics = (SLAVE_MEASURED_CP, SLAVE_SERVO_CP)
 
     def __init__(self, context: Context) -> None:

@@ -1,6 +1,6 @@
 """Motion: how hand and slave move: speed, spectrum, smoothness, submovements, tremor, strokes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from teleop_core.evaluation.approach import approach_end_ns
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, MEASURED, Figure, line, time_axis
-from teleop_core.evaluation.metric import Key, Metric
+from teleop_core.evaluation.metric import Key, Metric, keys_of
 from teleop_core.evaluation.motion import RATE
 from teleop_core.evaluation.motion_figures import Kinematics, Mask, MotionFigures
 from teleop_core.evaluation.motion_samples import MotionSamples
@@ -17,30 +17,9 @@ from teleop_core.evaluation.state_history import States
 from teleop_core.evaluation.windows import Window
 from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Topic
 
-_WHO = "motion.hand|slave|in_fixture."
-_MEANINGS = (
-    ("time_s", "s", "time without the approach; in_fixture: hand while a fixture was on"),
-    ("path_mm", "mm", "way of the tip"),
-    ("speed_median_mm_s", "mm/s", "median speed, at 30 Hz as all but the tremor"),
-    ("speed_p95_mm_s", "mm/s", "speed that is exceeded for 5 % of the time"),
-    ("acceleration_p95_m_s2", "m/s^2", "acceleration that is exceeded for 5 % of the time"),
-    ("idle_share", "1", "share of the time below 5 mm/s"),
-    ("submovements", "1", "peaks of speed with a prominence of 10 mm/s or more"),
-    ("peaks_per_s", "1/s", "the same per second"),
-    ("reversals", "1", "turning points of x, y and z with 2 mm or more on both sides"),
-    ("frequency_50_hz", "Hz", "half of the velocity's power is below (Welch, bins of 0.12 Hz)"),
-    ("frequency_95_hz", "Hz", "95 % of the velocity's power are below"),
-    ("power_1_3", "1", "share of the velocity's power in 1 to 3 Hz"),
-    ("sparc", "1", "spectral arc length of speed, median of windows of 5 s (Balasubramanian 2015)"),
-    ("ldlj", "1", "log dimensionless jerk, median of windows of 5 s (Balasubramanian 2015)"),
-    ("tremor_um", "um", "RMS of the motion in 8 to 12 Hz over three axes; null below 60 Hz"),
-    ("tremor_at_rest_um", "um", "the same of the seconds in which the tip stays within 1 mm"),
-    ("turn_median_deg_s", "deg/s", "median angular speed, with the noise of the device's gimbal"),
-    ("turn_p95_deg_s", "deg/s", "angular speed that is exceeded for 5 % of the time"),
-)  # fmt: skip
 _SEGMENT_NAMES = ("time_s", "path_mm", "speed_median_mm_s", "speed_p95_mm_s", "idle_share",
                   "submovements", "reversals", "sparc", "ldlj")  # fmt: skip
-_OF_SEGMENTS = tuple(found for found in _MEANINGS if found[0] in _SEGMENT_NAMES)
+_OF_SEGMENTS = [found for found in fields(MotionFigures) if found.name in _SEGMENT_NAMES]
 _SHORTEST_S = 0.5
 HAND, SLAVE = "motion of the hand", "motion of the slave"
 SEGMENTS, FIXTURE = "between clutch strokes", "hand with the fixture on"
@@ -84,16 +63,14 @@ class MotionMetric(Metric):
 
     name = "motion"
     keys = (
-        *(Key(_WHO + name, unit, meaning) for name, unit, meaning in _MEANINGS),
+        *keys_of("motion.hand|slave|in_fixture", MotionFigures),
         Key("motion.clutch.count", "1", "strokes of the clutch"),
         Key("motion.clutch.time_s", "s", "time with the clutch pressed"),
         Key("motion.segments.<number>.begin_s|end_s", "s",
             "hand between clutch strokes, from 0.5 s on: when, from the start of the recording"),
-        *(Key(f"motion.segments.<number>.{name}", unit, f"of a segment: {meaning}")
-          for name, unit, meaning in _OF_SEGMENTS),
+        *keys_of("motion.segments.<number>", _OF_SEGMENTS, "of a segment: "),
         Key("motion.segment_median.count", "1", "number of segments"),
-        *(Key(f"motion.segment_median.{name}", unit, f"median of the segments: {meaning}")
-          for name, unit, meaning in _OF_SEGMENTS),
+        *keys_of("motion.segment_median", _OF_SEGMENTS, "median of the segments: "),
     )  # fmt: skip
     topics = (MASTER_MEASURED_CP, SLAVE_MEASURED_CP)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from teleop_core.evaluation.accumulators import Integers, Moments, Spread
 from teleop_core.evaluation.context import Context
-from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
+from teleop_core.evaluation.metric import SPREAD_MEANING, Metric, figure, keys_of
 from teleop_core.evaluation.rows import MISSING, Row, error_rows, row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.windows import Window
@@ -27,59 +27,42 @@ _ALIGNING, _SILENT_S = len(Limit), 0.5
 
 @dataclass(frozen=True)
 class ReachScore:
-    """How far the slave followed, since it first did; None without what says so.
+    """How far the slave followed, since it first did; None without what says so."""
 
-    Attributes:
-        followed_share: Share of the time in which nothing held the slave back, 0 to 1.
-        longest_s: Longest stretch of time in which it did not follow, [s].
-        joint_share: Share of the time against the end of a joint.
-        workspace_share: Share beyond all joint vectors.
-        singularity_share: Share in which it lagged near a singularity.
-        speed_share: Share in which it lagged because joints were too slow.
-        aligning_share: Share in which master or slave were silent, or it was aligned anew.
-        residual_mm: Distance that inverse kinematics left to the command, [mm].
-        residual_deg: Angle that it left, [deg].
-        master_hz: Commands per second: the median of their stamps' steps.
-        interpolation: How the slave goes from command to command; None if it is not told.
-        interpolation_ms: By what that is late: a period of the commands, if it is longer than a
-            control tick, [ms].
-    """
-
-    followed_share: float | None
-    longest_s: float | None
-    joint_share: float | None
-    workspace_share: float | None
-    singularity_share: float | None
-    speed_share: float | None
-    aligning_share: float | None
-    residual_mm: Spread
-    residual_deg: Spread
-    master_hz: float | None
-    interpolation: str | None
-    interpolation_ms: float | None
+    followed_share: float | None = figure(
+        "1",
+        "share of the time since the slave first followed in which it could do what it was asked: "
+        "commands whose limit in slave/reach is 0, each until the next one; clutched time counts "
+        "as followed",
+    )
+    longest_s: float | None = figure("s", "longest stretch in which it did not follow")
+    joint_share: float | None = figure("1", "share of that time against the end of a joint")
+    workspace_share: float | None = figure("1", "share of it beyond all joint vectors")
+    singularity_share: float | None = figure("1", "share of it too slow near a singularity")
+    speed_share: float | None = figure("1", "share of it too slow, because joints were")
+    aligning_share: float | None = figure(
+        "1", "share of it in which master or slave were silent, or it was aligned anew"
+    )
+    residual_mm: Spread = figure(
+        "mm", f"what inverse kinematics left of each command: {SPREAD_MEANING}"
+    )
+    residual_deg: Spread = figure("deg", f"the same for angles: {SPREAD_MEANING}")
+    master_hz: float | None = figure(
+        "Hz", "commands per second, by the median step of their stamps"
+    )
+    interpolation: str | None = figure(
+        "1", "how the slave goes from command to command; null if it is not told"
+    )
+    interpolation_ms: float | None = figure(
+        "ms", "by what that is late; 0 where there is a command every tick"
+    )
 
 
 class ReachMetric(Metric):
     """Shares of time and residuals by slave/reach."""
 
     name = "reach"
-    keys = (
-        Key("reach.followed_share", "1",
-            "share of the time since the slave first followed in which it could do what it was "
-            "asked: commands whose limit in slave/reach is 0, each until the next one; clutched "
-            "time counts as followed"),
-        Key("reach.longest_s", "s", "longest stretch in which it did not follow"),
-        Key("reach.joint_share|workspace_share|singularity_share|speed_share|aligning_share", "1",
-            "share of that time against the end of a joint, beyond the workspace, too slow near a "
-            "singularity, too slow, and while master or slave were silent"),
-        Key("reach.residual_mm.rms|sd|max", "mm",
-            f"what inverse kinematics left of each command: {SPREAD_MEANING}"),
-        Key("reach.residual_deg.rms|sd|max", "deg", f"the same for angles: {SPREAD_MEANING}"),
-        Key("reach.master_hz", "Hz", "commands per second, by the median step of their stamps"),
-        Key("reach.interpolation", "1", "how the slave goes from command to command"),
-        Key("reach.interpolation_ms", "ms", "by what that is late; 0 where there is a command "
-            "every tick"),
-    )  # fmt: skip
+    keys = keys_of("reach", ReachScore)
     topics = (SLAVE_REACH,)
 
     def __init__(self, context: Context) -> None:
