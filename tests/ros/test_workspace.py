@@ -76,6 +76,21 @@ def test_the_workspace_builds_and_a_built_node_answers(workspace, peer):
         node.wait()
 
 
+def test_teleop_of_the_workspace_finds_the_commands_of_the_other_packages(workspace):
+    packages = [
+        workspace / "install" / name for name in ("teleop_core", "teleop_lab", "teleop_drill")
+    ]
+    places = [str(next(package.glob("lib/python*/site-packages"))) for package in packages]
+    assert all((package / "share" / package.name / "hook").is_dir() for package in packages)
+    teleop = packages[0] / "lib" / "teleop_core" / "teleop"
+    for words, text in ((["drill", "--list"], "kill_motion_scaling"), (["experiment"], "points24")):
+        done = subprocess.run(
+            [teleop, *words], env=environment() | {"PYTHONPATH": ":".join(places)},
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert text in done.stdout, done.stderr
+
+
 def test_colcon_test_runs_the_quick_tests_and_keeps_their_results(workspace):
     select = ("--packages-select", "teleop_core")
     colcon(workspace, "test", *select, "--return-code-on-test-failure")
