@@ -41,10 +41,17 @@ class Series:
 
     def only(self, is_kept: NDArray[np.bool_]) -> "Series":
         """Some of the messages; ``is_kept`` has the shape (N,)."""
-        if is_kept.all():
-            return self
-        stamps, logs, values = self.stamp_ns[is_kept], self.log_ns[is_kept], self.values[is_kept]
+        return self if is_kept.all() else self[is_kept]
+
+    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.int64]) -> "Series":
+        """A stretch of the messages, some of them, or all in another order."""
+        stamps, logs, values = self.stamp_ns[rows], self.log_ns[rows], self.values[rows]
         return Series(stamps, logs, values, self.names, self.frame_id)
+
+
+def empty(width: int) -> Series:
+    """No messages, of so many columns."""
+    return Series(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, width)))
 
 
 def kind_of(name: str, ros_type: str) -> Kind | None:
@@ -170,7 +177,7 @@ def join(parts: list[Series], column: Column) -> Series:
     """One series of all parts, in the order of log times."""
     if not parts:
         width = column.kind.width(len(column.names))
-        return Series(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, width)))
+        return empty(width)
     return replace(in_order(parts), names=column.names, frame_id=column.frame_id)
 
 
@@ -179,7 +186,5 @@ def in_order(parts: list[Series]) -> Series:
     stamps = np.concatenate([part.stamp_ns for part in parts])
     logs = np.concatenate([part.log_ns for part in parts])
     values = np.concatenate([part.values for part in parts])
-    if (np.diff(logs) < 0).any():
-        order = np.argsort(logs, kind="stable")
-        stamps, logs, values = stamps[order], logs[order], values[order]
-    return Series(stamps, logs, values, parts[0].names, parts[0].frame_id)
+    whole = Series(stamps, logs, values, parts[0].names, parts[0].frame_id)
+    return whole[np.argsort(logs, kind="stable")] if (np.diff(logs) < 0).any() else whole

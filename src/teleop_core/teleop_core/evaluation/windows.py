@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar, cast
 import numpy as np
 
 from teleop_core.bags.reader import Bag, Series
-from teleop_core.bags.series import in_order
+from teleop_core.bags.series import empty, in_order
 from teleop_core.errors import ParameterError
 from teleop_core.evaluation.state_history import NO_HISTORY, StateHistory, States
 from teleop_core.topics import Topic
@@ -46,19 +46,12 @@ class Window:
 
     def samples(self, topic: Topic) -> Series:
         """Samples of a topic inside of the window; none if the recording has no such topic."""
-        own, series = self.own(topic), self.around(topic)
-        return Series(
-            series.stamp_ns[own], series.log_ns[own], series.values[own],
-            series.names, series.frame_id,
-        )  # fmt: skip
+        return self.around(topic)[self.own(topic)]
 
     def around(self, topic: Topic) -> Series:
         """The same with the context; :meth:`own` says which of them are inside."""
         series = self.series.get(topic.name)
-        if series is None:
-            none = np.empty(0, np.int64)
-            return Series(none, none, np.empty((0, topic.width(0))))
-        return series
+        return empty(topic.width(0)) if series is None else series
 
     def states(self, topic: Topic) -> States:
         """State in force at the stamp of each of a topic's samples inside of the window."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.series import Series, kind_of
+from teleop_core.bags.series import Series, in_order, kind_of
 from teleop_core.errors import UnknownNameError
 from teleop_core.exchange.times import SECOND_NS, Stamps
 from teleop_core.geometry import Array
@@ -116,7 +116,7 @@ class Streams:
                 known = [s for s in (last.get(name), piece.get(name)) if s is not None]
                 values[name] = self._newest(name, times, known)
                 if known:
-                    last[name] = _tail(known[-1])
+                    last[name] = known[-1][-1:]
             if len(times):
                 yield Joined(times, values)
 
@@ -136,7 +136,7 @@ class Streams:
             return
         done = -(2**62)
         if isinstance(self._bag, MemoryBag) or not self._is_in_order():
-            yield _in_order({name: [s] for name, s in self._bag.read_many(self._names).items()})
+            yield _sorted({name: [s] for name, s in self._bag.read_many(self._names).items()})
             return
         waiting: dict[str, list[Series]] = {}
         for block in self._bag.blocks(self._names):
@@ -150,7 +150,7 @@ class Streams:
                 done = cut
                 if piece := _before(waiting, cut):
                     yield piece
-        if piece := _in_order(waiting):
+        if piece := _sorted(waiting):
             yield piece
 
     def _is_in_order(self) -> bool:
@@ -232,36 +232,18 @@ def _series(stream: Stream) -> Series:
     return Series(stream.stamp_ns, stream.log_ns, stream.values)
 
 
-def _tail(series: Series) -> Series:
-    """The last message alone."""
-    return Series(series.stamp_ns[-1:], series.log_ns[-1:], series.values[-1:], series.names)
-
-
-def _in_order(waiting: Mapping[str, list[Series]]) -> dict[str, Series]:
+def _sorted(waiting: Mapping[str, list[Series]]) -> dict[str, Series]:
     """One series of each topic that has messages, in the order of log times."""
-    out = {}
-    for name, parts in waiting.items():
-        logs = np.concatenate([part.log_ns for part in parts])
-        if not len(logs):
-            continue
-        order = np.argsort(logs, kind="stable")
-        stamps = np.concatenate([part.stamp_ns for part in parts])[order]
-        values = np.concatenate([part.values for part in parts])[order]
-        out[name] = Series(stamps, logs[order], values, parts[0].names)
-    return out
+    whole = {name: in_order(parts) for name, parts in waiting.items()}
+    return {name: series for name, series in whole.items() if len(series)}
 
 
 def _before(waiting: dict[str, list[Series]], cut: int) -> dict[str, Series]:
     """Take what was logged before a time [ns] out of what is waiting."""
     out = {}
-    for name, series in _in_order(waiting).items():
+    for name, series in _sorted(waiting).items():
         end = int(np.searchsorted(series.log_ns, cut))
-        waiting[name] = [_between(series, end, len(series))]
+        waiting[name] = [series[end:]]
         if end:
-            out[name] = _between(series, 0, end)
+            out[name] = series[:end]
     return out
-
-
-def _between(series: Series, begin: int, end: int) -> Series:
-    part = slice(begin, end)
-    return Series(series.stamp_ns[part], series.log_ns[part], series.values[part], series.names)
