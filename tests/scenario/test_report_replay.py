@@ -8,7 +8,7 @@ from recipes import START_NS, Recipe, state
 from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.metrics import replay as metric
-from teleop_core.evaluation.replay import ROOM
+from teleop_core.evaluation.replay_figure import ROOM
 from teleop_core.geometry import pose_from_transform
 from teleop_core.robots import load_robot
 from teleop_core.topics import (

@@ -10,9 +10,9 @@ import teleop_core as tc
 from teleop_core.bodies import Solid
 from teleop_core.bodies.meshes import mesh_of
 from teleop_core.console.body_nodes import ROLES
+from teleop_core.console.fixture_outlines import unit_outline
 from teleop_core.console.link import Arm, ArmView, View
 from teleop_core.console.look import GOOD, WRONG
-from teleop_core.console.outlines import unit_outline
 from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer

@@ -8,7 +8,7 @@ import pytest
 from teleop_core.controllers import CONTROLLERS, Controller, register_controller
 from teleop_core.controllers.adaptive import _FRICTION, _INERTIA, _LOAD, _VISCOUS
 from teleop_core.controllers.computed_torque import COMPUTED_TORQUE, computed_torque_control
-from teleop_core.controllers.motion import known_friction
+from teleop_core.controllers.motion_estimates import known_friction
 from teleop_core.errors import ParameterError, PartError
 from teleop_core.parameters import build
 from teleop_core.robots import load_robot

@@ -26,7 +26,7 @@ from teleop_core.evaluation import (
     time_axis,
 )
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.table import score_tables
+from teleop_core.evaluation.score_table import score_tables
 from teleop_core.signals import TICK_NS
 from teleop_core.topics import (
     ALL,

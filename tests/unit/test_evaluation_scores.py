@@ -16,8 +16,8 @@ from teleop_core.errors import EvaluationError, RecordingError
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.page import report_page
 from teleop_core.evaluation.score import key_table, keys
+from teleop_core.evaluation.score_table import score_tables
 from teleop_core.evaluation.scoring import evaluate, study
-from teleop_core.evaluation.table import score_tables
 from teleop_core.evaluation.windows import WINDOW_NS, DisorderError, windows
 from teleop_core.signals import STATE_FIELDS, TICK_NS
 from teleop_core.topics import (

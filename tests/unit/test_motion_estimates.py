@@ -12,7 +12,7 @@ from teleop_core.controllers.disturbance_observer import (
     DISTURBANCE_OBSERVER,
     DisturbanceObserverParameters,
 )
-from teleop_core.controllers.motion import (
+from teleop_core.controllers.motion_estimates import (
     FRICTION_SHARE,
     MEMORY,
     SLOWEST_RATIO,

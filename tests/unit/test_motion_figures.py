@@ -8,7 +8,8 @@ from scipy import signal
 from scipy.spatial.transform import Rotation
 
 from teleop_core.errors import ShapeError
-from teleop_core.evaluation.motion import (
+from teleop_core.evaluation.motion_figures import NAMES, Kinematics, motion_figures
+from teleop_core.evaluation.motion_measures import (
     RATE,
     log_dimensionless_jerk,
     reversals,
@@ -21,7 +22,6 @@ from teleop_core.evaluation.motion import (
     turning_points,
     velocity_spectrum,
 )
-from teleop_core.evaluation.motion_figures import NAMES, Kinematics, motion_figures
 from teleop_core.evaluation.motion_samples import MotionSamples
 
 # The bell of the documentation of the authors' own program, and what that gives for it.

@@ -14,8 +14,8 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.score import Score
+from teleop_core.evaluation.score_table import MET, NOT_MET, score_tables
 from teleop_core.evaluation.scoring import evaluate
-from teleop_core.evaluation.table import MET, NOT_MET, score_tables
 from teleop_core.evaluation.windows import windows
 from teleop_core.mapping.motion_scaling import MotionScaling
 from teleop_core.mapping.parameters import MotionScalingParameters

@@ -11,8 +11,8 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from teleop_core import topics
+from teleop_core.bags.mcap_source import McapSource
 from teleop_core.bags.reader import Bag, recover
-from teleop_core.bags.source import McapSource
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 

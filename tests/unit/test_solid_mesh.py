@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from teleop_core.bodies import Solid, bodies_of
 from teleop_core.bodies.meshes import mesh_of
 from teleop_core.evaluation.packing import pack_to
-from teleop_core.evaluation.replay import posed, robot_mesh
+from teleop_core.evaluation.replay_figure import posed, robot_mesh
 from teleop_core.robots import load_robot
 
 HERE = np.array([0.1, -0.2, 0.3, np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])

@@ -11,7 +11,7 @@ from rich.console import Console
 import teleop_core as tc
 from teleop_core.errors import ParameterError
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.evaluation.table import score_table
+from teleop_core.evaluation.score_table import score_table
 
 FROM, TO = 9.0, 11.5
 

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.bags.finding import mcap_files
+from teleop_core.bags.mcap_source import McapSource, Records
 from teleop_core.bags.messages import Refusal, Report, read_reports
 from teleop_core.bags.recovery import recover
 from teleop_core.bags.series import Column, Series, join, kind_of
-from teleop_core.bags.source import McapSource, Records
 from teleop_core.bags.writer import METADATA_NAME
 from teleop_core.errors import RecordingError
 from teleop_core.texts import printable

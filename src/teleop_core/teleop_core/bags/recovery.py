@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from teleop_core.bags import compression, rosbag2
 from teleop_core.bags.chunks import HEADER, Chunk
 from teleop_core.bags.mcap_file import McapFile
-from teleop_core.bags.source import McapSource, Records
+from teleop_core.bags.mcap_source import McapSource, Records
 from teleop_core.errors import RecordingError
 
 

@@ -27,12 +27,12 @@ from teleop_core.robots.robot import Robot
 _LOOPS = {
     "teleop_core.robots.stewart": "parallel:stewart_bodies",
     "teleop_core.robots.rps3": "parallel:rps3_bodies",
-    "teleop_core.robots.scara_stewart": "hybrid:scara_stewart_bodies",
+    "teleop_core.robots.scara_stewart": "hybrid_bodies:scara_stewart_bodies",
     "teleop_core.robots.four_bar": "planar:four_bar_bodies",
     "teleop_core.robots.parallelogram": "planar:parallelogram_bodies",
-    "teleop_core.robots.mma": "mma:mma_bodies",
-    "teleop_core.robots.mma_forward": "mma:mma_bodies",
-    "teleop_core.robots.three_finger_hand": "hand:hand_bodies",
+    "teleop_core.robots.mma": "mma_bodies:mma_bodies",
+    "teleop_core.robots.mma_forward": "mma_bodies:mma_bodies",
+    "teleop_core.robots.three_finger_hand": "hand_bodies:hand_bodies",
 }
 _KNOWN: "WeakKeyDictionary[Robot, Bodies]" = WeakKeyDictionary()
 

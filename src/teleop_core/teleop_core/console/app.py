@@ -148,7 +148,7 @@ def replay(server: ConsoleServer, path: Path) -> None:
     Raises:
         RecordingError: It cannot be read, or is one of another system.
     """
-    from teleop_core.console.replay import ReplayControls
+    from teleop_core.console.replay_controls import ReplayControls
 
     link = RecordedLink(path)
     console = Console(server, link)

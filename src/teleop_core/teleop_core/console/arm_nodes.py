@@ -9,10 +9,10 @@ import viser
 from teleop_core.bodies import bodies_of
 from teleop_core.bodies.meshes import mesh_of
 from teleop_core.console.body_nodes import BodyNodes, extent
+from teleop_core.console.fixture_outlines import OutlineNode
 from teleop_core.console.link import Arm, ArmView, box_of
 from teleop_core.console.look import MEASURED, WANTED, Color
 from teleop_core.console.master_nodes import MasterNodes
-from teleop_core.console.outlines import OutlineNode
 from teleop_core.console.stand import DEVICE, PUBLISHED_AXES, REST, stand_beside
 from teleop_core.console.tails import LENGTH, Tail, is_jump
 from teleop_core.errors import TeleopError

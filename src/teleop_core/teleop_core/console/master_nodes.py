@@ -4,8 +4,8 @@ import numpy as np
 import viser
 
 from teleop_core.console.body_nodes import add_solids
+from teleop_core.console.fixture_outlines import OutlineNode
 from teleop_core.console.look import HAND, WRONG
-from teleop_core.console.outlines import OutlineNode
 from teleop_core.console.poses import move
 from teleop_core.console.stand import DEVICE, REST, STYLUS, Stand
 from teleop_core.console.tails import Tail

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.controllers import Controller, drives_and_poles, fields
-from teleop_core.controllers.motion import (
+from teleop_core.controllers.motion_estimates import (
     MEMORY,
     approach,
     beyond,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.controllers import Controller, drives_and_poles, per_joint
-from teleop_core.controllers.motion import approach
+from teleop_core.controllers.motion_estimates import approach
 from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
 from teleop_core.parameters import parameter
@@ -120,7 +120,7 @@ def weighted_setpoint(
     load alone, instead of ``Kp (1 - b) r`` besides.
 
     A setpoint farther than ``room / (b Kp)`` counts as nearer, so that the drive can brake: see
-    :func:`teleop_core.controllers.motion.approach`.
+    :func:`teleop_core.controllers.motion_estimates.approach`.
 
     Args:
         setpoint: Wanted position [rad or m].

@@ -1,4 +1,4 @@
-"""Motion figures: all numbers of :mod:`~teleop_core.evaluation.motion` of one motion at once."""
+"""Motion figures: all numbers of motion_measures of one motion at once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from teleop_core.errors import ShapeError
 from teleop_core.evaluation.metric import figure
-from teleop_core.evaluation.motion import (
+from teleop_core.evaluation.motion_measures import (
     IDLE_SPEED,
     RATE,
     cut,

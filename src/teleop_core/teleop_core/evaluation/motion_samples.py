@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.evaluation.motion import (
+from teleop_core.evaluation.motion_measures import (
     GAP,
     RATE,
     SLOWEST_FOR_TREMOR,

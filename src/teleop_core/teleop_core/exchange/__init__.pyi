@@ -2,4 +2,4 @@ from .exporting import ExportReport as ExportReport, export_recording as export_
 from .importing import import_recording as import_recording
 from .master_bag import as_master_bag as as_master_bag
 from .options import ImportOptions as ImportOptions
-from .report import ImportReport as ImportReport
+from .import_report import ImportReport as ImportReport

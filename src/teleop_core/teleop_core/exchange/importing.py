@@ -18,11 +18,11 @@ from teleop_core.bags.arms import ARMS_KEY
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
 from teleop_core.exchange.gathering import gather
-from teleop_core.exchange.motion import Motion
+from teleop_core.exchange.import_report import ImportReport, summary
+from teleop_core.exchange.imported_motion import Motion
 from teleop_core.exchange.opening import open_source
 from teleop_core.exchange.options import ImportOptions, Option
 from teleop_core.exchange.presets import options_of
-from teleop_core.exchange.report import ImportReport, summary
 from teleop_core.exchange.spool import Spool
 from teleop_core.exchange.times import Stamps
 from teleop_core.geometry import Array

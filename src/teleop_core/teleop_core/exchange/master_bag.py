@@ -16,7 +16,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.series import Series
 from teleop_core.errors import RecordingError
 from teleop_core.exchange.gathering import gather
-from teleop_core.exchange.motion import Motion
+from teleop_core.exchange.imported_motion import Motion
 from teleop_core.exchange.opening import open_source
 from teleop_core.exchange.options import ImportOptions
 from teleop_core.exchange.spool import Spool

@@ -9,8 +9,8 @@ from teleop_core.evaluation.approach import approach_end_ns
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.metric import Key, Metric, keys_of
-from teleop_core.evaluation.motion import RATE
 from teleop_core.evaluation.motion_figures import Kinematics, Mask, MotionFigures
+from teleop_core.evaluation.motion_measures import RATE
 from teleop_core.evaluation.motion_samples import MotionSamples
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.state_history import States

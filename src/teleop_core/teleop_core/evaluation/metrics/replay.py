@@ -11,7 +11,7 @@ from teleop_core.evaluation.metric import Metric
 from teleop_core.evaluation.metrics.path import PathMetric
 from teleop_core.evaluation.outlines import outlines_of
 from teleop_core.evaluation.plain import Values
-from teleop_core.evaluation.replay import replay_figure
+from teleop_core.evaluation.replay_figure import replay_figure
 from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array

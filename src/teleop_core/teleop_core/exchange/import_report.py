@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from teleop_core.exchange.motion import Counts, Motion
+from teleop_core.exchange.imported_motion import Counts, Motion
 from teleop_core.exchange.times import spread_ms
 from teleop_core.geometry import Array
 from teleop_core.portable import dot, length
