@@ -220,7 +220,7 @@ def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer, tm
     if "recover" in line:  # not even the end of the file found room
         subprocess.run([sys.executable, "-m", "teleop_core.cli", "recover", str(bag)], check=True)
         bag = tmp_path / "bag_recovered"
-    assert Bag(bag).topics["master/measured_cp"].count > 0
+    assert sum(topic.count for topic in Bag(bag).topics.values()) > 0
 
 
 @pytest.mark.slow

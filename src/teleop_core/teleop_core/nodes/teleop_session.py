@@ -79,7 +79,7 @@ class TeleopSession:
             if at_work != self._at_work:
                 self._link()
                 self._at_work = at_work
-        if not any(at_work):
+        if not self._loop.is_ready or not any(at_work):
             time.sleep(0.01)
             self._schedule.start()
             return
