@@ -18,7 +18,7 @@ from teleop_core.robots import Robot, load_robot
 from teleop_core.robots.hardware import NUMBERS
 from teleop_core.session.configuration import parameter_rows
 from teleop_core.session.layers import declared_groups
-from teleop_core.topics import DIAGNOSTICS, HAND_BUTTONS, HAND_SERVO_CP, Kind, Topic
+from teleop_core.topics import DIAGNOSTICS, OPERATOR_BUTTONS, OPERATOR_SERVO_CP, Kind, Topic
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTE = "<!-- Written by docs/generate.py; change the code, not this page. -->"
@@ -62,15 +62,15 @@ def topics_page(graph: Graph) -> str:
         for topic in member.writes:
             rows.append(topic_row(topic, member.name, graph))
     rows.append(topic_row(DIAGNOSTICS, "every node", graph))
-    for topic in (HAND_SERVO_CP, HAND_BUTTONS):
+    for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS):
         row = topic_row(topic, "[a person](hand.md)", graph)
-        rows.append(row.replace("–", "haptic_master, if its operator is `remote`", 1))
+        rows.append(row.replace("–", "operator, if it is `remote`", 1))
     return page([
         "# Topics",
         "CRTK names, standard messages, SI units. Streams are offered reliable with a queue of "
         "one, so that subscribers of both kinds get them, and read best effort, "
         "`teleop/state` is latched, `diagnostics` comes once a second. The recorder takes all of "
-        "them but those of a person's hand. Those of a further arm stand below its name: "
+        "them but those of a person elsewhere. Those of a further arm stand below its name: "
         "`left/slave/servo_cp`.",
         "\n".join(rows),
         "*Late*: the reader takes what was there at the end of the last tick. *In force*: the "
@@ -106,7 +106,7 @@ def page(parts: list[str]) -> str:
 
 def diagram(graph: Graph) -> str:
     """The graph as a Mermaid diagram; dotted: what is late by a tick."""
-    lines = ["```mermaid", "flowchart LR", "  operator([operator]) --> haptic_master"]
+    lines = ["```mermaid", "flowchart LR"]
     pairs: dict[tuple[str, str, bool], list[Link]] = {}
     for link in graph.links:
         pairs.setdefault((link.writer.name, link.reader.name, link.is_late), []).append(link)

@@ -1,6 +1,6 @@
 """Be the hand: say now and then where the stylus shall be, let go, take it again elsewhere.
 
-A live session takes the same from the topic hand/servo_cp, at any rate.
+A live session takes the same from the topic operator/servo_cp, at any rate.
 """
 
 import numpy as np

@@ -54,6 +54,13 @@ def test_own_fixture_holds_the_hand_as_the_built_in_ones_do(tmp_path):
     assert all(0.1 < depth < 4.0 for depth in depths)
 
 
+def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path):
+    at_once, late, later = numbers(r"([\d.]+) s to the goal", run("own_operator", tmp_path))
+    # exp(-2 t) takes 29 mm to half a millimetre in 2.0 s; the device's friction makes it uneven.
+    assert 1.2 < at_once < 2.6
+    assert later > late > at_once + 0.1
+
+
 def test_own_controller_follows_better_than_pd(tmp_path):
     pid, pd, own = numbers(r"([\d.]+) mm RMS", run("own_controller", tmp_path))
     assert pid < 0.2

@@ -32,6 +32,8 @@ from .graph import Graph as Graph, build_graph as build_graph
 from .kernels import kernel as kernel
 from .operators import (
     Operator as Operator,
+    Seen as Seen,
+    Setting as Setting,
     following as following,
     register_operator as register_operator,
 )

@@ -31,7 +31,7 @@ off whatever the device's friction is. What is left out is zero.
 
 
 class Seen(NamedTuple):
-    """What an operator sees and feels, as it was at the end of the last tick.
+    """What an operator sees and feels, as it was told when it last made a step.
 
     Views of the signals: read them when the motion is asked for. Who answers to them is asked as
     late as possible: ``ahead=1``. What is told of the slave comes as late as a declared delay says:

@@ -1,0 +1,63 @@
+"""Make a person who sees: a hand that goes on by what it sees missing, as late as it sees it.
+
+Only who sees can be slowed down by a delay.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+import teleop_core as tc
+
+# The slave's x, y, z are the master's -z, -x, +y.
+MASTER_OF_SLAVE = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).T
+WAY = np.array([-0.02, 0.015, 0.015])  # from where the tip begins to the goal [m]
+RATE = 2.0  # share of what is missing that the hand goes in a second [1/s]
+NEAR = 0.5e-3  # there [m]
+LOOKS = 1.0  # for which the person looks on before the hand moves [s]
+
+
+def make(_: object, setting: tc.Setting) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Motion of one session: it reads what is seen at the time that it is asked."""
+    seen, place = setting.seen, np.zeros(3)
+    assert seen is not None
+    goal: list[NDArray[np.float64]] = []
+
+    def motion(times: NDArray[np.float64]) -> NDArray[np.float64]:
+        if times[0] >= LOOKS:
+            if not goal:
+                goal.append(seen.slave[:3] + WAY)
+            missing = MASTER_OF_SLAVE @ (goal[0] - seen.slave[:3])
+            place[:] += RATE * 1e-3 * len(times) * missing
+        return np.tile(place, (len(times), 1))
+
+    return motion
+
+
+SEEING = tc.Operator("seeing", make, ahead=1)  # asked for one tick at a time
+
+
+def reached(delay: float) -> float:
+    """Time [s] to the goal, to stay, if the tip is seen so late [s]."""
+    delays = [f"slave/measured_cp@operator={delay}"] if delay else []
+    recording = tc.run(
+        operator=SEEING, duration=9.0, settings={"tremor_amplitude": 0.0, "teleop.delays": delays}
+    )
+    state = recording["teleop/state"]
+    begin = state.time[state["is_following"] > 0.0][0] + LOOKS
+    tip = recording["slave/measured_cp"]
+    places = tip[["x", "y", "z"]]
+    goal = places[tip.time >= begin][0] + WAY
+    off = np.linalg.norm(places - goal, axis=1)
+    return float(tip.time[off > NEAR][-1] - begin)
+
+
+def main() -> None:
+    """Print how long the same way takes with what is seen ever later."""
+    for delay in (0.0, 0.2, 0.4):
+        print(f"seen {1e3 * delay:3.0f} ms late: {reached(delay):.2f} s to the goal")
+
+
+if __name__ == "__main__":
+    main()
