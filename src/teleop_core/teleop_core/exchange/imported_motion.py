@@ -3,17 +3,24 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.damage import damage_told
 from teleop_core.errors import RecordingError
-from teleop_core.exchange.gathering import Gathered, bridge
+from teleop_core.exchange.gathering import bridge, gather
 from teleop_core.exchange.options import ImportOptions
 from teleop_core.exchange.orientation import continuous
+from teleop_core.exchange.source import Source
+from teleop_core.exchange.spool import Spool
 from teleop_core.exchange.times import SECOND_NS, Stamps, gaps, ordered
 from teleop_core.geometry import Array, quaternion_from_rotation, quaternion_products
 from teleop_core.portable import product
+
+if TYPE_CHECKING:
+    from teleop_core.exchange.tables import Table
 
 ROWS = 20_000
 """Rows of a block."""
@@ -49,9 +56,9 @@ class Motion:
     """Poses of a hand in the master's axes.
 
     Args:
-        path: The file, for messages.
-        gathered: Its rows.
-        options: What becomes of them.
+        path: The file.
+        options: What is taken of it, and what becomes of that.
+        spool: Where its rows are kept; it must stay open as long as they are read.
 
     Attributes:
         stamp_ns: Times (N,) [ns], rising.
@@ -61,10 +68,13 @@ class Motion:
         gaps: Begin and length [s] of each gap, the longest first.
 
     Raises:
-        RecordingError: Times go back too often or stand still, or fewer than two rows are left.
+        RecordingError: The file is missing, damaged or holds no motion; times go back too often
+            or stand still, or fewer than two rows are left.
+        ParameterError: An option does not fit the file.
     """
 
-    def __init__(self, path: Path, gathered: Gathered, options: ImportOptions) -> None:
+    def __init__(self, path: Path, options: ImportOptions, spool: Spool) -> None:
+        gathered = gather(open_source(path, options), options, spool)
         self._path, self._gathered, self._options = path, gathered, options
         self.told, self.strange = list(gathered.told), gathered.strange
         filled = 0
@@ -187,3 +197,38 @@ class Motion:
         changes[1:] = (pressed[1:] != pressed[:-1]).any(axis=1)
         changes &= stamps >= 0
         return (stamps[changes], pressed[changes]) if changes.any() else None
+
+
+_BAGS = {".bag", ".mcap", ".db3"}
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is a recording of ROS: a directory of one, or a file of one."""
+    return path.is_dir() or path.suffix.lower() in _BAGS
+
+
+def open_source(path: Path, options: ImportOptions) -> Source:
+    """Source that reads a file.
+
+    Raises:
+        RecordingError: It is missing, empty, or nothing that can be read.
+        ParameterError: An option does not fit it.
+    """
+    if not path.exists():
+        raise RecordingError(path, "does not exist")
+    if is_bag(path):
+        from teleop_core.exchange.bag_source import BagSource
+
+        return BagSource(path, options)
+    from teleop_core.exchange.table_source import TableSource
+
+    return TableSource(_table(path, options), options)
+
+
+def _table(path: Path, options: ImportOptions) -> "Table":
+    from teleop_core.exchange.tables import ParquetTable
+    from teleop_core.exchange.text_table import TextTable
+
+    with damage_told(path), path.open("rb") as file:
+        magic = file.read(4)
+    return ParquetTable(path) if magic == b"PAR1" else TextTable(path, options.skip)

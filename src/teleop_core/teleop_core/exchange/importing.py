@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from teleop_core.bags.arms import ARMS_KEY
 from teleop_core.bags.writer import BagWriter
 from teleop_core.errors import RecordingError
-from teleop_core.exchange.gathering import gather
 from teleop_core.exchange.import_report import ImportReport, summary
 from teleop_core.exchange.imported_motion import Motion
-from teleop_core.exchange.opening import open_source
 from teleop_core.exchange.options import ImportOptions, Option
 from teleop_core.exchange.presets import options_of
 from teleop_core.exchange.spool import Spool
@@ -71,7 +69,7 @@ def import_recording(
         raise RecordingError(out, "exists already; choose another --out")
     with ExitStack() as spools:
         motions = {
-            arm: _motion(path, one, spools.enter_context(Spool(7))) for arm, one in wanted.items()
+            arm: Motion(path, one, spools.enter_context(Spool(7))) for arm, one in wanted.items()
         }
         first_ns = min(int(motion.stamp_ns[0]) for motion in motions.values())
         for motion in motions.values():
@@ -80,10 +78,6 @@ def import_recording(
         report = replace(found[0], others=tuple(found[1:]))
         write(motions, out, _about(path, out, wanted, report))
     return report
-
-
-def _motion(path: Path, options: ImportOptions, spool: Spool) -> Motion:
-    return Motion(path, gather(open_source(path, options), options, spool), options)
 
 
 Block = dict[Topic, tuple[Stamps, Array, Stamps]]

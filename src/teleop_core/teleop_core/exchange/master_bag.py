@@ -15,9 +15,7 @@ from teleop_core.bags.messages import QUATERNION_TOLERANCE
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.series import Series
 from teleop_core.errors import RecordingError
-from teleop_core.exchange.gathering import gather
 from teleop_core.exchange.imported_motion import Motion
-from teleop_core.exchange.opening import open_source
 from teleop_core.exchange.options import ImportOptions
 from teleop_core.exchange.spool import Spool
 from teleop_core.exchange.times import is_constant
@@ -123,9 +121,8 @@ def _of_arm(bag: Bag, prefix: str, options: ImportOptions) -> ImportOptions:
 
 def _read(path: Path, arm: str, options: ImportOptions) -> dict[Topic, Series]:
     """Streams of one arm."""
-    source = open_source(path, options)
     with Spool(7) as spool:
-        motion = Motion(path, gather(source, options, spool), options)
+        motion = Motion(path, options, spool)
         blocks = [poses for _, poses in motion.blocks()]
         presses = motion.presses()
     stamps, poses = motion.stamp_ns, np.concatenate(blocks)
