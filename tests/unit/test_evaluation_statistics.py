@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.evaluation.accumulators import Distribution, Moments
 from teleop_core.evaluation.pairing import NONE, latest, same_stamp, same_tick
-from teleop_core.evaluation.pose_errors import pose_errors
 from teleop_core.evaluation.published import COARSE, FINE, published_for
 from teleop_core.evaluation.traces import BUCKETS, SAMPLES, Envelope, spacing_s
+from teleop_core.evaluation.tracking import pose_errors
 from teleop_core.geometry import rotations_from_quaternions
 from teleop_core.robots import load_robot
 

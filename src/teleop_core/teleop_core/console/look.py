@@ -84,11 +84,6 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 """
 
 
-def hexadecimal(color: Color) -> str:
-    """Colour as pages write it."""
-    return "#" + "".join(f"{part:02x}" for part in color)
-
-
 def style() -> str:
     """Style sheet that is added to the page."""
     light, dark = ("; ".join(f"--t-color-{name}: {value}" for name, value in kind.items())

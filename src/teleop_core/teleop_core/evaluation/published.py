@@ -1,7 +1,15 @@
-"""Published figures: what the RCRT-1 reached with a Phantom Omni and a human operator."""
+"""Published figures: what the RCRT-1 and its operator reached, and which of them compare here."""
 
 import math
+from collections import Counter
 from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.controllers.source_pid import SOURCE_PID
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.windows import Window
+from teleop_core.topics import SLAVE_MEASURED_CP
 
 SOURCE = "Vongbunyong 2008, Table 8.2"
 POSITION_SHARE, ANGLE_FACTOR = 0.15, 1.6
@@ -59,3 +67,34 @@ def agrees(value: float | None, published: float, share: float) -> bool | None:
 def agrees_by_factor(value: float | None, published: float, factor: float) -> bool | None:
     """Whether a figure is within a factor of the published one; None without a figure."""
     return None if value is None else published / factor <= value <= published * factor
+
+
+class Gains:
+    """Accumulator of how many slave samples each gain was in force for."""
+
+    def __init__(self, context: Context) -> None:
+        self._robot, self._origin = context.robot, context.origin
+        self._counts: Counter[float] = Counter()
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        column = window.states(SLAVE_MEASURED_CP).column("gain")
+        gains, counts = np.unique(column, return_counts=True)
+        self._counts.update(
+            {g: n for g, n in zip(gains.tolist(), counts.tolist(), strict=True) if g}
+        )
+
+    @property
+    def gain(self) -> float | None:
+        """Gain that was in force for most slave samples; None without teleop/state."""
+        return self._counts.most_common(1)[0][0] if self._counts else None
+
+    @property
+    def published(self) -> Published | None:
+        """Published figures of this gain, robot and plant; None if there are none."""
+        return published_for(self.gain, self._robot, self._origin.plant)
+
+    @property
+    def is_source(self) -> bool:
+        """Whether the machine itself may have run, or what is to predict it, control law too."""
+        return self._origin.plant is None or self._origin.controller == SOURCE_PID.name

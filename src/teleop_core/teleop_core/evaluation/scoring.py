@@ -14,12 +14,12 @@ from teleop_core.errors import EvaluationError, PartError, RecordingError
 from teleop_core.evaluation.bands import Band, bands_of
 from teleop_core.evaluation.context import Accumulator, Context
 from teleop_core.evaluation.figure import Figure
-from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import Metric
 from teleop_core.evaluation.metrics.reach import COMPARABLE, ReachScore
 from teleop_core.evaluation.metrics.reach import GROUP as REACH_GROUP
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.plain import Plain, leaves, plain
+from teleop_core.evaluation.published import Gains
 from teleop_core.evaluation.registry import all_metrics
 from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.score import Result, Score, Session

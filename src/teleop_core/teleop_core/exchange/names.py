@@ -61,11 +61,6 @@ def find_time(names: Sequence[str]) -> tuple[int, ...]:
     return ()
 
 
-def find_position(names: Sequence[str]) -> tuple[int, ...]:
-    """Columns of x, y and z of a position; empty if no names say it."""
-    return next(iter(find_positions(names)), ())
-
-
 def find_positions(names: Sequence[str]) -> list[tuple[int, ...]]:
     """Columns of x, y and z of all positions that the names say equally well, the first first."""
     found = _series(names, "xyz", without="w") or _series(names, "xyz")

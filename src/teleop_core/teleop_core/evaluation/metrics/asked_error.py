@@ -7,7 +7,7 @@ from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, SpreadMetric
 from teleop_core.evaluation.pairing import NONE, latest, same_stamp
-from teleop_core.evaluation.pose_errors import angles_between
+from teleop_core.evaluation.tracking import angles_between
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array, quaternion_products
 from teleop_core.signals import STATE

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from teleop_core.evaluation.approach import approach_end_ns
+from teleop_core.errors import TeleopError
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.metric import Key, Metric, keys_of
@@ -15,7 +15,39 @@ from teleop_core.evaluation.motion_samples import MotionSamples
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.state_history import States
 from teleop_core.evaluation.windows import Window
+from teleop_core.operators import OPERATORS
+from teleop_core.operators.parameters import OperatorParameters
+from teleop_core.parameters import build
+from teleop_core.signals import STATE
 from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Topic
+
+
+def approach_end_ns(context: Context) -> int:
+    """Time at which the approach is over [ns].
+
+    The approach begins when teleop/state first says that the slave follows, and takes as long as
+    the stored configuration says. Recordings of others have none, and begin at once.
+    """
+    history, start_ns = context.history, context.bag.start_ns
+    begin_ns = start_ns
+    follows = history.stamp_ns[history.rows[:, STATE["is_following"]] > 0.0]
+    if len(follows):
+        begin_ns = max(start_ns, int(follows[0]))
+    return begin_ns + round(approach_time(context) * 1e9)
+
+
+def approach_time(context: Context) -> float:
+    """How long the operator approached the centre of its motion [s]; 0 if nothing is known."""
+    values = context.origin.operator
+    try:
+        common = build(OperatorParameters, values, "operator.")
+        operator = OPERATORS.find(common.kind.kind)
+    except TeleopError:
+        return 0.0
+    # A recorded motion is approached where it has been moved to a centre.
+    is_moved = operator.length is not None and any(common.center)
+    return common.approach_time if values and (operator.approaches or is_moved) else 0.0
+
 
 _SEGMENT_NAMES = ("time_s", "path_mm", "speed_median_mm_s", "speed_p95_mm_s", "idle_share",
                   "submovements", "reversals", "sparc", "ldlj")  # fmt: skip

@@ -13,13 +13,11 @@ from teleop_core.evaluation.figure import (
     line,
     stacked_axes,
 )
-from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics.position_error import COMMAND_GROUP, GROUP
-from teleop_core.evaluation.pose_errors import PoseErrors
-from teleop_core.evaluation.published import ANGLE_FACTOR, agrees_by_factor
+from teleop_core.evaluation.published import ANGLE_FACTOR, Gains, agrees_by_factor
 from teleop_core.evaluation.rows import Row, error_rows, number, spread_rows
-from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, tracked
+from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, PoseErrors, tracked
 from teleop_core.evaluation.windows import Window
 
 TURNS = ("roll", "pitch", "yaw")

@@ -8,13 +8,11 @@ import numpy as np
 
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, line, time_axis
-from teleop_core.evaluation.gains import Gains
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, SpreadMetric
 from teleop_core.evaluation.pairing import same_stamp
-from teleop_core.evaluation.pose_errors import pose_errors
-from teleop_core.evaluation.published import POSITION_SHARE, agrees
+from teleop_core.evaluation.published import POSITION_SHARE, Gains, agrees
 from teleop_core.evaluation.rows import Row, number, spread_rows
-from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, rows_of, tracked
+from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, pose_errors, rows_of, tracked
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array
 from teleop_core.topics import SLAVE_TRUE_CP
