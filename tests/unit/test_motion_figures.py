@@ -107,7 +107,7 @@ def test_turn_rate_is_that_of_a_steady_turn_whatever_the_signs(axis):
     angles = np.arange(0.0, 7.0, 0.02)
     turns = Rotation.from_rotvec(angles[:, None] * axis).as_quat(scalar_first=True)
     turns[::3] *= -1.0
-    np.testing.assert_allclose(turn_rates(turns, RATE), 0.02 * RATE, rtol=1e-6)
+    np.testing.assert_allclose(turn_rates(turns), 0.02 * RATE, rtol=1e-6)
 
 
 @pytest.mark.parametrize("rate", [100.0, 609.0, 1000.0])

@@ -41,12 +41,9 @@ class Scene:
     Args:
         server: The page.
         arms: Arms of the session, at least one.
-        is_dark: Whether its ground is dark.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, arms: Iterable[Arm], *, is_dark: bool = False
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, arms: Iterable[Arm]) -> None:
         self._server = server
         self.arms: dict[str, ArmNodes] = {}
         side = 0.0
@@ -64,7 +61,7 @@ class Scene:
                 side += float(low[1]) - 0.1 * nodes.bodies.size
                 self.arms[arm.name] = nodes
             self._ground()
-            self.set_dark(is_dark=is_dark)
+            self.set_dark(is_dark=False)
             self._begin()
 
     # -- drawing ---------------------------------------------------------------------------------

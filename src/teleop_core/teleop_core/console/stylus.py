@@ -22,6 +22,7 @@ STEP_LENGTH, STEP_TURN = 1e-3, np.radians(1.0)
 """A small step [m, rad]."""
 LINGER = 1.0
 """Time for which the stylus is held after a small step, in which the next may come [s]."""
+_SIZE = 0.08  # of a gizmo [m]
 
 
 @dataclass
@@ -56,7 +57,6 @@ class Stylus:
         may_drive: Whether a browser may command the arms, by its number.
         on_hold: Told the arm and the pose (7,) in master_base that is wanted.
         on_let_go: Told the arm that is let go of.
-        scale: Size of the gizmos [m].
     """
 
     def __init__(
@@ -66,7 +66,6 @@ class Stylus:
         may_drive: Callable[[int], bool],
         on_hold: Callable[[str, Array], None],
         on_let_go: Callable[[str], None],
-        scale: float = 0.08,
     ) -> None:
         self._time: float | None = None
         self._may_drive, self._on_hold, self._on_let_go = may_drive, on_hold, on_let_go
@@ -74,7 +73,7 @@ class Stylus:
         self._hands = {
             arm: _Hand(
                 server.scene.add_transform_controls(
-                    f"{node}/grip", scale=scale, depth_test=False, opacity=0.8
+                    f"{node}/grip", scale=_SIZE, depth_test=False, opacity=0.8
                 )
             )
             for arm, node in scene.masters.items()

@@ -63,20 +63,20 @@ def resampled(times: Array, rows: Array, rate: float = RATE) -> Array:
     return np.column_stack([np.interp(wanted, times, column) for column in rows.T])
 
 
-def velocities(position: Array, rate: float = RATE) -> Array:
+def velocities(position: Array) -> Array:
     """Central differences of positions (N, 3), one-sided at both ends; [m/s] for [m]."""
     if len(position) < 2:
         return np.zeros_like(position)
-    found: Array = np.gradient(position, 1.0 / rate, axis=0)
+    found: Array = np.gradient(position, 1.0 / RATE, axis=0)
     return found
 
 
-def turn_rates(attitude: Array, rate: float = RATE) -> Array:
+def turn_rates(attitude: Array) -> Array:
     """Angular speed (N - 1,) [rad/s] between unit quaternions (N, 4), w first, of any sign."""
     # The chord between two quaternions keeps small angles exact, where their product does not.
     chord = np.linalg.norm(np.diff(attitude, axis=0), axis=1)
     other = np.linalg.norm(attitude[1:] + attitude[:-1], axis=1)
-    found: Array = 4.0 * rate * np.arcsin(np.minimum(0.5 * np.minimum(chord, other), 1.0))
+    found: Array = 4.0 * RATE * np.arcsin(np.minimum(0.5 * np.minimum(chord, other), 1.0))
     return found
 
 
@@ -141,12 +141,11 @@ def log_dimensionless_jerk(velocity: Array, rate: float) -> float | None:
     return -math.log((len(velocity) / rate) ** 3 / peak * total)
 
 
-def velocity_spectrum(parts: Iterable[Array], rate: float = RATE) -> tuple[Array, Array]:
+def velocity_spectrum(parts: Iterable[Array]) -> tuple[Array, Array]:
     """Power density of velocity, summed over its axes: Welch's mean of overlapping segments.
 
     Args:
         parts: Velocities (N, 3) [m/s] of each stretch; short ones are padded with zeros.
-        rate: Samples per second [Hz].
 
     Returns:
         Frequencies (129,) [Hz] and densities (129,) [m²/s]; zeros without motion.
@@ -168,9 +167,9 @@ def velocity_spectrum(parts: Iterable[Array], rate: float = RATE) -> tuple[Array
             )
             total += (np.abs(spectrum) ** 2).sum(axis=1) * (size / np.sum(window**2))
             weight += size
-    frequency = np.asarray(np.fft.rfftfreq(SPECTRUM_SAMPLES, 1.0 / rate), np.float64)
+    frequency = np.asarray(np.fft.rfftfreq(SPECTRUM_SAMPLES, 1.0 / RATE), np.float64)
     total[1:-1] *= 2.0  # what stands at negative frequencies
-    return frequency, total / max(weight, 1) / rate
+    return frequency, total / max(weight, 1) / RATE
 
 
 def frequency_holding(share: float, frequency: Array, density: Array) -> float | None:
