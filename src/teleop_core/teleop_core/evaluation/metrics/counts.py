@@ -34,10 +34,6 @@ class NodesMetric(Metric):
         """Counts per node and name."""
         return self._counts
 
-    def rows(self) -> list[Row]:
-        """None: they are for JSON."""
-        return []
-
 
 def _read_counts(bag: Bag) -> Counts:
     """Counts per node and name; empty without diagnostics."""

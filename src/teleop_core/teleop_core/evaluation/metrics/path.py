@@ -27,7 +27,7 @@ from teleop_core.evaluation.metrics.fixture import FixtureMetric
 from teleop_core.evaluation.metrics.position_error import PositionErrorMetric
 from teleop_core.evaluation.outlines import Outline, kinds_of, largest, outlines_of
 from teleop_core.evaluation.plain import Values
-from teleop_core.evaluation.rows import Row, number
+from teleop_core.evaluation.rows import number
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.tracking import TRACKED, tracked
 from teleop_core.evaluation.windows import Window
@@ -82,10 +82,6 @@ class PathMetric(Metric):
     def values(self) -> Values:
         """Nothing: it only draws."""
         return {}
-
-    def rows(self) -> list[Row]:
-        """None."""
-        return []
 
     def figures(self) -> list[Figure]:
         """Paths in space and per plane, and positions against time."""

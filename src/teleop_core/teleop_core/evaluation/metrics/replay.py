@@ -12,7 +12,6 @@ from teleop_core.evaluation.metrics.path import PathMetric
 from teleop_core.evaluation.outlines import outlines_of
 from teleop_core.evaluation.plain import Values
 from teleop_core.evaluation.replay_figure import replay_figure
-from teleop_core.evaluation.rows import Row
 from teleop_core.evaluation.windows import Window
 from teleop_core.geometry import Array
 from teleop_core.robots import load_robot_set
@@ -62,10 +61,6 @@ class ReplayMetric(Metric):
     def values(self) -> Values:
         """Nothing: it only draws."""
         return {}
-
-    def rows(self) -> list[Row]:
-        """None."""
-        return []
 
     def figures(self) -> list[Figure]:
         """The robot as it moved; nothing if that is not known."""
