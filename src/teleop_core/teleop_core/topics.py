@@ -173,6 +173,7 @@ class Topic:
         adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
             another source of force; empty for a topic of its own.
         arm: Namespace; empty for the default arm.
+        is_seldom: Whether it is sent only where it is not zero, and once where it becomes zero.
         message: Name of the ROS message type where it carries no values, such as a robot's model;
             empty for that of its kind.
     """
@@ -185,6 +186,7 @@ class Topic:
     columns: tuple[str, ...] = ()
     adds_to: str = ""
     arm: str = ""
+    is_seldom: bool = False
     message: str = ""
 
     @property
@@ -275,7 +277,7 @@ HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
 HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base")
 """Which buttons of the stylus the operator presses."""
 HAND_TREMOR = Topic(
-    "hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z")
+    "hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z"), is_seldom=True
 )  # fmt: skip
 """By how much the tip is off [m], whatever the device's friction swallows of the hand's motion."""
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
@@ -289,7 +291,7 @@ OPERATOR_BUTTONS = Topic(
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (
-    HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR,
+    HAND_SERVO_CP, HAND_BUTTONS,
     MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT,
     MASTER_SERVO_CF,
     SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_REACH, SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP,
@@ -298,5 +300,5 @@ STREAMS = (
 """Topics of the built-in stages that carry one message per tick."""
 REPORTS = (SLAVE_OPERATION, TELEOP_STATE)
 """Topics of the built-in stages that are sent where they change."""
-ALL = (*STREAMS, *REPORTS, DIAGNOSTICS)
+ALL = (*STREAMS, HAND_TREMOR, *REPORTS, DIAGNOSTICS)
 BY_NAME = {topic.name: topic for topic in ALL}

@@ -12,6 +12,8 @@ from teleop_core.topics import MASTER_MEASURED_CF, Topic
 
 _FULL = 3.3
 """Force that is told a person in full [N]; a rumble has no more."""
+_LOOK = 10
+"""Ticks from one look at what is told to the next, of operators who do not answer to it at once."""
 
 
 class OperatorNode(TickingNode):
@@ -19,6 +21,7 @@ class OperatorNode(TickingNode):
 
     _hand: HandInput | None = None
     _device: DeviceHand | None = None
+    _ticks = 0
 
     def setup(self, parameters: OperatorParameters) -> None:
         """Make the operator and open its topics, and its device."""
@@ -55,7 +58,9 @@ class OperatorNode(TickingNode):
 
     def read_ports(self, trigger: Topic | None = None) -> None:
         """Bring the signals up to date, and hear who says where the stylus shall be."""
-        super().read_ports(trigger)
+        self._ticks += 1
+        if self.stage.ahead == 1 or not self.has_own_loop or self._ticks % _LOOK == 0:
+            super().read_ports(trigger)
         if self._hand is not None:
             self._hand.read()
 

@@ -81,6 +81,7 @@ class Ports:
         self._ports = [(p.name, f"{p.field}_ns", self.inputs[p.name]) for p in stage.reads]
         self._stamped: list[tuple[Output, str]] = []
         self._passed_on: dict[Output, int] = {}  # stamps that went out last
+        self._seldom: dict[Output, bool] = {}  # whether what went out last was not zero
         for topic in stage.writes:
             if topic.kind is not Kind.REPORT:
                 form = layout(topic.of_arm(arm), joint_names)
@@ -89,6 +90,8 @@ class Ports:
                 self._stamped.append((output, self._stamp_field(topic)))
                 if topic.stamp.of and not topic.stamp.is_in_force:
                     self._passed_on[output] = 0
+                if topic.is_seldom:
+                    self._seldom[output] = False
 
     def _stamp_field(self, written: Topic) -> str:
         """Field of the stamp that an output passes on; empty for the time of sampling."""
@@ -138,6 +141,10 @@ class Ports:
                 if self._passed_on[output] == stamp_ns:
                     continue
                 self._passed_on[output] = stamp_ns
+            if output in self._seldom:
+                before, self._seldom[output] = self._seldom[output], output.is_moving()
+                if not (before or self._seldom[output]):
+                    continue
             output.send(stamp_ns)
 
     def concerns(self) -> list[str]:

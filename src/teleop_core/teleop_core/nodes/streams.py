@@ -343,6 +343,10 @@ class Output:
             self.tap(data, sent_ns)
         self.sent += 1
 
+    def is_moving(self) -> bool:
+        """Whether a present value is not zero."""
+        return bool(self._source.any())
+
     def is_sound(self) -> bool:
         """Whether the present values are finite."""
         return bool(np.isfinite(self._source).all())

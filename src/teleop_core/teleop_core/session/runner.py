@@ -235,6 +235,7 @@ class NewSamples:
 
     def __init__(self) -> None:
         self._last: dict[str, int] = {}
+        self._was_moving: dict[str, bool] = {}
 
     def of(
         self, topic: Topic, block: Any, log_ns: NDArray[np.int64]
@@ -245,6 +246,10 @@ class NewSamples:
             return stamps, values, log_ns
         is_new = np.diff(stamps, prepend=self._last.get(topic.name, 0)) != 0
         self._last[topic.name] = int(stamps[-1])
+        if topic.is_seldom:
+            moving = values.any(axis=1)
+            is_new &= moving | np.append(self._was_moving.get(topic.name, False), moving[:-1])
+            self._was_moving[topic.name] = bool(moving[-1])
         if is_new.all():
             return stamps, values, log_ns
         return stamps[is_new], values[is_new], log_ns[is_new]
