@@ -55,6 +55,7 @@ class Numbers:
         longest_outage: Silence after which the arm is PAUSED [s].
         longest_silence: Silence of the arm itself that is a fault [s].
         longest_pause: Silence of the hand after which it is aligned anew [s].
+        hand_timeout: Silence of the hand that lets go of the stylus [s].
         button_silence: Silence of the buttons that counts as a pressed clutch [s].
         effort_time: Time at the effort limit that is a fault [s].
         pressing_time: Time beyond a joint's limit that is told [s].
@@ -71,6 +72,7 @@ class Numbers:
     longest_outage: float
     longest_silence: float
     longest_pause: float
+    hand_timeout: float
     button_silence: float
     effort_time: float
     pressing_time: float
@@ -109,6 +111,7 @@ class Numbers:
             longest_outage=given.operation.longest_outage or math.inf,
             longest_silence=given.operation.longest_silence,
             longest_pause=scaling.longest_pause,
+            hand_timeout=configuration.group("haptic_master").hand_timeout,
             button_silence=scaling.plausible.button_silence,
             effort_time=given.operation.effort_time,
             pressing_time=given.operation.pressing_time,

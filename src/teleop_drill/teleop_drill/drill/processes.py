@@ -17,6 +17,7 @@ from teleop_drill.drill.exercise import (
     unheard,
 )
 from teleop_drill.drill.inside import HANGS, RAISES, WORKS
+from teleop_drill.drill.numbers import Numbers
 
 FREEZE = 3.0
 """For how long a process is stopped [s]."""
@@ -86,6 +87,10 @@ def _frozen(node: str) -> Exercise:
     )  # fmt: skip
 
 
+def _let_go(numbers: Numbers) -> float:
+    return numbers.hand_timeout
+
+
 def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exercise, Exercise]:
     """A stage that breaks in a process of its own, and in that of all."""
     alone = Exercise(
@@ -100,6 +105,11 @@ def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exerci
 
 
 PROCESSES = (
+    Exercise(  # the stylus is let go of, and the arm holds as with the clutch pressed
+        name="kill_operator", text="operator killed", inject=partial(_kill, "operator"),
+        motion=Motion.HOLDS, allowed=_let_go, master=Master.DEVICE, watch=2.6, warns=True,
+        ways=(False,),
+    ),
     *(_killed(node) for node in _STAGES),
     Exercise(
         name="kill_slave", text="slave killed", inject=partial(_kill, "slave"),
