@@ -23,8 +23,8 @@ sys.path.append(str(Path(__file__).parents[1] / "tests"))  # the page is used as
 from browser import VIEWER, Tab
 from console_process import ConsoleProcess
 from teleop_core.bags.reader import Bag
-from teleop_core.geometry import Array
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
+from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
+from teleop_core.kernels.geometry import Array
 
 SIZE = (800, 450)  # px
 GRIP, TIP, ARROW, WAY = "/arm/master/grip", "/arm/robot/tip", 0.07, 0.012  # m

@@ -26,7 +26,7 @@ import numpy as np
 import psutil
 
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
 
 KINDS = {"five processes": (), "composed": ("--composed",)}
 _BUSY = "while True: pass"

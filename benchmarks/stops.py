@@ -26,12 +26,12 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 
 from teleop_core.bags.layouts import layout
+from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.operation import STOP_TOPIC
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.streams import Subscription
 from teleop_core.robots import load_robot
-from teleop_core.topics import SLAVE_SETPOINT_JS
 
 _JOINTS = load_robot("rcrt1").joint_names
 _PATIENCE = 120.0

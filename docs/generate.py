@@ -9,16 +9,16 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from teleop_core.base.parameters import specs
 from teleop_core.evaluation import key_table
-from teleop_core.geometry import Array
-from teleop_core.graph import Graph, Link, build_graph
-from teleop_core.parameters import specs
-from teleop_core.plants.hardware import HardwareParameters
+from teleop_core.graph.graph import Graph, Link, build_graph
+from teleop_core.graph.layers import declared_groups
+from teleop_core.graph.topics import DIAGNOSTICS, OPERATOR_BUTTONS, OPERATOR_SERVO_CP, Kind, Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import Robot, load_robot
 from teleop_core.robots.hardware import NUMBERS
 from teleop_core.session.configuration import parameter_rows
-from teleop_core.session.layers import declared_groups
-from teleop_core.topics import DIAGNOSTICS, OPERATOR_BUTTONS, OPERATOR_SERVO_CP, Kind, Topic
+from teleop_core.slave.plants.hardware import HardwareParameters
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTE = "<!-- Written by docs/generate.py; change the code, not this page. -->"

@@ -3,7 +3,7 @@
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.operation import State
+from teleop_core.slave.operation import State
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from teleop_core.operation import State
+from teleop_core.slave.operation import State
 from teleop_drill import Cure, Exercise, Motion, Rig, hand, register_exercise
 
 

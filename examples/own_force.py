@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.topics import MASTER_MEASURED_CP, MASTER_MEASURED_CV, passed_on
+from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_MEASURED_CV, passed_on
 
 DAMPING_CF = tc.Topic(
     "master/damping_cf", tc.Kind.WRENCH, passed_on("master/measured_cp"), "master_base",

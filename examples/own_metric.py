@@ -4,7 +4,7 @@ import numpy as np
 
 import teleop_core as tc
 from teleop_core.evaluation import Context, Moments, Spread, Window
-from teleop_core.topics import SLAVE_SETPOINT_CP
+from teleop_core.graph.topics import SLAVE_SETPOINT_CP
 
 
 class JerkMetric(tc.Metric):

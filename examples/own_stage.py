@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.topics import SLAVE_SERVO_CP, passed_on
+from teleop_core.graph.topics import SLAVE_SERVO_CP, passed_on
 
 LIMITED = tc.Topic("slave/limited_cp", tc.Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
 

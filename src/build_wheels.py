@@ -22,8 +22,8 @@ CORE, OTHERS = "teleop_core", ("teleop_lab", "teleop_drill")
 COMPILE = "import sys; from teleop_core.cli import main; sys.exit(main(['compile', '--all']))"
 RUN = """
 import hashlib
-from teleop_core import api
-from teleop_core.controllers import CONTROLLERS
+from teleop_core.session import api
+from teleop_core.slave.controllers import CONTROLLERS
 from teleop_core.kernels.progress import compiled_count
 from teleop_core.robots import ROBOTS
 from teleop_core.session.virtual import VirtualTime

@@ -9,9 +9,9 @@ import numpy as np
 from teleop_core.console.app import Console
 from teleop_core.console.link import Arm, ArmView, View
 from teleop_core.console.server import ConsoleServer
-from teleop_core.operation import Fault, State, operation_text
+from teleop_core.graph.topics import MASTER_MEASURED_CP, OPERATION
 from teleop_core.robots import load_robot_set
-from teleop_core.topics import MASTER_MEASURED_CP, OPERATION
+from teleop_core.slave.operation import Fault, State, operation_text
 
 POSE = np.array([0.0, -0.0655, -0.0881, 1.0, 0.0, 0.0, 0.0])
 

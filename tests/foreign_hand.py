@@ -3,7 +3,7 @@
 import numpy as np
 from sensor_msgs.msg import Joy
 
-from teleop_core import topics
+from teleop_core.graph import topics
 
 MS = 1_000_000
 WHERE = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0]

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from teleop_core.controllers import CONTROLLERS
-from teleop_core.fixtures import FIXTURES
-from teleop_core.operators import OPERATORS
-from teleop_core.plants import PLANTS
-from teleop_core.stage import STAGES
+from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.chain.operators import OPERATORS
+from teleop_core.graph.stage import STAGES
+from teleop_core.slave.controllers import CONTROLLERS
+from teleop_core.slave.plants import PLANTS
 
 REGISTRIES = (CONTROLLERS, FIXTURES, OPERATORS, PLANTS, STAGES)
 

@@ -27,8 +27,8 @@ from contextlib import contextmanager
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from teleop_core.errors import TeleopError
-from teleop_core.texts import LONGEST_LINE, printable
+from teleop_core.base.errors import TeleopError
+from teleop_core.base.texts import LONGEST_LINE, printable
 
 USUAL = 20_000
 CASES = int(os.environ.get("TELEOP_FUZZ_CASES", USUAL))

@@ -1,9 +1,9 @@
 """Held master: a haptic master in the hand of an operator, tick by tick, without the slave."""
 
-from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
-from teleop_core.master.operator import RunningOperator
-from teleop_core.operators.parameters import OperatorParameters
-from teleop_core.topics import HAND_BUTTONS, HAND_SERVO_CP, HAND_TREMOR
+from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.chain.master.operator import RunningOperator
+from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.graph.topics import HAND_BUTTONS, HAND_SERVO_CP, HAND_TREMOR
 
 _HAND = [topic.field for topic in (HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR)]
 

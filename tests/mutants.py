@@ -55,7 +55,7 @@ def _mutant(
     return Mutant(name, text, ((file, before, after),), rows, composed)
 
 
-_SLAVE, _COMMANDS, _WATCH = "nodes/slave.py", "slave/commands.py", "operation/watch.py"
+_SLAVE, _COMMANDS, _WATCH = "nodes/slave.py", "slave/commands.py", "slave/operation/watch.py"
 _RECORDER, _STAGE, _STEP = "nodes/recorder.py", "slave/slave.py", "slave/step.py"
 _RELEASED = """            self.request(Event.STOP)
         elif self.state["state"] == State.FAULT:
@@ -85,15 +85,15 @@ MUTANTS = (
     Mutant("press_lost", "the stop button's reader keeps one message",
            (("nodes/operation.py", "history=HistoryPolicy.KEEP_ALL,",
              "history=HistoryPolicy.KEEP_LAST, depth=1,"),
-            ("operation/presses.py", "missing = max(0, number - last - 1)", "missing = 0")),
+            ("slave/operation/presses.py", "missing = max(0, number - last - 1)", "missing = 0")),
            ("stop_brief",)),
     _mutant("stop_soft", "a stop brakes as softly as a pause", _STEP,
             "AT_ONCE if s.state == _FAULT else AT_LIMITS", "AT_LIMITS", "stop_topic"),
-    _mutant("reset_not_needed", "enable ends a stop without reset", "operation/states.py",
+    _mutant("reset_not_needed", "enable ends a stop without reset", "slave/operation/states.py",
             "{_D: _E, _E: _E, _P: _E}", "{_D: _E, _E: _E, _P: _E, _F: _E}", "stop_latched"),
     _mutant("heartbeat_ignored", "a silent stop button is none", _WATCH,
             "if p.heartbeat_ns > 0 and", "if p.heartbeat_ns > 10**18 and", "heartbeat"),
-    _mutant("resume_moving", "resume is taken while the arm moves", "operation/states.py",
+    _mutant("resume_moving", "resume is taken while the arm moves", "slave/operation/states.py",
             "and s.is_moving:", "and s.is_moving > 1:", "resume_early"),
     _mutant("no_pause", "silence never pauses", _COMMANDS,
             "0 < p.outage_ns < silence_ns", "0 < p.outage_ns < silence_ns - 10**18",
@@ -137,10 +137,11 @@ MUTANTS = (
     _mutant("old_messages", "messages older than the last one are taken", "nodes/streams.py",
             "check(self.topic.kind, stamp_ns, values, last_ns)",
             "check(self.topic.kind, stamp_ns, values, None)", "replayed", "stamps_frozen"),
-    _mutant("plausibility_off", "a hand may be anywhere at once", "mapping/plausibility.py",
+    _mutant("plausibility_off", "a hand may be anywhere at once", "chain/mapping/plausibility.py",
             "    if not is_sound:\n", "    is_sound = True\n    if not is_sound:\n",
             "teleport", "infinite"),
-    _mutant("buttons_forgotten", "silent buttons are released ones", "mapping/plausibility.py",
+    _mutant("buttons_forgotten", "silent buttons are released ones",
+            "chain/mapping/plausibility.py",
             "return bool(s.is_lost)", "return False", "buttons_silent"),
     _mutant("measured_lies", "the arm measures half of what it moves", "slave/simulation.py",
             "row.slave_measured_js[i] = s.measured[i]",

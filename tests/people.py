@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.series import Series
-from teleop_core.recording import Recording
-from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.session.recording import Recording
 
 _BEGIN_NS = 5_000_000_000
 

@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import (
+from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph.topics import (
     ALL,
     SLAVE_MEASURED_CP,
     SLAVE_SERVO_CP,

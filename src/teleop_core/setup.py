@@ -33,7 +33,7 @@ setup(
         "teleop_core": [
             "py.typed",
             "*.pyi",
-            "exchange/*.pyi",
+            "session/exchange/*.pyi",
             "console/page.js",
             "evaluation/report/*",
             "kernels/compiled/**/*.nb?",

@@ -16,8 +16,8 @@ from teleop_core.bags.messages import (
     read_reports,
     report,
 )
-from teleop_core.stage import STAGES
-from teleop_core.topics import DIAGNOSTICS, Kind
+from teleop_core.graph.stage import STAGES
+from teleop_core.graph.topics import DIAGNOSTICS, Kind
 
 JOINTS = ("theta1", "theta2", "d3", "theta4", "theta5", "theta6")
 READ = {topic.name: topic for name in STAGES.names() for topic in STAGES.find(name).reads}

@@ -25,8 +25,8 @@ from fuzzing import NASTY, assert_one_line, damaged, fuzz
 from teleop_core import cli
 from teleop_core.bags.reader import Bag
 from teleop_core.console.recorded import RecordedLink
+from teleop_core.graph.layers import config_folder
 from teleop_core.robots import load_robot
-from teleop_core.session.layers import config_folder
 from teleop_lab.fitting.table import read_rests
 
 pytestmark = pytest.mark.slow

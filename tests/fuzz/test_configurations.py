@@ -8,11 +8,10 @@ from fuzzing import NASTY, TEXTS, assert_one_line, damaged, fuzz, lawful
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.reports import report
 from teleop_core.bags.series import Series
+from teleop_core.base.parameters import specs
+from teleop_core.base.plain_yaml import UnreadableError, parse
 from teleop_core.evaluation.origin import read_origin
-from teleop_core.parameters import specs
-from teleop_core.plain_yaml import UnreadableError, parse
-from teleop_core.session.configuration import Configuration, configure
-from teleop_core.session.layers import (
+from teleop_core.graph.layers import (
     config_folder,
     declared_groups,
     list_scenarios,
@@ -20,8 +19,9 @@ from teleop_core.session.layers import (
     parse_setting,
     scenario_file,
 )
+from teleop_core.graph.topics import MASTER_BUTTONS, TELEOP_STATE
+from teleop_core.session.configuration import Configuration, configure
 from teleop_core.session.runner import recorded_configuration
-from teleop_core.topics import MASTER_BUTTONS, TELEOP_STATE
 
 BASE = load_file(config_folder() / "teleop.yaml")
 KEYS = [

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType, Writer
 
 from fuzzing import NASTY, TEXTS, damaged, fuzz
-from teleop_core import topics
 from teleop_core.bags import compression, ros_types
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.bags.reports import report
 from teleop_core.bags.series import kind_of
 from teleop_core.bags.writer import BagWriter
-from teleop_core.topics import Kind
+from teleop_core.graph import topics
+from teleop_core.graph.topics import Kind
 
 TOPICS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_SERVO_JP, topics.TELEOP_STATE)
 MS = 1_000_000

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import strategies as st
 
 from fuzzing import fuzz
-from teleop_core.operation import Fault, OperationParameters, State
-from teleop_core.operation.states import COMMANDS
+from teleop_core.slave.operation import Fault, OperationParameters, State
+from teleop_core.slave.operation.states import COMMANDS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 WORDS = st.one_of(

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 from held_master import HeldMaster
-from teleop_core.evaluation.metrics.contact import TOUCH_J
-from teleop_core.mapping.motion_scaling import MotionScaling
-from teleop_core.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.mapping.walls import passive_stiffness
-from teleop_core.master.haptic_master import (
+from teleop_core.base.parameters import build
+from teleop_core.chain.mapping.motion_scaling import MotionScaling
+from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
+from teleop_core.chain.mapping.walls import passive_stiffness
+from teleop_core.chain.master.haptic_master import (
     REST_POSITION,
     DeviceParameters,
     HandParameters,
     HapticMasterParameters,
 )
-from teleop_core.operators import register_operator
-from teleop_core.operators.parameters import ButtonParameters, OperatorParameters
-from teleop_core.parameters import build
-from teleop_core.signals import TICK_NS
+from teleop_core.chain.operators import register_operator
+from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
+from teleop_core.evaluation.metrics.contact import TOUCH_J
+from teleop_core.graph.signals import TICK_NS
 
 HALF = 2e-3  # from the middle of the box to its walls [m]
 RENDERED = DeviceParameters().stiffness  # what the device can render on x, y, z [N/m]

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from teleop_core.operation import OperationParameters, State
-from teleop_core.operation.faults import Fault
-from teleop_core.operation.states import COMMANDS
-from teleop_core.plants import PLANTS
+from teleop_core.slave.operation import OperationParameters, State
+from teleop_core.slave.operation.faults import Fault
+from teleop_core.slave.operation.states import COMMANDS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.plants import PLANTS
 
 TICK_NS = 1_000_000
 SEQUENCES = 100_000

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from teleop_core.geometry import rotation, transform
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot_set
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime

@@ -6,20 +6,23 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from teleop_core.api import configuration
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.series import Series
-from teleop_core.geometry import pose_from_transform
-from teleop_core.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
-from teleop_core.mapping.motion_scaling import MotionScaling
-from teleop_core.mapping.parameters import MotionScalingParameters
-from teleop_core.mapping.plausibility import PlausibilityParameters
-from teleop_core.operators.shapes import minimum_jerk
+from teleop_core.chain.mapping.inverse_kinematics import (
+    InverseKinematics,
+    InverseKinematicsParameters,
+)
+from teleop_core.chain.mapping.motion_scaling import MotionScaling
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.mapping.plausibility import PlausibilityParameters
+from teleop_core.chain.operators.shapes import minimum_jerk
+from teleop_core.graph.signals import STATE, TICK_NS
+from teleop_core.graph.topics import MASTER_MEASURED_CP, NO_COMMAND_NS, SLAVE_REACH, Limit
+from teleop_core.kernels.geometry import pose_from_transform
 from teleop_core.robots import load_robot
+from teleop_core.session.api import configuration
 from teleop_core.session.runner import replayed_blocks
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.signals import STATE, TICK_NS
-from teleop_core.topics import MASTER_MEASURED_CP, NO_COMMAND_NS, SLAVE_REACH, Limit
 
 ANY_HAND = PlausibilityParameters(
     speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from teleop_core.mapping.motion_scaling import MotionScaling
-from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
-from teleop_core.mapping.plausibility import PlausibilityParameters
+from teleop_core.chain.mapping.motion_scaling import MotionScaling
+from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
+from teleop_core.chain.mapping.plausibility import PlausibilityParameters
+from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.signals import STATE, TICK_NS
 
 # A command of 0.5 m is rounded to 1e-16 m at every sample.
 ROUNDING = 1e-14

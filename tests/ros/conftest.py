@@ -31,19 +31,19 @@ from live_process import has_recorded
 from middleware_faults import MiddlewareLossError, check_end
 from teleop_core.bags.messages import discover, layout
 from teleop_core.bags.reader import Bag
+from teleop_core.base.parameters import specs
+from teleop_core.graph.stage import STAGES
+from teleop_core.graph.topics import Topic
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import live
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
-from teleop_core.parameters import specs
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import Configuration
 from teleop_core.slave.slave import SlaveParameters
 from teleop_core.slave.slave_sim import SlaveSimParameters
-from teleop_core.stage import STAGES
-from teleop_core.topics import Topic
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # its parser imports a deprecated module of Python

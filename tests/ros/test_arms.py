@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from rcl_interfaces.srv import GetParameters
 
-from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
+from teleop_core.graph import topics
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 

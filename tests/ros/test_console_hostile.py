@@ -10,7 +10,7 @@ import teleop_core as tc
 from browser import until
 from console_process import STARTS, ConsoleProcess
 from page_client import PageClient
-from teleop_core.operation import State
+from teleop_core.slave.operation import State
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
 

@@ -11,7 +11,7 @@ from console_process import STARTS, ConsoleProcess
 from teleop_core.bags.reader import Bag
 from teleop_core.console.recorded_arms import configuration_of
 from teleop_core.evaluation.origin import read_origin
-from teleop_core.operation import State
+from teleop_core.slave.operation import State
 
 pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow, pytest.mark.alone]
 

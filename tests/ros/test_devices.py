@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from rclpy.logging import get_logger
 
-from teleop_core.errors import SessionError
+from teleop_core.base.errors import SessionError
+from teleop_core.chain.operators import OPERATORS
+from teleop_core.chain.operators.remote import AHEAD, RemoteHand
+from teleop_core.graph.topics import HAND_BUTTONS
 from teleop_core.nodes.device_hand import DeviceHand
-from teleop_core.operators import OPERATORS
-from teleop_core.operators.remote import AHEAD, RemoteHand
-from teleop_core.topics import HAND_BUTTONS
 
 pytestmark = pytest.mark.ros
 NODE = SimpleNamespace(get_logger=lambda: get_logger("devices"))

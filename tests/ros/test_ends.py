@@ -11,10 +11,10 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from live_process import TIMEOUT, LiveProcess, WorkingTime, are_gone, wait_until
-from teleop_core import topics
 from teleop_core.bags.reader import Bag
+from teleop_core.graph import topics
+from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.children import free_domain
-from teleop_core.stage import STAGES
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = list(STAGES)
@@ -23,8 +23,8 @@ import time
 from pathlib import Path
 
 import teleop_core as tc
-from teleop_core.stage import STAGES, RunningStage
-from teleop_core.topics import SLAVE_MEASURED_JS
+from teleop_core.graph.stage import STAGES, RunningStage
+from teleop_core.graph.topics import SLAVE_MEASURED_JS
 
 BEAT = tc.Topic("test/beat", tc.Kind.NUMBERS, SLAVE_MEASURED_JS.stamp, columns=("beat",))
 

@@ -8,7 +8,7 @@ import pytest
 from example_runs import EXAMPLES, numbers, run
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.remote_control import RemoteControl
-from teleop_core.operation import State
+from teleop_core.slave.operation import State
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 

@@ -3,7 +3,7 @@
 import pytest
 
 from foreign_hand import WHERE, Hand
-from teleop_core import topics
+from teleop_core.graph import topics
 
 pytestmark = pytest.mark.ros
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from live_process import LiveProcess, wait_until
-from teleop_core import topics
+from teleop_core.graph import topics
+from teleop_core.graph.topics import Kind, Topic
 from teleop_core.robots import load_robot
-from teleop_core.topics import Kind, Topic
 
 pytestmark = pytest.mark.ros
 
@@ -22,9 +22,9 @@ STAGES = """
     from dataclasses import dataclass
 
     from teleop_core.kernels import kernel
-    from teleop_core.parameters import parameter
-    from teleop_core.stage import Stage
-    from teleop_core.topics import (
+    from teleop_core.base.parameters import parameter
+    from teleop_core.graph.stage import Stage
+    from teleop_core.graph.topics import (
         MASTER_MEASURED_CP, MASTER_SERVO_CF, SLAVE_SERVO_CP, Kind, Topic, passed_on,
     )
 

@@ -15,14 +15,14 @@ from rich.console import Console
 from rosbags.highlevel import AnyReader
 
 from live_process import wait_until
-from teleop_core import topics
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import ParameterError, RecordingError, SessionError
+from teleop_core.base.errors import ParameterError, RecordingError, SessionError
+from teleop_core.graph import topics
+from teleop_core.graph.stage import STAGES
+from teleop_core.graph.topics import STREAMS
 from teleop_core.nodes.live import live
 from teleop_core.nodes.play import play
 from teleop_core.session.configuration import configure
-from teleop_core.stage import STAGES
-from teleop_core.topics import STREAMS
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 SESSION_TIMEOUT = 300.0

@@ -8,10 +8,10 @@ import pytest
 import yaml
 from rcl_interfaces.srv import GetParameters
 
-from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
+from teleop_core.graph import topics
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.naming import taken_names
 from teleop_core.robots import load_robot

@@ -2,7 +2,7 @@
 
 import pytest
 
-from teleop_core import topics
+from teleop_core.graph import topics
 from teleop_core.robots import load_robot
 
 pytestmark = pytest.mark.ros

@@ -11,11 +11,11 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import DescribeParameters, GetParameters
 
-from teleop_core import topics
 from teleop_core.bags.reader import Bag
+from teleop_core.graph import topics
+from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.children import environment
 from teleop_core.robots import load_robot
-from teleop_core.stage import STAGES
 
 pytestmark = pytest.mark.ros
 
@@ -115,7 +115,7 @@ def test_inverse_kinematics_warns_with_the_joint_that_holds_the_slave_back(peer)
 
 
 def _quaternion(transform):
-    from teleop_core.geometry import pose_from_transform
+    from teleop_core.kernels.geometry import pose_from_transform
 
     pose = np.empty(7)
     pose_from_transform(np.ascontiguousarray(transform), pose)

@@ -9,10 +9,10 @@ import pytest
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from teleop_core.graph.topics import SLAVE_OPERATION, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS
 from teleop_core.nodes.operation import STOP_TOPIC, StopButton
-from teleop_core.operation import State
 from teleop_core.robots import load_robot
-from teleop_core.topics import SLAVE_OPERATION, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS
+from teleop_core.slave.operation import State
 
 pytestmark = pytest.mark.ros
 HOME = load_robot("rcrt1").home

@@ -10,8 +10,8 @@ from rcl_interfaces.srv import GetParameters
 from rosgraph_msgs.msg import Clock
 
 from foreign_hand import Hand
-from teleop_core import topics
 from teleop_core.bags.reader import Bag
+from teleop_core.graph import topics
 from teleop_core.nodes.children import environment
 
 pytestmark = pytest.mark.ros

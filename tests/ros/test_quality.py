@@ -3,12 +3,12 @@
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 
-from teleop_core import topics
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
+from teleop_core.graph import topics
+from teleop_core.graph.stage import STAGES
+from teleop_core.graph.topics import Quality
 from teleop_core.nodes.quality import QualityOverrides, profile
 from teleop_core.nodes.streams import message_type
-from teleop_core.stage import STAGES
-from teleop_core.topics import Quality
 
 pytestmark = pytest.mark.ros
 

@@ -3,10 +3,10 @@
 import pytest
 from std_srvs.srv import Trigger
 
-from teleop_core import topics
 from teleop_core.bags.messages import report
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import MARKS
+from teleop_core.graph import topics
 
 pytestmark = pytest.mark.ros
 

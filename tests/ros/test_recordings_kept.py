@@ -7,8 +7,8 @@ from contextlib import ExitStack
 import pytest
 
 from live_process import LiveProcess, WorkingTime
-from teleop_core import topics
 from teleop_core.bags.reader import Bag, recover
+from teleop_core.graph import topics
 
 pytestmark = pytest.mark.ros
 

@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from teleop_core.operators.rest import rest_pose
-from teleop_core.topics import (
+from teleop_core.chain.operators.rest import rest_pose
+from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
     OPERATOR_BUTTONS,

@@ -6,9 +6,9 @@ import sys
 import numpy as np
 import pytest
 
-from teleop_core import topics
 from teleop_core.bags.messages import layout
-from teleop_core.geometry import pose_from_transform, rotation, transform
+from teleop_core.graph import topics
+from teleop_core.kernels.geometry import pose_from_transform, rotation, transform
 from teleop_core.nodes.children import environment
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.session.configuration import configure

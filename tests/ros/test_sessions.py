@@ -8,9 +8,12 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from teleop_core import topics
 from teleop_core.bags.messages import write_values
-from teleop_core.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
+from teleop_core.chain.mapping.inverse_kinematics import (
+    InverseKinematics,
+    InverseKinematicsParameters,
+)
+from teleop_core.graph import topics
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime

@@ -13,15 +13,15 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
-from teleop_core import topics
 from teleop_core.bags.reader import Bag
+from teleop_core.graph import topics
+from teleop_core.graph.layers import RealTimeParameters
+from teleop_core.graph.stage import STAGES
+from teleop_core.graph.topics import STREAMS
 from teleop_core.nodes.real_time import apply_options, is_priority_granted
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
-from teleop_core.session.layers import RealTimeParameters
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.stage import STAGES
-from teleop_core.topics import STREAMS
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = list(STAGES)
@@ -169,7 +169,7 @@ def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_th
     script = """
 import os, subprocess, sys, threading
 from teleop_core.nodes.real_time import apply_options, is_priority_granted
-from teleop_core.session.layers import RealTimeParameters
+from teleop_core.graph.layers import RealTimeParameters
 threading.Thread(target=sys.stdin.read).start()
 assert apply_options(RealTimeParameters(priority=10, freeze_gc=False)) == []
 threads = sorted(map(int, os.listdir("/proc/self/task")))

@@ -9,7 +9,7 @@ import numpy as np
 import psutil
 import pytest
 
-from teleop_core import topics
+from teleop_core.graph import topics
 from teleop_core.nodes.discovery import (
     LOOPBACK,
     NETWORK,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from teleop_core import topics
 from teleop_core.bags.messages import layout
+from teleop_core.graph import topics
+from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.streams import message_type
-from teleop_core.stage import STAGES
 
 pytestmark = pytest.mark.ros
 

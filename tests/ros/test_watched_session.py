@@ -2,7 +2,7 @@
 
 import pytest
 
-from teleop_core.topics import STREAMS
+from teleop_core.graph.topics import STREAMS
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 

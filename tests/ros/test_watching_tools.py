@@ -10,10 +10,10 @@ from teleop_core.bags.layouts import layout
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.ros_types import deserialise
 from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
-from teleop_core.bodies import bodies_of
-from teleop_core.bodies.urdf import urdf_of
+from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_JS
 from teleop_core.robots import load_robot
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_JS
+from teleop_core.robots.bodies import bodies_of
+from teleop_core.robots.bodies.urdf import urdf_of
 
 pytestmark = pytest.mark.ros
 

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from teleop_core import topics
+from teleop_core.graph import topics
 from teleop_core.nodes.children import environment
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]

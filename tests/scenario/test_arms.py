@@ -5,13 +5,13 @@ import pytest
 import yaml
 
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import TeleopError
-from teleop_core.operators import register_operator
+from teleop_core.base.errors import TeleopError
+from teleop_core.chain.operators import register_operator
+from teleop_core.graph.layers import parse_layer
+from teleop_core.graph.topics import STREAMS
 from teleop_core.session.configuration import Configuration, configure
-from teleop_core.session.layers import parse_layer
 from teleop_core.session.runner import replay, simulate
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.topics import STREAMS
 
 # So long moves the rcrt1 to where it starts, at half of its speed; its hand moves from then on.
 LEAD = VirtualTime(configure()).lead

@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from teleop_core import topics
 from teleop_core.bags.reader import Bag, recover
-from teleop_core.errors import RecordingError
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph import topics
 
 LIMIT = 3_000_000  # bytes that a file may have, or a disk holds
 
 RECORDER = """
 import json, os, resource, signal, sys
 import numpy as np
-from teleop_core import topics
+from teleop_core.graph import topics
 from teleop_core.bags.messages import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError
+from teleop_core.base.errors import RecordingError
 
 path, compression, seconds, ending = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4]
 if ending.startswith("limit"):

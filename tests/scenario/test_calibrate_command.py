@@ -10,8 +10,8 @@ import yaml
 
 from teleop_core import cli
 from teleop_core.bags.reader import Bag
+from teleop_core.graph.topics import SLAVE_MEASURED_CP
 from teleop_core.robots import load_robot
-from teleop_core.topics import SLAVE_MEASURED_CP
 
 RCRT1 = load_robot("rcrt1")
 

@@ -15,12 +15,12 @@ import yaml
 from numba.core import event
 from scipy.spatial.transform import Rotation
 
-from teleop_core import topics
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
 from teleop_core.commands.progress import Progress, say_compiling
+from teleop_core.graph import topics
+from teleop_core.graph.topics import STREAMS
 from teleop_core.robots import load_robot
-from teleop_core.topics import STREAMS
 
 COMPILING = "compiling kernels"
 

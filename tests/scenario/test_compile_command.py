@@ -8,9 +8,9 @@ import pytest
 from teleop_core.kernels import IS_COMPILED
 
 SESSION = """
-from teleop_core import api
+from teleop_core.session import api
 from teleop_core.kernels.progress import compiled_count
-from teleop_core.session.layers import list_scenarios
+from teleop_core.graph.layers import list_scenarios
 
 for scenario in list_scenarios():
     api.run(scenario, duration=0.5)

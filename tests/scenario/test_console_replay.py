@@ -7,7 +7,7 @@ pytest.importorskip("viser")
 from browser import Tab
 from console_process import ConsoleProcess
 from teleop_core.bags.reader import Bag
-from teleop_core.topics import SLAVE_MEASURED_CP
+from teleop_core.graph.topics import SLAVE_MEASURED_CP
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -12,9 +12,9 @@ import viser
 from viser import _messages
 
 from browser import Tab, handshake, until
+from teleop_core.base.errors import SessionError
 from teleop_core.console import connection
 from teleop_core.console.server import ConsoleServer
-from teleop_core.errors import SessionError
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.robots import load_robot
-from teleop_core.topics import NO_COMMAND_NS
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.controllers import GOAL_UM, LAWS, compared, tracking_of
 

@@ -13,8 +13,8 @@ import pytest
 import teleop_core
 import teleop_drill
 import teleop_lab
-from teleop_core.api import configuration
 from teleop_core.cli import _parser
+from teleop_core.session.api import configuration
 from teleop_core.session.configuration import parse_setting
 from teleop_core.session.virtual import VirtualTime
 

@@ -16,10 +16,12 @@ from teleop_core.session.virtual import VirtualTime
 
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 PUBLIC = {
-    "teleop_lab", "teleop_lab.calibration", "teleop_core.operation", "teleop_core.console.app",
+    "teleop_lab", "teleop_lab.calibration", "teleop_core.slave.operation",
+    "teleop_core.console.app",
     "teleop_core.console.recorded", "teleop_core.console.server",
-    "teleop_core", "teleop_core.evaluation", "teleop_core.operators", "teleop_core.fixtures",
-    "teleop_core.controllers", "teleop_core.robots", "teleop_core.topics",
+    "teleop_core", "teleop_core.evaluation", "teleop_core.chain.operators",
+    "teleop_core.chain.fixtures",
+    "teleop_core.slave.controllers", "teleop_core.robots", "teleop_core.graph.topics",
     "teleop_drill", "teleop_lab.experiments", "numpy",
     "numpy.typing", "pandas", "plotly.graph_objects",
 }  # fmt: skip

@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from teleop_core.bags.reader import Bag
-from teleop_core.master.haptic_master import REST_POSITION
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
+from teleop_core.chain.master.haptic_master import REST_POSITION
+from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
 
 pytestmark = pytest.mark.slow
 

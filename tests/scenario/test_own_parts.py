@@ -6,23 +6,16 @@ import numpy as np
 import pytest
 
 from teleop_core.bags.reader import Bag
-from teleop_core.controllers import register_controller
-from teleop_core.controllers.source_pid import SOURCE_PID, source_pid_control
-from teleop_core.errors import PartError
-from teleop_core.fixtures import register_fixture
-from teleop_core.fixtures.box import BOX
-from teleop_core.fixtures.sphere import SPHERE, sphere_depth
-from teleop_core.kernels import kernel
-from teleop_core.mapping.parameters import MotionScalingParameters
-from teleop_core.operators import register_operator
-from teleop_core.parameters import NoParameters, build, parameter
-from teleop_core.robots import load_robot
-from teleop_core.session.configuration import configure
-from teleop_core.session.runner import simulate
-from teleop_core.session.virtual import VirtualTime
-from teleop_core.signals import STATE, TICK_NS
-from teleop_core.stage import Stage, register_stage
-from teleop_core.topics import (
+from teleop_core.base.errors import PartError
+from teleop_core.base.parameters import NoParameters, build, parameter
+from teleop_core.chain.fixtures import register_fixture
+from teleop_core.chain.fixtures.box import BOX
+from teleop_core.chain.fixtures.sphere import SPHERE, sphere_depth
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.operators import register_operator
+from teleop_core.graph.signals import STATE, TICK_NS
+from teleop_core.graph.stage import Stage, register_stage
+from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
     SLAVE_SERVO_CP,
@@ -31,6 +24,13 @@ from teleop_core.topics import (
     Topic,
     passed_on,
 )
+from teleop_core.kernels import kernel
+from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
+from teleop_core.session.runner import simulate
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.slave.controllers import register_controller
+from teleop_core.slave.controllers.source_pid import SOURCE_PID, source_pid_control
 
 TICKS = 1500
 MS = 1e-3

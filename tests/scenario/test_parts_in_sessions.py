@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.topics import SLAVE_SERVO_CP, passed_on
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.signals import TICK_NS
-from teleop_core.topics import SLAVE_SERVO_CP, passed_on
 
 ANSWER = tc.Topic("test/answer", tc.Kind.POSE, passed_on("slave/servo_cp"))
 
@@ -60,7 +60,7 @@ def test_answer_that_nobody_reads_is_a_warning_with_the_way_out(own_parts):
 FORGETFUL = """
 import teleop_core as tc
 from beside import NAME
-from teleop_core.topics import SLAVE_SERVO_CP, passed_on
+from teleop_core.graph.topics import SLAVE_SERVO_CP, passed_on
 
 
 def copies(p, s, row, dt):

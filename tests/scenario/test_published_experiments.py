@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.geometry import roll_pitch_yaw, rotations_from_quaternions
+from teleop_core.graph.signals import STATE, TICK_NS
+from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_MEASURED_CP, SLAVE_REACH, STREAMS
+from teleop_core.kernels.geometry import roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.runner import session_ticks, simulate
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.signals import STATE, TICK_NS
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.trajectory import shortest_move_time
-from teleop_core.topics import NO_COMMAND_NS, SLAVE_MEASURED_CP, SLAVE_REACH, STREAMS
 from teleop_lab.fitting.table import PUBLISHED as PUBLISHED_RESTS
 from teleop_lab.fitting.table import read_rests
 

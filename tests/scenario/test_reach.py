@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_lab as lab
 from people import PEOPLE, moves, person, recorded, saved
-from teleop_core.topics import Limit
+from teleop_core.graph.topics import Limit
 
 # A walk has no slave that lags, and ticks of sessions take stamps together that are closer than
 # 1 ms: of some thousand samples a few are told otherwise.

@@ -14,8 +14,8 @@ from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.scoring import studies, study
-from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import (
+from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph.topics import (
     ALL,
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,

@@ -9,15 +9,15 @@ from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.metrics import replay as metric
 from teleop_core.evaluation.replay_figure import ROOM
-from teleop_core.geometry import pose_from_transform
-from teleop_core.robots import load_robot
-from teleop_core.topics import (
+from teleop_core.graph.topics import (
     SLAVE_MEASURED_CP,
     SLAVE_MEASURED_JS,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
 )
+from teleop_core.kernels.geometry import pose_from_transform
+from teleop_core.robots import load_robot
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

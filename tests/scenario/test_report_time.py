@@ -11,8 +11,8 @@ import pytest
 from headless import Headless
 from recipes import START_NS, Recipe, state
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.signals import TICK_NS
-from teleop_core.topics import (
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_SERVO_CP,

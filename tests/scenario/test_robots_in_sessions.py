@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from teleop_core import topics
 from teleop_core.bags.reader import Bag
+from teleop_core.graph import topics
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.runner import simulate

@@ -22,10 +22,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from teleop_core.graph.topics import STREAMS, TELEOP_STATE
 from teleop_core.session.configuration import configure
 from teleop_core.session.runner import run_blocks, session_ticks
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.topics import STREAMS, TELEOP_STATE
 
 SCENARIOS = ("coarse_box", "fine_box", "mode_switching", "free_motion")
 SEEDS = (1, 2, 3)

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teleop_core import topics
 from teleop_core.bags import ros_types
 from teleop_core.bags.layouts import Layout, discover, layout, layout_of
 from teleop_core.bags.messages import Refusal, read_values
-from teleop_core.errors import ShapeError
-from teleop_core.topics import Kind
+from teleop_core.base.errors import ShapeError
+from teleop_core.graph import topics
+from teleop_core.graph.topics import Kind
 
 JOINTS = ("theta1", "d2", "a_rather_long_joint_name")
 NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=9)

@@ -16,8 +16,8 @@ from teleop_core.bags.messages import (
     report,
     write_values,
 )
-from teleop_core.texts import printable
-from teleop_core.topics import Kind
+from teleop_core.base.texts import printable
+from teleop_core.graph.topics import Kind
 
 POSE = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
 
@@ -120,7 +120,7 @@ def test_stamps_that_stand_still_or_go_back_are_refused(last):
     assert check(Kind.POSE, 5, POSE, last) is Refusal.NOT_NEWER
 
 
-# Control codes are shown, not kept: see teleop_core.texts.
+# Control codes are shown, not kept: see teleop_core.base.texts.
 TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0")).map(printable)
 
 

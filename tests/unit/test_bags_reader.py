@@ -12,13 +12,13 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
-from teleop_core import topics
 from teleop_core.bags import ros_types
 from teleop_core.bags.messages import layout, layout_of, report
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError
-from teleop_core.topics import Kind
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph import topics
+from teleop_core.graph.topics import Kind
 
 JOINTS = ("a", "b", "c")
 MS = 1_000_000

@@ -19,14 +19,14 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
-from teleop_core import topics
 from teleop_core.bags import ros_types
 from teleop_core.bags.messages import layout, report
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import RecordingParameters
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
-from teleop_core.parameters import build
+from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
+from teleop_core.base.parameters import build
+from teleop_core.graph import topics
 
 JOINTS = ("a", "b", "c")
 MS = 1_000_000

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from teleop_core.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
+from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.robots import dh_kernels, load_robot, robot_from_table
 from teleop_core.robots.chains import true_chain
 from teleop_lab.calibration import (

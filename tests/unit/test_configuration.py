@@ -5,10 +5,9 @@ import dataclasses
 import pytest
 import yaml
 
-from teleop_core.errors import ParameterError, TeleopError, UnknownNameError
-from teleop_core.graph import BUILT_IN, RECORDER_NAME
-from teleop_core.session.configuration import Configuration, configure
-from teleop_core.session.layers import (
+from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
+from teleop_core.graph.layers import (
     SESSION,
     config_folder,
     list_scenarios,
@@ -16,6 +15,7 @@ from teleop_core.session.layers import (
     parse_layer,
     parse_setting,
 )
+from teleop_core.session.configuration import Configuration, configure
 
 SCENARIOS = ("coarse_box", "fine_box", "free_motion", "mode_switching")
 

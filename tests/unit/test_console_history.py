@@ -5,8 +5,8 @@ import pytest
 
 from teleop_core.console.history import SPAN, History, LiveScores
 from teleop_core.console.link import Arm, ArmView
+from teleop_core.graph.topics import MASTER_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
 from teleop_core.robots import load_robot
-from teleop_core.topics import MASTER_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
 
 ARM = Arm("", load_robot("rcrt1"))
 

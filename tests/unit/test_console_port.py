@@ -6,8 +6,8 @@ import socket
 
 import pytest
 
+from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.console.server import free_port, listen, owner
-from teleop_core.errors import ParameterError, SessionError
 
 
 def test_taken_port_is_refused_with_its_owner_and_one_that_is_free():

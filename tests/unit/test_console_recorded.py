@@ -15,7 +15,7 @@ from teleop_core.console.app import Console
 from teleop_core.console.recorded import FRAME, RecordedLink
 from teleop_core.console.recorded_arms import configuration_of, recorded_arms
 from teleop_core.console.server import ConsoleServer
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Kind, Topic
+from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Kind, Topic
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,6 @@ import pytest
 import trimesh
 
 import teleop_core as tc
-from teleop_core.bodies import Solid
-from teleop_core.bodies.meshes import mesh_of
 from teleop_core.console.body_nodes import ROLES
 from teleop_core.console.fixture_outlines import unit_outline
 from teleop_core.console.link import Arm, ArmView, View
@@ -16,7 +14,9 @@ from teleop_core.console.look import GOOD, WRONG
 from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
-from teleop_core.geometry import rotations_from_quaternions
+from teleop_core.kernels.geometry import rotations_from_quaternions
+from teleop_core.robots.bodies import Solid
+from teleop_core.robots.bodies.meshes import mesh_of
 
 # Poses that differ less from what is drawn are not sent.
 STILL = 3e-5

@@ -3,12 +3,12 @@
 import pytest
 
 from desk import Desk
+from teleop_core.base.parameters import specs, values_of
+from teleop_core.base.plain_yaml import parse
 from teleop_core.console.link import ParameterInfo
 from teleop_core.console.server import ConsoleServer
 from teleop_core.console.settings import SettingsPanel, _parsed, _shown, _text
-from teleop_core.parameters import specs, values_of
-from teleop_core.plain_yaml import parse
-from teleop_core.session.layers import declared_groups
+from teleop_core.graph.layers import declared_groups
 
 MODE, GAIN = ("motion_scaling", "mode"), ("motion_scaling", "fine_gain")
 EVERY = [

@@ -11,7 +11,7 @@ from teleop_core.console.link import Arm, ArmView, View
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
 from teleop_core.console.stylus import LINGER, STEP_LENGTH, STEP_TURN, Stylus, stepped
-from teleop_core.geometry import rotations_from_quaternions
+from teleop_core.kernels.geometry import rotations_from_quaternions
 
 POSE = np.array([0.01, -0.06, -0.08, 0.98, -0.2, 0.0, 0.0])
 POSE[3:] /= np.linalg.norm(POSE[3:])

@@ -5,7 +5,7 @@ import numpy as np
 import teleop_core as tc
 from teleop_core.console.recorded_arms import parameters_of
 from teleop_core.console.scene import targets_of
-from teleop_core.topics import MASTER_MEASURED_CP
+from teleop_core.graph.topics import MASTER_MEASURED_CP
 
 
 def test_the_hand_of_a_task_passes_every_target_and_no_other_operator_has_any():

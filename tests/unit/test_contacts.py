@@ -7,20 +7,20 @@ import pytest
 
 from held_master import HeldMaster
 from recipes import Recipe
-from teleop_core.api import configuration
-from teleop_core.evaluation.scoring import evaluate
-from teleop_core.mapping.parameters import FixtureParameters
-from teleop_core.mapping.walls import passive_stiffness
-from teleop_core.master.haptic_master import (
+from teleop_core.base.parameters import build
+from teleop_core.chain.mapping.parameters import FixtureParameters
+from teleop_core.chain.mapping.walls import passive_stiffness
+from teleop_core.chain.master.haptic_master import (
     REST_POSITION,
     DeviceParameters,
     HandParameters,
     HapticMasterParameters,
 )
-from teleop_core.operators.parameters import OperatorParameters
-from teleop_core.parameters import build
+from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.evaluation.scoring import evaluate
+from teleop_core.graph.topics import MASTER_CONTACT
+from teleop_core.session.api import configuration
 from teleop_core.session.notes import notes_of, passive_note, rendered_note
-from teleop_core.topics import MASTER_CONTACT
 
 COLUMN = {name: index for index, name in enumerate(MASTER_CONTACT.columns)}
 CALM = HandParameters()

@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.controllers import CONTROLLERS, Controller, register_controller
-from teleop_core.controllers.adaptive import _FRICTION, _INERTIA, _LOAD, _VISCOUS
-from teleop_core.controllers.computed_torque import COMPUTED_TORQUE, computed_torque_control
-from teleop_core.controllers.motion_estimates import known_friction
-from teleop_core.errors import ParameterError, PartError
-from teleop_core.parameters import build
+from teleop_core.base.errors import ParameterError, PartError
+from teleop_core.base.parameters import build
+from teleop_core.graph.signals import TICK_NS
 from teleop_core.robots import load_robot
-from teleop_core.signals import TICK_NS
+from teleop_core.slave.controllers import CONTROLLERS, Controller, register_controller
+from teleop_core.slave.controllers.adaptive import _FRICTION, _INERTIA, _LOAD, _VISCOUS
+from teleop_core.slave.controllers.computed_torque import COMPUTED_TORQUE, computed_torque_control
+from teleop_core.slave.controllers.motion_estimates import known_friction
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_core.slave.slave_sim import ControllerParameters, PlantParameters

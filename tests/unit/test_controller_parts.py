@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.controllers import CONTROLLERS, Controller, register_controller
-from teleop_core.controllers.pd import PD, PdParameters, pd_control
-from teleop_core.controllers.pid import PidParameters, pid_control, pid_gains
-from teleop_core.errors import ParameterError, PartError
+from teleop_core.base.errors import ParameterError, PartError
+from teleop_core.base.parameters import build
+from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels import kernel
-from teleop_core.parameters import build
 from teleop_core.robots import load_robot
-from teleop_core.signals import DT, TICK_NS
+from teleop_core.slave.controllers import CONTROLLERS, Controller, register_controller
+from teleop_core.slave.controllers.pd import PD, PdParameters, pd_control
+from teleop_core.slave.controllers.pid import PidParameters, pid_control, pid_gains
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave_sim import ControllerParameters
 

@@ -8,14 +8,14 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from teleop_core.base.errors import ParameterError, SessionError
+from teleop_core.chain.devices import NOTHING, Reading
+from teleop_core.chain.devices.pilot import Pilot, PilotParameters, beyond
+from teleop_core.chain.devices.spacemouse import Reports, is_space_mouse
+from teleop_core.chain.operators import OPERATORS
+from teleop_core.chain.operators.remote import AHEAD, RemoteHand
+from teleop_core.chain.operators.rest import rest_pose
 from teleop_core.cli import main
-from teleop_core.devices import NOTHING, Reading
-from teleop_core.devices.pilot import Pilot, PilotParameters, beyond
-from teleop_core.devices.spacemouse import Reports, is_space_mouse
-from teleop_core.errors import ParameterError, SessionError
-from teleop_core.operators import OPERATORS
-from teleop_core.operators.remote import AHEAD, RemoteHand
-from teleop_core.operators.rest import rest_pose
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -216,7 +216,7 @@ def pad():
 
 @pytest.fixture
 def gamepad(pad):
-    from teleop_core.devices.gamepad import Gamepad
+    from teleop_core.chain.devices.gamepad import Gamepad
 
     made = Gamepad("virtual")
     yield made

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.robots import load_robot
 from teleop_core.robots.dexterity import (
     COLUMNS,

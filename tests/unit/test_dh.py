@@ -7,14 +7,14 @@ import pytest
 import roboticstoolbox as rtb
 import sympy
 
-from teleop_core.errors import (
+from teleop_core.base.errors import (
     ParameterError,
     RecordingError,
     ShapeError,
     TeleopError,
     UnknownNameError,
 )
-from teleop_core.geometry import rotation, transform
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import CONVENTIONS, elementary, load_table, parse_table
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.geometry import rotation, transform
+from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 
 BRANCHES = {"puma560": 8, "scara": 2, "planar_3r": 2, "five_axis": 4}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.robots import IkStatus, load_robot, robot_from_table
 from teleop_core.robots.drives import ENTRIES
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from mutants import MUTANTS, changed
-from teleop_core import api
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import UnknownNameError
-from teleop_core.operation import Fault, State
+from teleop_core.base.errors import UnknownNameError
+from teleop_core.graph.topics import SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
 from teleop_core.robots import load_robot
-from teleop_core.topics import SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
+from teleop_core.session import api
+from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill import EXERCISES, SHORT, Cure, Motion, Outcome, chosen, hand, measure
 from teleop_drill.drill.hand import Sample
 from teleop_drill.drill.judging import Measured, Seen, judge

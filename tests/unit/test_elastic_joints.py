@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels import kernel
-from teleop_core.parameters import build
-from teleop_core.plants.hardware import faults_of
 from teleop_core.robots import load_robot
-from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.elastic import integrate_elastic
+from teleop_core.slave.plants.hardware import faults_of
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 from teleop_core.slave.transmission import drive
 

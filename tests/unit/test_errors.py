@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from teleop_core.errors import (
+from teleop_core.base.errors import (
     ClosureError,
     KernelError,
     ParameterError,

@@ -11,11 +11,11 @@ from teleop_core.bags.arms import arm_names, of_arm, topic_prefix
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import EvaluationError, RecordingError, UnknownNameError
+from teleop_core.base.errors import EvaluationError, RecordingError, UnknownNameError
 from teleop_core.evaluation import evaluate, scores
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import (
+from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph.topics import (
     ALL,
     DIAGNOSTICS,
     SLAVE_MEASURED_CP,

@@ -8,14 +8,14 @@ import yaml
 from rich.console import Console
 
 from recipes import Recipe, pose_rows
+from teleop_core.base.parameters import NoParameters
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.scoring import evaluate
-from teleop_core.graph import build_graph
-from teleop_core.parameters import NoParameters
-from teleop_core.signals import TICK_NS
-from teleop_core.stage import Stage, register_stage
-from teleop_core.topics import (
+from teleop_core.graph.graph import build_graph
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.stage import Stage, register_stage
+from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
     SLAVE_SERVO_CP,

@@ -10,7 +10,7 @@ from rich.console import Console
 from teleop_core import evaluation
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import EvaluationError, PartError, UnknownNameError
+from teleop_core.base.errors import EvaluationError, PartError, UnknownNameError
 from teleop_core.evaluation import (
     METRICS,
     Context,
@@ -27,8 +27,8 @@ from teleop_core.evaluation import (
 )
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.score_table import score_tables
-from teleop_core.signals import TICK_NS
-from teleop_core.topics import (
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.topics import (
     ALL,
     MASTER_MEASURED_CF,
     SLAVE_MEASURED_CP,

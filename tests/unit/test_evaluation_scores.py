@@ -12,15 +12,15 @@ from recipes import JOINTS, START_NS, Recipe, pose_rows, state
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import EvaluationError, RecordingError
+from teleop_core.base.errors import EvaluationError, RecordingError
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.page import report_page
 from teleop_core.evaluation.score import key_table, keys
 from teleop_core.evaluation.score_table import score_tables
 from teleop_core.evaluation.scoring import evaluate, study
 from teleop_core.evaluation.windows import WINDOW_NS, DisorderError, windows
-from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import (
+from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph.topics import (
     ALL,
     DIAGNOSTICS,
     MASTER_MEASURED_CF,

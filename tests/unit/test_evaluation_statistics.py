@@ -11,7 +11,7 @@ from teleop_core.evaluation.pairing import NONE, latest, same_stamp, same_tick
 from teleop_core.evaluation.published import COARSE, FINE, published_for
 from teleop_core.evaluation.traces import BUCKETS, SAMPLES, Envelope, spacing_s
 from teleop_core.evaluation.tracking import pose_errors
-from teleop_core.geometry import rotations_from_quaternions
+from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.robots import load_robot
 
 MS = 1_000_000

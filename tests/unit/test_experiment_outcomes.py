@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.evaluation.figure import Figure
 from teleop_lab.experiments import (
     EXACT,
@@ -155,7 +155,7 @@ def test_page_escapes_what_others_wrote_and_asks_nobody():
 
 
 def test_experiment_that_returns_something_else_is_named():
-    from teleop_core.errors import PartError
+    from teleop_core.base.errors import PartError
     from teleop_lab.experiments import Bench
 
     wrong = Experiment("mine", "mine", "me", lambda bench: None)

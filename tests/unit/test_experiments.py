@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.signal import dlti, dstep
 
-from teleop_core.errors import ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.operators.tour import tour
-from teleop_core.recording import Stream
+from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
+from teleop_core.chain.operators.tour import tour
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
+from teleop_core.session.recording import Stream
 from teleop_lab import experiments
 from teleop_lab.experiments import Bench, Experiment, Findings, Row
 from teleop_lab.experiments.accuracy import (

@@ -14,8 +14,8 @@ import pytest
 
 import teleop_core as tc
 from teleop_core.bags.writer import BagWriter
-from teleop_core.exchange.joining import Streams
-from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.session.exchange.joining import Streams
 
 STATE_TOPIC = "teleop/state"
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from teleop_core.operation import Fault, State
-from teleop_core.parameters import build
+from teleop_core.base.parameters import build
+from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.robots import load_robot
-from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.commands import CommandStatus
+from teleop_core.slave.operation import Fault, State
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import Slave, SlaveParameters
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.errors import ParameterError
-from teleop_core.mapping.filters import lag_step
-from teleop_core.parameters import build
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.kernels.filters import lag_step
 from teleop_core.slave.slave import ReferenceFilterParameters
 
 GAIN, ZERO, POLE, DT = 0.1, 100.0, 10.0, 1e-3

@@ -8,13 +8,13 @@ import pandas as pd
 import pytest
 import yaml
 
+from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.base.parameters import build
 from teleop_core.cli import main
-from teleop_core.errors import ParameterError, TeleopError, UnknownNameError
-from teleop_core.parameters import build
-from teleop_core.plants.hardware import faults_of
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
+from teleop_core.slave.plants.hardware import faults_of
 from teleop_lab.fitting.fit import FitError, default_free, fit
 from teleop_lab.fitting.rests import rest_positions
 from teleop_lab.fitting.table import PUBLISHED, RestTable, read_rests

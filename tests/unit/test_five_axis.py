@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from teleop_core.geometry import rotation, transform
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import load_table, parse_table
 from teleop_core.robots.five_axis import pitch_and_roll

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.errors import PartError
-from teleop_core.fixtures import FIXTURES, Fixture, register_fixture, shape_of
-from teleop_core.fixtures.sphere import SphereParameters, sphere_depth, sphere_outline
+from teleop_core.base.errors import PartError
+from teleop_core.base.parameters import build, parameter
+from teleop_core.chain.fixtures import FIXTURES, Fixture, register_fixture, shape_of
+from teleop_core.chain.fixtures.sphere import SphereParameters, sphere_depth, sphere_outline
+from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.kernels import kernel
-from teleop_core.mapping.parameters import FixtureParameters
-from teleop_core.parameters import build, parameter
 
 # Quotients of numbers below one.
 ROUNDING = 1e-15

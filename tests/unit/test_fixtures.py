@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.fixtures.box import box_depth
-from teleop_core.mapping.walls import wall_force
+from teleop_core.chain.fixtures.box import box_depth
+from teleop_core.chain.mapping.walls import wall_force
 
 # Products of numbers up to four.
 ROUNDING = 1e-12

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
 
 MS = 1_000_000
 

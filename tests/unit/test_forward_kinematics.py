@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ClosureError, ParameterError, ShapeError
-from teleop_core.geometry import rotation, transform
+from teleop_core.base.errors import ClosureError, ParameterError, ShapeError
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import FkStatus, list_robots, load_robot
 from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.robots.rps3 import assembly_modes

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import roboticstoolbox as rtb
 
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.geometry import rotation, transform
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.four_bar import Assembly, FourBar
 

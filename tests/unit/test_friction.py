@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from teleop_core.base.parameters import build
+from teleop_core.graph.signals import DT
 from teleop_core.kernels import kernel
-from teleop_core.parameters import build
-from teleop_core.signals import DT
 from teleop_core.slave.friction import wander
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters

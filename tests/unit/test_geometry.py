@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from teleop_core import geometry
-from teleop_core.errors import ParameterError, ShapeError
-from teleop_core.kernels import kernel
+from teleop_core.base.errors import ParameterError, ShapeError
+from teleop_core.kernels import geometry, kernel
 
 # Sums of a few products of numbers of size one.
 ROUNDING = 1e-14

@@ -4,13 +4,20 @@ from itertools import permutations
 
 import pytest
 
-from teleop_core import topics
-from teleop_core.errors import ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.graph import BUILT_IN, Delay, Graph, build_graph
-from teleop_core.parameters import NoParameters
+from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
+from teleop_core.base.parameters import NoParameters
+from teleop_core.graph import topics
+from teleop_core.graph.graph import BUILT_IN, Delay, Graph, build_graph
+from teleop_core.graph.stage import STAGES, Stage, register_stage
+from teleop_core.graph.topics import (
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+    Kind,
+    Topic,
+    in_force,
+    passed_on,
+)
 from teleop_core.session.configuration import configure
-from teleop_core.stage import STAGES, Stage, register_stage
-from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, in_force, passed_on
 
 BASE = tuple(STAGES.find(name) for name in BUILT_IN)
 ECHO = Topic("test/echo", Kind.POSE, passed_on("slave/measured_cp"))

@@ -9,19 +9,19 @@ from scipy.signal import periodogram
 from scipy.spatial.transform import Rotation
 
 from held_master import HeldMaster
-from teleop_core.errors import ParameterError
-from teleop_core.kernels import records
-from teleop_core.master.haptic_master import (
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.chain.master.haptic_master import (
     REST_POSITION,
     REST_TILT,
     DeviceParameters,
     HandParameters,
     HapticMasterParameters,
 )
-from teleop_core.operators import OPERATORS, Setting, register_operator
-from teleop_core.operators.parameters import ButtonParameters, OperatorParameters
-from teleop_core.operators.shapes import PHASES
-from teleop_core.parameters import build
+from teleop_core.chain.operators import OPERATORS, Setting, register_operator
+from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
+from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.kernels import records
 
 RESOLUTION, NOISE, PEAK = 0.055e-3, 2e-3, 3.3
 REST = Rotation.from_euler("x", REST_TILT)

@@ -5,16 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError, PartError, ShapeError, UnknownNameError
-from teleop_core.parameters import MARKS, build, parameter, specs
-from teleop_core.plants import PLANTS, Plant, register_plant
-from teleop_core.plants.hardware import FAULTS, HARDWARE, faults_of
+from teleop_core.base.errors import ParameterError, PartError, ShapeError, UnknownNameError
+from teleop_core.base.parameters import MARKS, build, parameter, specs
+from teleop_core.graph.signals import TICK_NS
 from teleop_core.robots import load_robot
 from teleop_core.robots.hardware import ENTRIES, Hardware
 from teleop_core.robots.link_errors import LinkErrors
 from teleop_core.session.configuration import configure
-from teleop_core.signals import TICK_NS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.plants import PLANTS, Plant, register_plant
+from teleop_core.slave.plants.hardware import FAULTS, HARDWARE, faults_of
 from teleop_core.slave.slave_sim import SlaveSim
 from teleop_lab.fitting.rests import Mover
 

@@ -13,19 +13,20 @@ from mcap.opcode import Opcode
 from mcap.records import DataEnd, Footer, Header
 from rich.console import Console
 
-from teleop_core import cli, topics
+from teleop_core import cli
 from teleop_core.bags.compression import LARGEST
 from teleop_core.bags.mcap_file import MAGIC, encode
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.bags.reports import report
 from teleop_core.bags.rosbag2 import records_of
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError, TeleopError, UnknownNameError
+from teleop_core.base.errors import RecordingError, TeleopError, UnknownNameError
+from teleop_core.base.texts import LONGEST_LINE, one_line, printable, shown
 from teleop_core.evaluation.command import evaluate_bags
-from teleop_core.exchange import as_master_bag
+from teleop_core.graph import topics
+from teleop_core.graph.layers import load_file
 from teleop_core.robots.dh import load_table
-from teleop_core.session.layers import load_file
-from teleop_core.texts import LONGEST_LINE, one_line, printable, shown
+from teleop_core.session.exchange import as_master_bag
 
 MS = 1_000_000
 GIGABYTE = 1 << 30

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from held_master import HeldMaster
-from teleop_core.errors import ParameterError
-from teleop_core.master.haptic_master import HapticMasterParameters
-from teleop_core.operators import OPERATORS, Setting
-from teleop_core.operators.human import HumanParameters, Submovement, submovements, tremor
-from teleop_core.operators.parameters import OperatorParameters
-from teleop_core.parameters import build
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.chain.master.haptic_master import HapticMasterParameters
+from teleop_core.chain.operators import OPERATORS, Setting
+from teleop_core.chain.operators.human import HumanParameters, Submovement, submovements, tremor
+from teleop_core.chain.operators.parameters import OperatorParameters
 
 SIZE, ROTATION, APPROACH = (0.06, 0.05, 0.04), 0.2, 2.0
 CENTER, TILT = (0.01, -0.02, 0.03), (-0.5, 0.1, 0.2)

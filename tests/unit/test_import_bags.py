@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
-from teleop_core.exchange import bag_messages
+from teleop_core.session.exchange import bag_messages
 
 START_NS = 1_700_000_000_000_000_000
 COUNT = 300

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import teleop_core as tc
-from teleop_core.exchange import ImportOptions
+from teleop_core.session.exchange import ImportOptions
 
 COUNT = 200
 T = np.arange(COUNT) * 0.01

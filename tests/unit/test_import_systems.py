@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
 from teleop_core import cli
-from teleop_core.exchange import ImportOptions
-from teleop_core.geometry import rotation_from_quaternion
+from teleop_core.kernels.geometry import rotation_from_quaternion
+from teleop_core.session.exchange import ImportOptions
 
 COUNT = 300
 T = np.arange(COUNT) / 100.0

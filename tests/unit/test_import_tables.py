@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
-from teleop_core.exchange import names, orientation
+from teleop_core.session.exchange import names, orientation
 
 COUNT, RATE = 400, 100.0
 TIMES = np.arange(COUNT) / RATE

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.errors import ParameterError, ShapeError
+from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.robots import list_robots, load_robot, rcrt1_dynamics
 from teleop_core.robots.drives import Dynamics, independent_axes
 from teleop_core.robots.inertias import LinkInertia, check_possible

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
+from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.robots import load_robot
-from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import INTERPOLATIONS

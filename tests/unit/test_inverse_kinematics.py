@@ -7,11 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.geometry import pose_from_transform, rotation, transform
-from teleop_core.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
+from teleop_core.chain.mapping.inverse_kinematics import (
+    InverseKinematics,
+    InverseKinematicsParameters,
+)
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.topics import SLAVE_REACH
+from teleop_core.kernels.geometry import pose_from_transform, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.signals import TICK_NS
-from teleop_core.topics import SLAVE_REACH
 
 ARM = load_robot("rcrt1")
 SPEED = ARM.drives.speed_limit

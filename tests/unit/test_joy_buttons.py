@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from teleop_core.bags.messages import Refusal, read_values
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.graph.topics import Kind
 from teleop_core.nodes.base import NodeParameters
-from teleop_core.parameters import build
-from teleop_core.topics import Kind
 
 
 def joy(*pressed):

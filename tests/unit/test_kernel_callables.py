@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import types
 
-from teleop_core.errors import KernelError
+from teleop_core.base.errors import KernelError
 from teleop_core.kernels import IS_COMPILED, kernel, pointer, raise_pending
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")

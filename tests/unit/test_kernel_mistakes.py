@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numba import types
 
-from teleop_core.errors import KernelError
+from teleop_core.base.errors import KernelError
 from teleop_core.kernels import IS_COMPILED, bound, inner, kernel, pointer, records
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="it is the compiler that finds them")
@@ -67,4 +67,6 @@ def test_place_of_a_mistake_is_counted_from_the_package_or_the_working_directory
         [sys.executable, "own.py"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     last = done.stderr.splitlines()[-1]
-    assert last.startswith("teleop_core.errors.KernelError: own.py:4: kernel 'f': Unknown attri")
+    assert last.startswith(
+        "teleop_core.base.errors.KernelError: own.py:4: kernel 'f': Unknown attri"
+    )

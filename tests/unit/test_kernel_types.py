@@ -12,7 +12,13 @@ START = """
 import numpy as np
 from numba import types
 
-from teleop_core.geometry import Array, compose, is_rigid, multiply_quaternions, rotate_by_vector
+from teleop_core.kernels.geometry import (
+    Array,
+    compose,
+    is_rigid,
+    multiply_quaternions,
+    rotate_by_vector,
+)
 from teleop_core.kernels import Kernel, bound, inner, kernel, pointer
 
 

@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 
-from teleop_core.geometry import multiply_quaternions
 from teleop_core.kernels import (
     IS_COMPILED,
     bound,
@@ -17,6 +16,7 @@ from teleop_core.kernels import (
     kernel_from_source,
     records,
 )
+from teleop_core.kernels.geometry import multiply_quaternions
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
 

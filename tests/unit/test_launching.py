@@ -8,7 +8,7 @@ from types import ModuleType, SimpleNamespace
 import pytest
 import yaml
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, processes
 
 LAUNCH = Path(__file__).resolve().parents[2] / "src" / "teleop_core" / "launch"

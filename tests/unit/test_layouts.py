@@ -12,8 +12,8 @@ import yaml
 import teleop_core as tc
 from teleop_core.bags.layouts import layout
 from teleop_core.bags.markers import MARKERS
-from teleop_core.session.layers import config_folder
-from teleop_core.topics import BY_NAME, Kind
+from teleop_core.graph.layers import config_folder
+from teleop_core.graph.topics import BY_NAME, Kind
 
 FOXGLOVE, RVIZ = config_folder() / "foxglove_layout.json", config_folder() / "teleop.rviz"
 TOPIC = re.compile(r"^/[a-z_/]+")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from teleop_core.mapping.motion_scaling import MotionScaling
-from teleop_core.mapping.parameters import MotionScalingParameters, ReachForceParameters
-from teleop_core.signals import STATE, TICK_NS
-from teleop_core.topics import SLAVE_REACH, Limit
+from teleop_core.chain.mapping.motion_scaling import MotionScaling
+from teleop_core.chain.mapping.parameters import MotionScalingParameters, ReachForceParameters
+from teleop_core.graph.signals import STATE, TICK_NS
+from teleop_core.graph.topics import SLAVE_REACH, Limit
 
 REACH = {name: index for index, name in enumerate(SLAVE_REACH.columns)}
 PLAIN = {"axes": ("+x", "+y", "+z"), "tool_axes": ("+x", "+y", "+z"), "tool_roll": 0.0}

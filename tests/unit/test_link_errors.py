@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.robots import dh_kernels, load_robot, robot_from_table
 from teleop_core.robots.chains import chain_of, true_chain
 from teleop_core.robots.link_errors import LinkErrors, error_names, next_axis_motion

@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
-from teleop_core.geometry import pose_from_transform
-from teleop_core.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
+from teleop_core.chain.mapping.inverse_kinematics import (
+    InverseKinematics,
+    InverseKinematicsParameters,
+)
+from teleop_core.graph.signals import DT, TICK_NS
+from teleop_core.kernels.geometry import pose_from_transform
 from teleop_core.robots import load_robot
-from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 ARM = load_robot("rcrt1")

@@ -9,7 +9,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import teleop_core as tc
-from teleop_core import topics
 from teleop_core.bags import ros_types
 from teleop_core.bags.messages import (
     Refusal,
@@ -21,8 +20,9 @@ from teleop_core.bags.messages import (
 )
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError
-from teleop_core.topics import Kind
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph import topics
+from teleop_core.graph.topics import Kind
 
 JOINTS = ("a", "b")
 NUMBERS = (topics.SLAVE_MEASURED_CP, topics.SLAVE_MEASURED_JS, topics.SLAVE_SERVO_JP,

@@ -12,8 +12,8 @@ import teleop_core as tc
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
-from teleop_core.exchange import as_master_bag
-from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind, Topic
+from teleop_core.session.exchange import as_master_bag
 
 START_NS = 1_700_000_000_000_000_000
 COUNT = 200

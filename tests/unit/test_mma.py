@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.robots.mma import holding_torques
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.robots.mma_balance import (
     ARM_AT_45_DEGREES,
     ARM_LEVEL,

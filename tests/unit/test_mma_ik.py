@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import rotation, transform
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.damped import is_near_singular, pose_error
 from teleop_core.robots.kinematics import REACHED

@@ -8,8 +8,8 @@ import pinocchio
 import pytest
 import roboticstoolbox as rtb
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.geometry import rotation
+from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels.geometry import rotation
 from teleop_core.robots import load_robot
 from teleop_core.robots.dh import DhRow
 from teleop_core.robots.mma_models import (

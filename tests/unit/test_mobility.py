@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.robots.mobility import (
     PLANAR,
     degrees_of_freedom,

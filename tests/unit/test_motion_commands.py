@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teleop_core.errors import ShapeError
-from teleop_core.geometry import rotation, transform
-from teleop_core.operation import OperationParameters
-from teleop_core.operation.states import Answer, State
-from teleop_core.parameters import build
+from teleop_core.base.errors import ShapeError
+from teleop_core.base.parameters import build
+from teleop_core.graph.signals import DT, TICK_NS
+from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import load_robot
-from teleop_core.signals import DT, TICK_NS
+from teleop_core.slave.operation import OperationParameters
+from teleop_core.slave.operation.states import Answer, State
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
-from teleop_core.topics import NO_COMMAND_NS
 
 ARM = load_robot("rcrt1")
 # Well inside the limits and off the singularities.

@@ -8,11 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lsim
 
-from teleop_core.controllers.disturbance_observer import (
+from teleop_core.graph.signals import DT
+from teleop_core.robots import load_robot
+from teleop_core.slave.controllers.disturbance_observer import (
     DISTURBANCE_OBSERVER,
     DisturbanceObserverParameters,
 )
-from teleop_core.controllers.motion_estimates import (
+from teleop_core.slave.controllers.motion_estimates import (
     FRICTION_SHARE,
     MEMORY,
     SLOWEST_RATIO,
@@ -24,8 +26,6 @@ from teleop_core.controllers.motion_estimates import (
     friction_of_setpoint,
     known_friction,
 )
-from teleop_core.robots import load_robot
-from teleop_core.signals import DT
 
 ARM = load_robot("rcrt1")
 fadings = st.floats(0.5, 0.98)

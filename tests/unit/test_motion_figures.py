@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 from scipy.spatial.transform import Rotation
 
-from teleop_core.errors import ShapeError
+from teleop_core.base.errors import ShapeError
 from teleop_core.evaluation.motion_figures import NAMES, Kinematics, motion_figures
 from teleop_core.evaluation.motion_measures import (
     RATE,

@@ -5,21 +5,25 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import (
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.chain.mapping.motion_scaling import (
+    MotionScaling,
+    mapped_orientation,
+    to_slave_axes,
+)
+from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
+from teleop_core.chain.mapping.plausibility import PlausibilityParameters
+from teleop_core.chain.master.haptic_master import REST_POSITION, REST_TILT
+from teleop_core.graph.signals import STATE, TICK_NS
+from teleop_core.kernels.geometry import (
     pose_from_transform,
     quaternion_from_rotation,
     rotation,
     rotation_from_quaternion,
     transform,
 )
-from teleop_core.mapping.motion_scaling import MotionScaling, mapped_orientation, to_slave_axes
-from teleop_core.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.mapping.plausibility import PlausibilityParameters
-from teleop_core.master.haptic_master import REST_POSITION, REST_TILT
-from teleop_core.parameters import build
 from teleop_core.robots import load_robot
-from teleop_core.signals import STATE, TICK_NS
 
 ANY_HAND = PlausibilityParameters(
     speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.parameters import build
 from teleop_core.kernels import kernel, records
-from teleop_core.operation import (
+from teleop_core.slave.operation import (
     Answer,
     Event,
     Fault,
@@ -17,8 +18,7 @@ from teleop_core.operation import (
     State,
     command_event,
 )
-from teleop_core.operation.states import COMMANDS, STATE_FIELDS, TABLE, answer_text, change
-from teleop_core.parameters import build
+from teleop_core.slave.operation.states import COMMANDS, STATE_FIELDS, TABLE, answer_text, change
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 D, E, P, F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT

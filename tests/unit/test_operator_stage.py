@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from teleop_core.errors import ParameterError, RecordingError
-from teleop_core.master.haptic_master import HapticMaster, HapticMasterParameters
-from teleop_core.operators.rest import rest_pose
+from teleop_core.base.errors import ParameterError, RecordingError
+from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.chain.operators.rest import rest_pose
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 

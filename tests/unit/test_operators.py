@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from held_master import HeldMaster
-from teleop_core.errors import ParameterError, PartError
-from teleop_core.operators import OPERATORS, Operator, Setting, following, register_operator
-from teleop_core.operators.parameters import OperatorParameters
-from teleop_core.operators.shapes import PHASES, minimum_jerk
-from teleop_core.parameters import NoParameters, build, parameter
+from teleop_core.base.errors import ParameterError, PartError
+from teleop_core.base.parameters import NoParameters, build, parameter
+from teleop_core.chain.operators import OPERATORS, Operator, Setting, following, register_operator
+from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.shapes import PHASES, minimum_jerk
 
 # Products of numbers below one.
 ROUNDING = 1e-15

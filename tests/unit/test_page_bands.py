@@ -8,8 +8,8 @@ from teleop_core.evaluation.bands import bands_of, merged, stretches_of
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.state_history import NO_HISTORY, StateHistory, read_history
-from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import TELEOP_STATE, Limit
+from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph.topics import TELEOP_STATE, Limit
 
 COUNT = 3000
 # Times are sums of float64 seconds.

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.parameters import build, parameter, specs, values_of
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.parameters import build, parameter, specs, values_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 import pytest
 
 from teleop_core import evaluation
-from teleop_core.controllers import register_controller
-from teleop_core.controllers.pid import PID
-from teleop_core.errors import ParameterError, PartError
+from teleop_core.base.errors import ParameterError, PartError
+from teleop_core.base.parameters import NoParameters, build, parameter, specs
+from teleop_core.chain.fixtures import register_fixture
+from teleop_core.chain.fixtures.sphere import SPHERE
+from teleop_core.chain.operators import Operator, register_operator
 from teleop_core.evaluation import Metric
-from teleop_core.fixtures import register_fixture
-from teleop_core.fixtures.sphere import SPHERE
+from teleop_core.graph.stage import Stage, register_stage
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, passed_on
 from teleop_core.kernels import IS_COMPILED, kernel, records
-from teleop_core.operators import Operator, register_operator
-from teleop_core.parameters import NoParameters, build, parameter, specs
 from teleop_core.session.configuration import configure
-from teleop_core.stage import Stage, register_stage
-from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, passed_on
+from teleop_core.slave.controllers import register_controller
+from teleop_core.slave.controllers.pid import PID
 
 ECHO = Topic("test/echo", Kind.POSE, passed_on("slave/measured_cp"))
 
@@ -176,9 +176,9 @@ def test_trial_of_a_step_leaves_no_trace():
 
 LATER = """
 from teleop_core.kernels import kernel
-from teleop_core.parameters import NoParameters
-from teleop_core.stage import Stage
-from teleop_core.topics import SLAVE_MEASURED_CP
+from teleop_core.base.parameters import NoParameters
+from teleop_core.graph.stage import Stage
+from teleop_core.graph.topics import SLAVE_MEASURED_CP
 
 
 @kernel

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from teleop_core.controllers.pid import critically_damped_gains, pid_step
 from teleop_core.robots.rcrt1_dynamics import DRIVES
+from teleop_core.slave.controllers.pid import critically_damped_gains, pid_step
 
 DT = 1e-3
 GAINS = np.stack(critically_damped_gains(DRIVES.inertia, DRIVES.viscous, DRIVES.bandwidth), axis=1)

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_lab as lab
 from people import PEOPLE, moves, recorded
+from teleop_core.chain.mapping.inverse_kinematics import InverseKinematicsParameters
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.kernels import IS_COMPILED
-from teleop_core.mapping.inverse_kinematics import InverseKinematicsParameters
-from teleop_core.mapping.parameters import MotionScalingParameters
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.room import room, roomy_postures
 from teleop_lab.planning.aim import Aim

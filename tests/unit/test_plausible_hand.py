@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teleop_core.mapping.motion_scaling import MOTION_SCALING
-from teleop_core.mapping.parameters import MotionScalingParameters
-from teleop_core.signals import TICK_NS
+from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.graph.signals import TICK_NS
 
 REST = np.array([0.0, -0.1, 0.1, 1.0, 0.0, 0.0, 0.0])
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.operation.presses import Presses
+from teleop_core.slave.operation.presses import Presses
 
 
 def told(presses, *messages, sender=b"a"):

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.geometry import roll_pitch_yaw, rotation, transform
+from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels.geometry import roll_pitch_yaw, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
 

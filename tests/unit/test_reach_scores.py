@@ -9,18 +9,17 @@ from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from recipes import JOINTS, START_NS, Recipe, state
-from teleop_core.api import configuration
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
+from teleop_core.chain.mapping.motion_scaling import MotionScaling
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.score_table import MET, NOT_MET, score_tables
 from teleop_core.evaluation.scoring import evaluate
 from teleop_core.evaluation.windows import windows
-from teleop_core.mapping.motion_scaling import MotionScaling
-from teleop_core.mapping.parameters import MotionScalingParameters
-from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import (
+from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
     SLAVE_REACH,
@@ -28,6 +27,7 @@ from teleop_core.topics import (
     TELEOP_STATE,
     Limit,
 )
+from teleop_core.session.api import configuration
 
 COUNT = 15_000  # ticks: some windows
 SECOND_NS = 1_000_000_000

@@ -13,9 +13,9 @@ import gc
 import weakref
 import numpy as np
 from teleop_core.kernels import is_kernel
-from teleop_core.operation import Fault
-from teleop_core.operation.states import COMMANDS
-from teleop_core.parameters import build
+from teleop_core.slave.operation import Fault
+from teleop_core.slave.operation.states import COMMANDS
+from teleop_core.base.parameters import build
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 

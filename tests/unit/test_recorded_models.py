@@ -15,10 +15,10 @@ from rosbags.typesys import Stores, get_typestore
 import teleop_core as tc
 from teleop_core.bags.markers import Marker, Shape, marker_message
 from teleop_core.bags.transforms import TransformMessages
-from teleop_core.errors import ShapeError, UnknownNameError
-from teleop_core.fixtures.sphere import SPHERE
+from teleop_core.base.errors import ShapeError, UnknownNameError
+from teleop_core.chain.fixtures.sphere import SPHERE
+from teleop_core.graph.signals import TICK_NS
 from teleop_core.session.markers import FORCE_SCALE, TAIL, ArmMarkers
-from teleop_core.signals import TICK_NS
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 ROUNDING = 1e-12

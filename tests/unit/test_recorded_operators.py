@@ -8,12 +8,12 @@ from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
 from teleop_core.bags.writer import BagWriter
-from teleop_core.operators import OPERATORS, Setting
-from teleop_core.operators.parameters import OperatorParameters
-from teleop_core.operators.rest import REST_TILT
-from teleop_core.operators.shapes import PHASES
-from teleop_core.parameters import build
-from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.base.parameters import build
+from teleop_core.chain.operators import OPERATORS, Setting
+from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.rest import REST_TILT
+from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
 
 START_NS = 1_700_000_000_000_000_000
 COUNT = 201

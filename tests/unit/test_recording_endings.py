@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from teleop_core import topics
 from teleop_core.bags.mcap_source import McapSource
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph import topics
 
 JOINTS = tuple("abcdef")
 TOPIC = topics.SLAVE_MEASURED_JS

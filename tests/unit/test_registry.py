@@ -4,14 +4,14 @@ import sys
 
 import pytest
 
-from teleop_core.controllers import CONTROLLERS
-from teleop_core.errors import PartError, UnknownNameError
-from teleop_core.fixtures import FIXTURES
-from teleop_core.operators import OPERATORS
-from teleop_core.registry import Registry
-from teleop_core.stage import STAGES
+from teleop_core.base.errors import PartError, UnknownNameError
+from teleop_core.base.registry import Registry
+from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.chain.operators import OPERATORS
+from teleop_core.graph.stage import STAGES
+from teleop_core.slave.controllers import CONTROLLERS
 
-BUILT_IN = {"here": "teleop_core.topics:ALL", "json": "json:loads"}
+BUILT_IN = {"here": "teleop_core.graph.topics:ALL", "json": "json:loads"}
 
 
 def registry(trial=None, **builtin):

@@ -8,12 +8,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from teleop_core.errors import ShapeError, UnknownNameError
-from teleop_core.mapping.plausibility import PlausibilityParameters
-from teleop_core.master.operator import RunningOperator
-from teleop_core.operators.remote import AHEAD, RemoteHand, RemoteParameters
-from teleop_core.operators.rest import rest_pose
-from teleop_core.parameters import specs
+from teleop_core.base.errors import ShapeError, UnknownNameError
+from teleop_core.base.parameters import specs
+from teleop_core.chain.mapping.plausibility import PlausibilityParameters
+from teleop_core.chain.master.operator import RunningOperator
+from teleop_core.chain.operators.remote import AHEAD, RemoteHand, RemoteParameters
+from teleop_core.chain.operators.rest import rest_pose
 from teleop_core.session.configuration import configure
 
 DT = 1e-3

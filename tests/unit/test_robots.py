@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from teleop_core.errors import (
+from teleop_core.base.errors import (
     ParameterError,
     PartError,
     RecordingError,

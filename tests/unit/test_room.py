@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from teleop_core.errors import ParameterError, ShapeError
+from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.robots import IkStatus
 from teleop_core.robots.dh import robot_from_table

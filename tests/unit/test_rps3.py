@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import roboticstoolbox as rtb
 
-from teleop_core.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
-from teleop_core.geometry import rotation, transform
+from teleop_core.base.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
 from teleop_core.robots.rps3 import Assembly, assembly_modes, joint_points, leg_coordinates
 from teleop_core.robots.rps3_loop import constraints

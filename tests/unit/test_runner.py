@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core import api, topics
 from teleop_core.bags.reader import Bag
+from teleop_core.graph import topics
+from teleop_core.graph.signals import TICK_NS
 from teleop_core.robots import load_robot
+from teleop_core.session import api
 from teleop_core.session.configuration import Configuration, configure
 from teleop_core.session.runner import recorded_configuration, replay, simulate
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.signals import TICK_NS
 
 HOME = load_robot("rcrt1").home.tolist()
 DELAY_TICKS = 20

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.geometry import rotation, transform
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.dh import load_table, parse_table
 

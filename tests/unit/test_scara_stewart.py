@@ -7,8 +7,8 @@ import pytest
 import roboticstoolbox as rtb
 from scipy.spatial.transform import Rotation
 
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.geometry import rotation, transform
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.stewart import Layout
 from teleop_core.session.configuration import configure

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from teleop_core.errors import SessionError
+from teleop_core.base.errors import SessionError
 from teleop_core.nodes.sessions import announced, domains
 
 HOLD = """

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.signal import lsim
 
-from teleop_core.controllers.pid import PID, THIRD, PidParameters, pid_control, pid_step
+from teleop_core.base.parameters import build
+from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels import kernel
-from teleop_core.parameters import build
 from teleop_core.robots import load_robot
-from teleop_core.signals import DT, TICK_NS
+from teleop_core.slave.controllers.pid import PID, THIRD, PidParameters, pid_control, pid_step
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_core.slave.slave_sim import ControllerParameters

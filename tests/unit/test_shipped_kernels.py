@@ -14,7 +14,7 @@ SOURCES = Path(__file__).parents[2] / "src"
 V3, V2 = TIERS
 SCRIPT = """
 import numpy as np
-from teleop_core.geometry import multiply_quaternions, turn_between
+from teleop_core.kernels.geometry import multiply_quaternions, turn_between
 from teleop_core.kernels import kernel_from_source
 from teleop_core.kernels.progress import compiled_count
 
@@ -34,7 +34,7 @@ print(*(any(tier in name for name in read) for tier in {[*TIERS]}))
 """
 PLACES = """
 from pathlib import Path
-import teleop_core.geometry as module
+import teleop_core.kernels.geometry as module
 from teleop_core.kernels.shipped import places
 print(*(tier for tier, _ in places(Path(module.__file__))), *places(Path.cwd() / "own.py"))
 """
@@ -122,7 +122,7 @@ def test_kernels_are_compiled_where_shipped_ones_are_broken(shipped, tree, conte
 
 
 def test_kernels_of_a_changed_source_are_compiled(shipped, tree):
-    source = tree / "teleop_core/geometry.py"
+    source = tree / "teleop_core/kernels/geometry.py"
     source.write_text(source.read_text() + "\n# changed\n")
     count, bits = wheels.run(tree, None, SCRIPT).split()
     assert int(count) >= 3

@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
-from teleop_core.controllers import CONTROLLERS
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels import pointer
-from teleop_core.operation import Answer, Fault, OperationParameters, State
-from teleop_core.parameters import build
 from teleop_core.robots import load_robot
 from teleop_core.robots.drives import ACCELERATION, independent_acceleration
-from teleop_core.signals import DT, TICK_NS
 from teleop_core.slave.commands import CommandStatus
+from teleop_core.slave.controllers import CONTROLLERS
 from teleop_core.slave.joints import integrate
+from teleop_core.slave.operation import Answer, Fault, OperationParameters, State
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_core.slave.slave_sim import ControllerParameters, SlaveSim, SlaveSimParameters

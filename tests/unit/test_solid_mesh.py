@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from teleop_core.bodies import Solid, bodies_of
-from teleop_core.bodies.meshes import mesh_of
 from teleop_core.evaluation.packing import pack_to
 from teleop_core.evaluation.replay_figure import posed, robot_mesh
 from teleop_core.robots import load_robot
+from teleop_core.robots.bodies import Solid, bodies_of
+from teleop_core.robots.bodies.meshes import mesh_of
 
 HERE = np.array([0.1, -0.2, 0.3, np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])
 VOLUMES = {

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teleop_core.controllers.source_pid import SOURCE_PID, SourcePidParameters, loaded_axes
-from teleop_core.errors import ParameterError
-from teleop_core.parameters import build
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
 from teleop_core.robots import load_robot
+from teleop_core.slave.controllers.source_pid import SOURCE_PID, SourcePidParameters, loaded_axes
 
 ARM = load_robot("rcrt1")
 DT = 1e-3

@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 import teleop_core as tc
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.score_table import score_table
 

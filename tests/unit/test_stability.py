@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from teleop_core.controllers import CONTROLLERS, register_controller
-from teleop_core.controllers.source_pid import SOURCE_PID
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
 from teleop_core.kernels import kernel
-from teleop_core.parameters import build
-from teleop_core.plants import PLANTS
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import ROBOTS, load_robot
+from teleop_core.slave.controllers import CONTROLLERS, register_controller
+from teleop_core.slave.controllers.source_pid import SOURCE_PID
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
+from teleop_core.slave.plants import PLANTS
 
 
 def slave(**values):

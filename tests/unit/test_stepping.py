@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from teleop_core.operation import State
+from teleop_core.slave.operation import State
 
 KINDS = {
     "coarse": {},

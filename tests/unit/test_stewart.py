@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from teleop_core.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
-from teleop_core.geometry import rotation, transform
+from teleop_core.base.errors import ClosureError, ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import FkStatus, IkStatus, list_robots, load_robot
 from teleop_core.robots.stewart import PAIRED, DirectStatus, Layout
 

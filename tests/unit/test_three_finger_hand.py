@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import roboticstoolbox as rtb
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.geometry import rotation, transform
+from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.kernels.geometry import rotation, transform
 from teleop_core.robots import IkStatus, list_robots, load_robot
 from teleop_core.robots.hand_fingers import finger_point
 from teleop_core.robots.three_finger_hand import Grasp, Hand

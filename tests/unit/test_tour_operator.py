@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
-from teleop_core.errors import ParameterError
-from teleop_core.operators import OPERATORS, Setting
-from teleop_core.operators.parameters import OperatorParameters
-from teleop_core.operators.shapes import PHASES
-from teleop_core.operators.tour import TourParameters, through, tour
-from teleop_core.parameters import build
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.chain.operators import OPERATORS, Setting
+from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.chain.operators.tour import TourParameters, through, tour
 from teleop_core.session.configuration import configure
 
 ROUNDING = 1e-15

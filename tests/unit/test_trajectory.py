@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.errors import ParameterError, ShapeError
+from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.robots.rcrt1_dynamics import DRIVES
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 

@@ -8,9 +8,9 @@ import pinocchio
 import pytest
 
 import teleop_core as tc
-from teleop_core.bodies import bodies_of, urdf_of
 from teleop_core.cli import main
-from teleop_core.geometry import rotations_from_quaternions
+from teleop_core.kernels.geometry import rotations_from_quaternions
+from teleop_core.robots.bodies import bodies_of, urdf_of
 
 ROUNDING = 1e-7  # of angles that went through roll, pitch and yaw near the pole
 

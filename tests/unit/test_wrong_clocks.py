@@ -9,9 +9,9 @@ import pytest
 import teleop_core as tc
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.series import Series
-from teleop_core.errors import RecordingError
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph.topics import MASTER_MEASURED_CP, Topic
 from teleop_core.session.replayed_span import replayed_span
-from teleop_core.topics import MASTER_MEASURED_CP, Topic
 
 HOUR = 3600 * 10**9
 LATER = {"an hour late": HOUR, "in 2038": 2145916800 * 10**9, "beyond all": 2**61}

@@ -1,7 +1,7 @@
-from . import topics as topics
-from .api import configuration as configuration, replay as replay, run as run
-from .controllers import Controller as Controller, register_controller as register_controller
-from .errors import (
+from .graph import topics as topics
+from .session.api import configuration as configuration, replay as replay, run as run
+from .slave.controllers import Controller as Controller, register_controller as register_controller
+from .base.errors import (
     ClosureError as ClosureError,
     EvaluationError as EvaluationError,
     KernelError as KernelError,
@@ -20,27 +20,31 @@ from .evaluation import (
     frame_of as frame_of,
     register_metric as register_metric,
 )
-from .exchange import (
+from .session.exchange import (
     ExportReport as ExportReport,
     ImportOptions as ImportOptions,
     ImportReport as ImportReport,
     export_recording as export_recording,
     import_recording as import_recording,
 )
-from .fixtures import Fixture as Fixture, register_fixture as register_fixture
-from .graph import Graph as Graph, build_graph as build_graph
+from .chain.fixtures import Fixture as Fixture, register_fixture as register_fixture
+from .graph.graph import Graph as Graph, build_graph as build_graph
 from .kernels import kernel as kernel
-from .operators import (
+from .chain.operators import (
     Operator as Operator,
     Seen as Seen,
     Setting as Setting,
     following as following,
     register_operator as register_operator,
 )
-from .operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
-from .parameters import NoParameters as NoParameters, parameter as parameter
-from .plants import Physics as Physics, Plant as Plant, register_plant as register_plant
-from .recording import Recording as Recording, Stream as Stream, open_recording as open_recording
+from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
+from .base.parameters import NoParameters as NoParameters, parameter as parameter
+from .slave.plants import Physics as Physics, Plant as Plant, register_plant as register_plant
+from .session.recording import (
+    Recording as Recording,
+    Stream as Stream,
+    open_recording as open_recording,
+)
 from .robots import (
     Robot as Robot,
     list_robots as list_robots,
@@ -51,7 +55,7 @@ from .robots import (
 from .robots.parameters import RobotParameters as RobotParameters
 from .session.configuration import Configuration as Configuration
 from .session.virtual import VirtualTime as VirtualTime
-from .stage import Runner as Runner, Stage as Stage, register_stage as register_stage
-from .topics import Kind as Kind, Topic as Topic
+from .graph.stage import Runner as Runner, Stage as Stage, register_stage as register_stage
+from .graph.topics import Kind as Kind, Topic as Topic
 
 __version__: str

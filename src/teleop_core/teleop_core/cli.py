@@ -11,6 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
+from teleop_core.base.errors import TeleopError
+from teleop_core.base.texts import one_line
 from teleop_core.commands import compiling, console, devices, exchange, installed, operate
 from teleop_core.commands.arguments import (
     command,
@@ -23,8 +25,6 @@ from teleop_core.commands.arguments import (
     setting_arguments,
 )
 from teleop_core.commands.progress import shown_progress
-from teleop_core.errors import TeleopError
-from teleop_core.texts import one_line
 
 FAILED = 2
 INTERRUPTED = 130
@@ -83,7 +83,7 @@ def _note(message: Warning | str, *_: object) -> None:
 
 def _take_parts(files: list[Path]) -> None:
     """Load files with own parts here, and in every process that is started from here."""
-    from teleop_core.own_parts import load_own_parts
+    from teleop_core.base.own_parts import load_own_parts
 
     load_own_parts(files)
 
@@ -223,7 +223,7 @@ def _add_lookups(commands: Any) -> None:
 
 
 def _sim(arguments: argparse.Namespace) -> int:
-    from teleop_core import api
+    from teleop_core.session import api
 
     configuration = configured(arguments)
     with shown_progress("simulating") as progress:
@@ -233,7 +233,7 @@ def _sim(arguments: argparse.Namespace) -> int:
 
 
 def _replay(arguments: argparse.Namespace) -> int:
-    from teleop_core import api
+    from teleop_core.session import api
 
     with shown_progress("replaying") as progress:
         api.replay(
@@ -283,7 +283,7 @@ def _recover(arguments: argparse.Namespace) -> int:
 
 
 def _scenarios(_: argparse.Namespace) -> int:
-    from teleop_core.session.layers import list_scenarios
+    from teleop_core.graph.layers import list_scenarios
 
     for name, description in list_scenarios().items():
         print(f"{name:16} {description}")
@@ -291,13 +291,13 @@ def _scenarios(_: argparse.Namespace) -> int:
 
 
 def _parts(_: argparse.Namespace) -> int:
-    from teleop_core.controllers import CONTROLLERS
+    from teleop_core.chain.fixtures import FIXTURES
+    from teleop_core.chain.operators import OPERATORS
     from teleop_core.evaluation import METRICS
-    from teleop_core.fixtures import FIXTURES
-    from teleop_core.operators import OPERATORS
-    from teleop_core.plants import PLANTS
+    from teleop_core.graph.stage import STAGES
     from teleop_core.robots import ROBOTS
-    from teleop_core.stage import STAGES
+    from teleop_core.slave.controllers import CONTROLLERS
+    from teleop_core.slave.plants import PLANTS
 
     for registry in (OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, STAGES, METRICS):
         print(f"{registry.kinds:12} {', '.join(registry)}")
@@ -305,9 +305,9 @@ def _parts(_: argparse.Namespace) -> int:
 
 
 def _parameters(arguments: argparse.Namespace) -> int:
-    from teleop_core.errors import UnknownNameError
+    from teleop_core.base.errors import UnknownNameError
+    from teleop_core.graph.layers import declared_groups
     from teleop_core.session.configuration import parameter_rows
-    from teleop_core.session.layers import declared_groups
 
     groups = declared_groups()
     if arguments.stage is not None and arguments.stage not in groups:
@@ -337,7 +337,7 @@ def _robot(arguments: argparse.Namespace) -> int:
         print("\n".join(list_robots()))
         return 0
     if arguments.urdf is not None:
-        from teleop_core.bodies import urdf_of
+        from teleop_core.robots.bodies import urdf_of
 
         arguments.urdf.write_text(urdf_of(robot), encoding="utf-8")
         print(f"{arguments.urdf}: {robot.name}")

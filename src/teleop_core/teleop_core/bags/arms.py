@@ -17,8 +17,8 @@ from collections.abc import Iterable, Iterator
 
 from teleop_core.bags.reader import Bag, Series, TopicInfo
 from teleop_core.bags.reports import Report
-from teleop_core.errors import RecordingError, UnknownNameError
-from teleop_core.topics import DIAGNOSTICS, SLAVE_MEASURED_CP, Topic
+from teleop_core.base.errors import RecordingError, UnknownNameError
+from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_CP, Topic
 
 ARMS_KEY = "arms"
 NAMESPACE_KEY = "namespace"

@@ -3,7 +3,7 @@
 import struct
 from dataclasses import dataclass, field
 
-from teleop_core.topics import Kind
+from teleop_core.graph.topics import Kind
 
 NUMPY_CODES = {"i": "i4", "I": "u4", "d": "f8"}
 _ENCAPSULATION = b"\x00\x01"  # plain CDR, little-endian; two bytes of options follow

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import lz4.frame
 import zstandard
 
-from teleop_core.texts import shown
+from teleop_core.base.texts import shown
 
 NAMES = ("zstd", "lz4", "none")
 LARGEST = 128 << 20

@@ -5,7 +5,7 @@ from pathlib import Path
 from teleop_core.bags import rosbag2
 from teleop_core.bags.layouts import SECOND_NS
 from teleop_core.bags.mcap_file import McapFile
-from teleop_core.errors import RecordingError
+from teleop_core.base.errors import RecordingError
 
 
 def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None) -> Exception | None:

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from teleop_core import plain_yaml
-from teleop_core.errors import RecordingError
-from teleop_core.texts import shown
+from teleop_core.base import plain_yaml
+from teleop_core.base.errors import RecordingError
+from teleop_core.base.texts import shown
 
 METADATA = "metadata.yaml"
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.cdr import NUMPY_CODES, Template, template
-from teleop_core.errors import ShapeError
-from teleop_core.topics import Kind, Topic
+from teleop_core.base.errors import ShapeError
+from teleop_core.graph.topics import Kind, Topic
 
 Bytes = NDArray[np.uint8]
 Stamps = NDArray[np.int64]

@@ -12,8 +12,8 @@ import numpy as np
 
 from teleop_core.bags.cdr import Template
 from teleop_core.bags.layouts import SECOND_NS
-from teleop_core.geometry import Array
-from teleop_core.topics import Kind, Quality, Topic
+from teleop_core.graph.topics import Kind, Quality, Topic
+from teleop_core.kernels.geometry import Array
 
 MARKERS = Topic(
     "teleop/markers", Kind.REPORT, quality=Quality.REPORT,

@@ -10,8 +10,8 @@ from teleop_core.bags.messages import read_reports
 from teleop_core.bags.reader import Bag, TopicInfo
 from teleop_core.bags.reports import Report
 from teleop_core.bags.series import Series
-from teleop_core.errors import RecordingError
-from teleop_core.topics import Kind, Topic
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph.topics import Kind, Topic
 
 Message = tuple[int, bytes]
 """Log time [ns] and CDR bytes."""

@@ -1,10 +1,10 @@
 """Messages: the one place that knows what a message's fields and bytes mean.
 
-Inside the package a message is a stamp and a row of numbers (:class:`~teleop_core.topics.Kind`
-says which). Three ways lead from one to the other: :func:`layout` for whole streams and for single
-messages of a known stream (fast), :func:`read_values` and :func:`write_values` for messages of any
-other sender, :func:`report` and :func:`read_reports` for reports. Quaternions are w, x, y, z in
-values and x, y, z, w in messages.
+Inside the package a message is a stamp and a row of numbers
+(:class:`~teleop_core.graph.topics.Kind` says which). Three ways lead from one to the other:
+:func:`layout` for whole streams and for single messages of a known stream (fast),
+:func:`read_values` and :func:`write_values` for messages of any other sender, :func:`report` and
+:func:`read_reports` for reports. Quaternions are w, x, y, z in values and x, y, z, w in messages.
 """
 
 import math
@@ -24,7 +24,7 @@ from teleop_core.bags.layouts import (
 )
 from teleop_core.bags.reports import Report, read_reports, report
 from teleop_core.bags.ros_types import deserialise
-from teleop_core.topics import Kind
+from teleop_core.graph.topics import Kind
 
 __all__ = [
     "SECOND_NS", "Layout", "Refusal", "Report", "Stamps", "Values", "check", "discover", "layout",

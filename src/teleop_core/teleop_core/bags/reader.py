@@ -19,9 +19,9 @@ from teleop_core.bags.messages import Refusal, Report, read_reports
 from teleop_core.bags.recovery import recover
 from teleop_core.bags.series import Column, Series, join, kind_of
 from teleop_core.bags.writer import METADATA_NAME
-from teleop_core.errors import RecordingError
-from teleop_core.texts import printable
-from teleop_core.topics import Kind, Topic
+from teleop_core.base.errors import RecordingError
+from teleop_core.base.texts import printable
+from teleop_core.graph.topics import Kind, Topic
 
 
 class _Message(NamedTuple):
@@ -88,7 +88,7 @@ def _name(topic: Topic | str) -> str:
 class Bag:
     """A recording, opened for reading.
 
-    Topics are named as in :mod:`teleop_core.topics`, without the leading slash.
+    Topics are named as in :mod:`teleop_core.graph.topics`, without the leading slash.
 
     Args:
         path: Directory of a recording, or one ``.mcap`` file.

@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from teleop_core.bags import compression
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.parameters import parameter
-from teleop_core.stage import Stage
-from teleop_core.topics import BY_NAME, Kind, Quality, Stamp, Topic
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.parameters import parameter
+from teleop_core.graph.stage import Stage
+from teleop_core.graph.topics import BY_NAME, Kind, Quality, Stamp, Topic
 
 
 @dataclass(frozen=True, kw_only=True)

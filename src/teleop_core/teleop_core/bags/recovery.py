@@ -9,7 +9,7 @@ from teleop_core.bags import compression, rosbag2
 from teleop_core.bags.chunks import HEADER, Chunk
 from teleop_core.bags.mcap_file import McapFile
 from teleop_core.bags.mcap_source import McapSource, Records
-from teleop_core.errors import RecordingError
+from teleop_core.base.errors import RecordingError
 
 
 def recover(path: Path | str, out: Path | str | None = None) -> tuple[Path, int]:

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from teleop_core.bags import ros_types
 from teleop_core.bags.layouts import SECOND_NS
-from teleop_core.texts import printable
-from teleop_core.topics import Kind
+from teleop_core.base.texts import printable
+from teleop_core.graph.topics import Kind
 
 
 class Report(NamedTuple):

@@ -10,10 +10,10 @@ from typing import Any
 import yaml
 from mcap.records import Channel, Schema, Statistics
 
-from teleop_core import plain_yaml
 from teleop_core.bags import ros_types
-from teleop_core.errors import RecordingError
-from teleop_core.topics import Quality, Topic
+from teleop_core.base import plain_yaml
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph.topics import Quality, Topic
 
 VERSION = 9
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}

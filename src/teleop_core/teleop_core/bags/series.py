@@ -11,7 +11,7 @@ from teleop_core.bags import ros_types
 from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values, discover
 from teleop_core.bags.messages import Refusal, read_any
 from teleop_core.bags.walk import gather
-from teleop_core.topics import BY_NAME, Kind
+from teleop_core.graph.topics import BY_NAME, Kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class Series:
     Attributes:
         stamp_ns: Stamps of the headers, shape (N,), [ns].
         log_ns: Times of recording, shape (N,), [ns].
-        values: Columns as in :class:`~teleop_core.topics.Kind`, shape (N, width).
+        values: Columns as in :class:`~teleop_core.graph.topics.Kind`, shape (N, width).
         names: Joint names in the order of the columns; empty without joints.
         frame_id: Frame in the header of the first message.
     """

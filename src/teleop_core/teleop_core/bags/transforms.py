@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from teleop_core.bags import ros_types
 from teleop_core.bags.cdr import Template
 from teleop_core.bags.layouts import SECOND_NS, Bytes, Stamps
-from teleop_core.errors import ShapeError
-from teleop_core.geometry import Array
-from teleop_core.topics import Kind, Quality, Stamp, Topic
+from teleop_core.base.errors import ShapeError
+from teleop_core.graph.topics import Kind, Quality, Stamp, Topic
+from teleop_core.kernels.geometry import Array
 
 ROBOT_DESCRIPTION = Topic(
     "robot_description", Kind.REPORT, Stamp("none"), quality=Quality.LATCHED,

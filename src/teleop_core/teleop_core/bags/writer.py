@@ -19,8 +19,8 @@ from teleop_core.bags.chunks import Messages, Single, Stretch, assemble, split
 from teleop_core.bags.layouts import SECOND_NS, Layout, Stamps, Values, layout
 from teleop_core.bags.mcap_file import McapFile
 from teleop_core.bags.recording import RecordingParameters
-from teleop_core.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
-from teleop_core.topics import Kind, Topic
+from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
+from teleop_core.graph.topics import Kind, Topic
 
 CHUNK_BYTES = 1 << 20
 QUEUE_LENGTH = 8

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
 
 if TYPE_CHECKING:
     from teleop_core.session.configuration import Configuration
@@ -72,7 +72,7 @@ def settings(arguments: argparse.Namespace) -> list[str]:
 
 def configured(arguments: argparse.Namespace) -> "Configuration":
     """Configuration of a session, as its arguments say."""
-    from teleop_core import api
+    from teleop_core.session import api
 
     return api.configuration(arguments.scenario, files=arguments.config, texts=settings(arguments))
 

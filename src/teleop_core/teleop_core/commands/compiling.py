@@ -46,12 +46,12 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _phases(*, is_all: bool) -> Iterator[Sequence[Job]]:
     """Jobs to be done side by side, one group after the other: later ones find what is there."""
-    from teleop_core.controllers import CONTROLLERS
-    from teleop_core.fixtures import FIXTURES
-    from teleop_core.graph import BUILT_IN
-    from teleop_core.plants import PLANTS
+    from teleop_core.chain.fixtures import FIXTURES
+    from teleop_core.graph.graph import BUILT_IN
+    from teleop_core.graph.layers import list_scenarios
     from teleop_core.robots import ROBOTS
-    from teleop_core.session.layers import list_scenarios
+    from teleop_core.slave.controllers import CONTROLLERS
+    from teleop_core.slave.plants import PLANTS
 
     yield [(_FIRST, "", stage) for stage in BUILT_IN]
     yield [(_FIRST, "", "")]
@@ -70,10 +70,10 @@ def _compile(job: Job, is_replayed: bool) -> int:
     """Number of kernels that were compiled to run a stage or a short session."""
     import tempfile
 
-    from teleop_core import api
+    from teleop_core.graph.signals import DT
+    from teleop_core.graph.stage import STAGES
     from teleop_core.kernels.progress import compiled_count
-    from teleop_core.signals import DT
-    from teleop_core.stage import STAGES
+    from teleop_core.session import api
 
     scenario, setting, stage = job
     before = compiled_count()

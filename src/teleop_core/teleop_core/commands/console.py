@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.base.texts import printable
 from teleop_core.commands.arguments import command, ros_module, setting_arguments
-from teleop_core.errors import ParameterError, TeleopError
-from teleop_core.texts import printable
 
 if TYPE_CHECKING:
     from teleop_core.console.server import ConsoleServer
@@ -102,7 +102,7 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
     """Start sessions one after the other, each with the page, until Ctrl-C."""
     from teleop_core.console.app import Console, splash
     from teleop_core.console.recorded_arms import parameters_of
-    from teleop_core.session.layers import SESSION
+    from teleop_core.graph.layers import SESSION
 
     ros_module("console_session")
     from teleop_core.nodes.console_session import ConsoleSession
@@ -143,7 +143,7 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
 
 
 def _configured(arguments: argparse.Namespace, texts: list[str]) -> Any:
-    from teleop_core import api
+    from teleop_core.session import api
 
     return api.configuration(arguments.scenario, files=arguments.config, texts=texts)
 

@@ -14,7 +14,7 @@ def add(commands: Any) -> None:
 
 
 def _run(_: argparse.Namespace) -> int:
-    from teleop_core.errors import SessionError
+    from teleop_core.base.errors import SessionError
 
     searches: tuple[tuple[str, Callable[[], Iterator[str]]], ...] = (
         ("gamepad", _gamepads), ("spacemouse", _space_mice),
@@ -30,7 +30,7 @@ def _run(_: argparse.Namespace) -> int:
 
 
 def _gamepads() -> Iterator[str]:
-    from teleop_core.devices.gamepad import Sdl
+    from teleop_core.chain.devices.gamepad import Sdl
 
     for _, name, is_known in Sdl().names():
         yield (
@@ -39,7 +39,7 @@ def _gamepads() -> Iterator[str]:
 
 
 def _space_mice() -> Iterator[str]:
-    from teleop_core.devices.spacemouse import space_mice
+    from teleop_core.chain.devices.spacemouse import space_mice
 
     for name, _ in space_mice():
         yield name

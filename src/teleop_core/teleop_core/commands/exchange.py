@@ -6,11 +6,11 @@ import shlex
 from pathlib import Path
 from typing import Any, NoReturn
 
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.texts import printable
 from teleop_core.commands.arguments import command, out_argument
-from teleop_core.errors import ParameterError
-from teleop_core.exchange.options import BUTTONS, LENGTHS, TIMES_NS, ImportOptions
-from teleop_core.exchange.presets import PRESETS
-from teleop_core.texts import printable
+from teleop_core.session.exchange.options import BUTTONS, LENGTHS, TIMES_NS, ImportOptions
+from teleop_core.session.exchange.presets import PRESETS
 
 _IMPORT = """\
 Make a recording of a hand's motion from a file of others: CSV, TSV or blanks (also .gz), Parquet,
@@ -202,7 +202,7 @@ def _add_export(commands: Any) -> None:
 
 
 def _export(arguments: argparse.Namespace) -> int:
-    from teleop_core.exchange import export_recording
+    from teleop_core.session.exchange import export_recording
 
     report = export_recording(
         arguments.bags, arguments.out, arguments.format, topics=arguments.topics,
@@ -213,7 +213,7 @@ def _export(arguments: argparse.Namespace) -> int:
 
 
 def _import(arguments: argparse.Namespace) -> int:
-    from teleop_core.exchange import import_recording
+    from teleop_core.session.exchange import import_recording
 
     arms = {name: _given(_of_arm(name, text)) for name, text in arguments.arm}
     report = import_recording(

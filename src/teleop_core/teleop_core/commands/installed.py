@@ -9,7 +9,7 @@ A package adds a command by a function that adds its parser, as ``add`` of the m
 import sys
 from typing import Any
 
-from teleop_core.texts import one_line
+from teleop_core.base.texts import one_line
 
 GROUP = "teleop_core.commands"
 RELEASED_TOGETHER = {

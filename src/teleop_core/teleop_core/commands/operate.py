@@ -4,9 +4,9 @@ import argparse
 import os
 from typing import TYPE_CHECKING, Any
 
+from teleop_core.base.errors import SessionError
 from teleop_core.commands.arguments import command, ros_module
-from teleop_core.errors import SessionError
-from teleop_core.topics import STATE_COMMANDS
+from teleop_core.graph.topics import STATE_COMMANDS
 
 if TYPE_CHECKING:
     from teleop_core.nodes.remote_control import ArmState, RemoteControl

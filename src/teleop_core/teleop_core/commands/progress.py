@@ -27,7 +27,7 @@ class Progress:
     @property
     def seconds(self) -> float:
         """Time of the ticks so far."""
-        from teleop_core.signals import DT
+        from teleop_core.graph.signals import DT
 
         return round(self.ticks * DT, 9)
 

@@ -6,8 +6,8 @@ from contextlib import suppress
 import numpy as np
 import viser
 
-from teleop_core.bodies import bodies_of
-from teleop_core.bodies.meshes import mesh_of
+from teleop_core.base.errors import TeleopError
+from teleop_core.chain.fixtures.box import BOX
 from teleop_core.console.body_nodes import BodyNodes, extent
 from teleop_core.console.fixture_outlines import OutlineNode
 from teleop_core.console.link import Arm, ArmView, box_of
@@ -15,11 +15,7 @@ from teleop_core.console.look import MEASURED, WANTED, Color
 from teleop_core.console.master_nodes import MasterNodes
 from teleop_core.console.stand import DEVICE, PUBLISHED_AXES, REST, stand_beside
 from teleop_core.console.tails import LENGTH, Tail, is_jump
-from teleop_core.errors import TeleopError
-from teleop_core.fixtures.box import BOX
-from teleop_core.geometry import Array
-from teleop_core.robots.robot import Robot
-from teleop_core.topics import (
+from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
@@ -30,6 +26,10 @@ from teleop_core.topics import (
     Limit,
     Topic,
 )
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.bodies import bodies_of
+from teleop_core.robots.bodies.meshes import mesh_of
+from teleop_core.robots.robot import Robot
 
 Path = Callable[[Topic, str, float], tuple[Array, Array]]
 """From a topic, an arm and a length [s]: times (N,) [s] and rows (N, width) up to now."""

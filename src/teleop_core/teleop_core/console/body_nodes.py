@@ -6,11 +6,11 @@ from types import MappingProxyType
 import numpy as np
 import viser
 
-from teleop_core.bodies import Bodies, Role, Solid
-from teleop_core.bodies.meshes import merged, mesh_of
 from teleop_core.console.look import WANTED, WRONG, Color
 from teleop_core.console.poses import moved, set_pose
-from teleop_core.geometry import Array, rotations_from_quaternions
+from teleop_core.kernels.geometry import Array, rotations_from_quaternions
+from teleop_core.robots.bodies import Bodies, Role, Solid
+from teleop_core.robots.bodies.meshes import merged, mesh_of
 
 ROLES: Mapping[Role, Color] = MappingProxyType({
     "base": (96, 108, 122), "link": (196, 204, 212), "joint": (52, 112, 176),

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import viser
 
-from teleop_core.geometry import Array, quaternion_from_rotation, rotations_from_quaternions
+from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotations_from_quaternions
 
 FIELD = np.radians(45.0)
 """Vertical field of view of all cameras [rad]."""

@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import viser
 
+from teleop_core.base.errors import TeleopError
+from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.chain.fixtures.box import BOX
 from teleop_core.console.look import GOOD, WRONG
-from teleop_core.errors import TeleopError
-from teleop_core.fixtures import FIXTURES
-from teleop_core.fixtures.box import BOX
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 _STILL = 5e-5  # [m]
 

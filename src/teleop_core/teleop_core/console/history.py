@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.console.link import Arm, ArmView
-from teleop_core.geometry import Array
-from teleop_core.topics import (
+from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_MEASURED_JS,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_JS,
 )
+from teleop_core.kernels.geometry import Array
 
 SPAN = 30.0
 """How far plots reach back [s]."""

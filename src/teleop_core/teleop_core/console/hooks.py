@@ -27,13 +27,13 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 from websockets.typing import Data, Subprotocol
 
+from teleop_core.base.errors import SessionError
 from teleop_core.console.answers import Answers
 from teleop_core.console.connection import Connection, Gate
 from teleop_core.console.drivers import Drivers
 from teleop_core.console.filter import FLOOD, LARGEST, NO_VALUE, WATCHES, Filter, Sets, decode
 from teleop_core.console.guard import HEADERS, Guard
 from teleop_core.console.guard import Request as Asked
-from teleop_core.errors import SessionError
 
 PAGES = 16
 """Pages that may be open at once; the youngest that does not drive gives way."""

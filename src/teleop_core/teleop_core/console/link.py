@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from teleop_core.geometry import Array
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
-from teleop_core.topics import Topic
 
 Setting = (
     bool
@@ -38,8 +38,8 @@ class ArmView:
 
     Attributes:
         streams: Newest values of each stream by its name without the arm, such as
-            ``slave/measured_cp``; columns as of :class:`~teleop_core.topics.Kind`. Topics that have
-            not spoken are missing.
+            ``slave/measured_cp``; columns as of :class:`~teleop_core.graph.topics.Kind`. Topics
+            that have not spoken are missing.
         stamp_ns: Their stamps [ns].
         state: Numbers of ``teleop/state`` by name; empty before the first.
         operation: Numbers of ``slave/operation`` by name; empty before the first.
@@ -126,7 +126,7 @@ class Link(Protocol):
         """What is known now; cheap, called at the rate of the page."""
 
     def command(self, word: str, arm: str = "") -> tuple[bool, str]:
-        """Send one of :data:`~teleop_core.topics.STATE_COMMANDS`; whether it was taken, and why."""
+        """Send one of ``topics.STATE_COMMANDS``; whether it was taken, and why."""
 
     def press(self, *, is_pressed: bool) -> None:
         """Press or release the emergency stop of all arms."""

@@ -9,7 +9,7 @@ from teleop_core.console.look import HAND, WRONG
 from teleop_core.console.poses import move
 from teleop_core.console.stand import DEVICE, REST, STYLUS, Stand
 from teleop_core.console.tails import Tail
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 METRES_PER_NEWTON = 0.05
 """Scale of forces."""

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 import viser
 
+from teleop_core.base.errors import TeleopError
 from teleop_core.console.drivers import Drivers
 from teleop_core.console.history import SPAN, History, LiveScores
 from teleop_core.console.hooks import Server
@@ -21,7 +22,6 @@ from teleop_core.console.plots import Plots
 from teleop_core.console.settings import Renew, SettingsPanel
 from teleop_core.console.status import alive, fixture_text, mode_text, next_button, status_html
 from teleop_core.console.tails import is_jump
-from teleop_core.errors import TeleopError
 
 _PERIOD = 0.2  # between two drawings of the texts [s]
 _RECALLED = 300  # points of a plot

@@ -9,7 +9,7 @@ from viser import uplot
 
 from teleop_core.console.history import SPAN, History
 from teleop_core.console.look import CURVES
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 _PERIOD = 0.25  # between two drawings [s]
 _POINTS = 400  # in a curve: more than the panel has pixels

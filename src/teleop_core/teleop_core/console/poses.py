@@ -11,7 +11,7 @@ import numpy as np
 import viser
 from viser import _messages
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 _STILL = 2e-5
 """Change of a pose [m, parts of a turn] below which nothing is sent."""

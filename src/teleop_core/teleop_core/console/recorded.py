@@ -8,11 +8,11 @@ from types import MappingProxyType
 import numpy as np
 
 from teleop_core.bags.reader import Bag
+from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.console.link import ArmView, Parameters, Setting, View
 from teleop_core.console.recorded_arms import configuration_of, parameters_of, recorded_arms
-from teleop_core.errors import ParameterError, SessionError
-from teleop_core.geometry import Array
-from teleop_core.topics import Topic
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """Speeds that the controls offer; any other from 0.01 to 100 is taken too."""

@@ -11,15 +11,10 @@ from teleop_core.bags.arms import arm_names, of_arm, topic_prefix
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import read_reports
 from teleop_core.bags.series import Series, in_order
+from teleop_core.base.errors import RecordingError, TeleopError
+from teleop_core.base.parameters import specs, values_of
 from teleop_core.console.link import Arm, ArmView, ParameterInfo, Setting
-from teleop_core.errors import RecordingError, TeleopError
-from teleop_core.operation.report import operation_text
-from teleop_core.parameters import specs, values_of
-from teleop_core.robots import load_robot_set
-from teleop_core.robots.robot import Robot
-from teleop_core.session.configuration import Configuration
-from teleop_core.session.runner import recorded_configuration
-from teleop_core.topics import (
+from teleop_core.graph.topics import (
     OPERATION,
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
@@ -27,6 +22,11 @@ from teleop_core.topics import (
     TELEOP_STATE,
     Topic,
 )
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.robot import Robot
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.runner import recorded_configuration
+from teleop_core.slave.operation.report import operation_text
 
 MOST = 200 << 20
 """Bytes of samples that are kept; of longer recordings every second, third ... sample is."""

@@ -5,15 +5,15 @@ from collections.abc import Iterable
 import numpy as np
 import viser
 
+from teleop_core.base.errors import TeleopError
+from teleop_core.chain.mapping.parameters import axis_map
+from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.console.arm_nodes import ArmNodes, Path
 from teleop_core.console.cameras import ASPECT, FIELD, Camera, around, from_tool, microscope
 from teleop_core.console.link import Arm, Parameters, View
 from teleop_core.console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
 from teleop_core.console.stand import PUBLISHED_AXES
-from teleop_core.errors import TeleopError
-from teleop_core.geometry import Array
-from teleop_core.mapping.parameters import axis_map
-from teleop_core.operators.rest import REST_POSITION
+from teleop_core.kernels.geometry import Array
 
 _POINTS = {"tour": "tour.points", "points": "points"}
 """Operators that go to points, and where these stand."""

@@ -9,11 +9,11 @@ import threading
 from contextlib import suppress
 from pathlib import Path
 
+from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.console.answers import Answers
 from teleop_core.console.drivers import PATIENCE, Drivers
 from teleop_core.console.guard import Guard, is_loopback, is_wildcard
 from teleop_core.console.hooks import Server
-from teleop_core.errors import ParameterError, SessionError
 
 _LISTENS = "0A"  # state in /proc/net/tcp
 _SHOWN = 80

@@ -7,8 +7,8 @@ from typing import Any
 
 import viser
 
+from teleop_core.base.errors import TeleopError
 from teleop_core.console.link import Link, ParameterInfo, Parameters, Setting
-from teleop_core.errors import TeleopError
 
 QUICK = (
     ("motion_scaling", "mode"), ("motion_scaling", "coarse_gain"), ("motion_scaling", "fine_gain"),

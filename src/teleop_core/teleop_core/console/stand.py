@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.bodies.meshes import mesh_of
-from teleop_core.bodies.solids import Solid
-from teleop_core.geometry import Array, quaternion_from_rotation
-from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
+from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
+from teleop_core.kernels.geometry import Array, quaternion_from_rotation
+from teleop_core.robots.bodies.meshes import mesh_of
+from teleop_core.robots.bodies.solids import Solid
 
 PUBLISHED_AXES = axis_map("axes", MotionScalingParameters.axes)
 """Rotation (3, 3) from the master's base to the slave's axes, of a session that says no other."""

@@ -4,7 +4,7 @@ import html
 
 from teleop_core.console.answers import Situation
 from teleop_core.console.link import ArmView, View
-from teleop_core.operation import Fault, State
+from teleop_core.slave.operation import Fault, State
 
 _SIGNALS = {
     State.ENABLED: "good", State.PAUSED: "held", State.DISABLED: "idle", State.FAULT: "wrong",

@@ -9,12 +9,12 @@ import numpy as np
 import viser
 from viser import TransformControlsEvent as Event
 
+from teleop_core.base.errors import UnknownNameError
 from teleop_core.console.link import View
 from teleop_core.console.poses import move
 from teleop_core.console.scene import Scene
-from teleop_core.errors import UnknownNameError
-from teleop_core.geometry import Array, turn_by
-from teleop_core.topics import MASTER_MEASURED_CP
+from teleop_core.graph.topics import MASTER_MEASURED_CP
+from teleop_core.kernels.geometry import Array, turn_by
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 """Directions of a small step: along and about the axes of master_base."""

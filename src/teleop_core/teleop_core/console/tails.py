@@ -4,7 +4,7 @@ import numpy as np
 import viser
 
 from teleop_core.console.look import Color
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 LENGTH = 10.0
 """Time that a tail shows [s]."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 Integers = NDArray[np.int64]
 _US = 1000  # resolution of a distribution [ns]

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.state_history import StateHistory
-from teleop_core.geometry import Array
-from teleop_core.signals import STATE
-from teleop_core.topics import Limit
+from teleop_core.graph.signals import STATE
+from teleop_core.graph.topics import Limit
+from teleop_core.kernels.geometry import Array
 
 _STRETCHES = 20_000  # per cause; more than a screen has pixels
 _FINEST_S = 1e-3

@@ -7,12 +7,12 @@ from pathlib import Path
 from rich.console import Console
 
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import EvaluationError
+from teleop_core.base.errors import EvaluationError
+from teleop_core.base.texts import printable
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.score_table import score_tables
 from teleop_core.evaluation.scoring import Study, studies
 from teleop_core.evaluation.windows import Seconds
-from teleop_core.texts import printable
 
 
 def evaluate_bags(

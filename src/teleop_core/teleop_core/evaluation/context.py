@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable
 from typing import Protocol, TypeVar, cast
 
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import EvaluationError
+from teleop_core.base.errors import EvaluationError
 from teleop_core.evaluation.origin import Origin
 from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.evaluation.windows import Span, Window
-from teleop_core.topics import Topic
+from teleop_core.graph.topics import Topic
 
 
 class Accumulator(Protocol):

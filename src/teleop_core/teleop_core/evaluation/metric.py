@@ -12,8 +12,8 @@ from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.plain import Leaf, Values, leaves, plain
 from teleop_core.evaluation.rows import Row, error_rows, row
 from teleop_core.evaluation.windows import Window
-from teleop_core.geometry import Array
-from teleop_core.topics import Topic
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
 
 SPREAD_MEANING = "rms, sample S.D. (n − 1), largest"
 """What the keys ``rms``, ``sd`` and ``max`` of a :class:`Spread` mean, for texts of keys."""

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.errors import ShapeError
+from teleop_core.base.errors import ShapeError
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.motion_measures import (
     IDLE_SPEED,
@@ -25,7 +25,7 @@ from teleop_core.evaluation.motion_measures import (
     velocity_spectrum,
 )
 from teleop_core.evaluation.motion_samples import MotionSamples, TremorWindows
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 Mask = NDArray[np.bool_]
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 RATE = 30.0
 """Rate of the samples that figures are taken from [Hz]."""

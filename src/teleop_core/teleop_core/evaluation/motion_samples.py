@@ -13,7 +13,7 @@ from teleop_core.evaluation.motion_measures import (
     resampled,
     tremor_power,
 )
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 REST = 1e-3
 """Extent of the motion in a second that is rest [m]."""

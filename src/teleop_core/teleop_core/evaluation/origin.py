@@ -5,20 +5,20 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from teleop_core import plain_yaml
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import TeleopError
-from teleop_core.geometry import Array
-from teleop_core.graph import Graph, build_graph
-from teleop_core.mapping.motion_scaling import MOTION_SCALING
-from teleop_core.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
-from teleop_core.master.operator import OPERATOR
-from teleop_core.parameters import build
-from teleop_core.session.layers import SESSION, Layer, SessionParameters, parse_layer
+from teleop_core.base import plain_yaml
+from teleop_core.base.errors import TeleopError
+from teleop_core.base.parameters import build
+from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
+from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
+from teleop_core.chain.master.operator import OPERATOR
+from teleop_core.graph.graph import Graph, build_graph
+from teleop_core.graph.layers import SESSION, Layer, SessionParameters, parse_layer
+from teleop_core.graph.stage import STAGES
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave import SLAVE
 from teleop_core.slave.slave_sim import SLAVE_SIM
-from teleop_core.stage import STAGES
-from teleop_core.topics import Topic
 
 _GRAPH = ("arms", "stages", "delays")
 _TOOL = ("axes", "tool_axes", "tool_roll", "rotation_gain")

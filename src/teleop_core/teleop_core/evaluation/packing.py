@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.evaluation.figure import Numbers
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 FINEST_BITS = 8.0
 """Bits per number that are never exceeded: the finest steps that anybody could want to see."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.controllers.source_pid import SOURCE_PID
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.windows import Window
-from teleop_core.topics import SLAVE_MEASURED_CP
+from teleop_core.graph.topics import SLAVE_MEASURED_CP
+from teleop_core.slave.controllers.source_pid import SOURCE_PID
 
 SOURCE = "Vongbunyong 2008, Table 8.2"
 POSITION_SHARE, ANGLE_FACTOR = 0.15, 1.6

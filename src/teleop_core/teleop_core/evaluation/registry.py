@@ -7,10 +7,10 @@ through ``METRICS.add("jerk", JerkMetric)``. Every metric of the registry is in 
 import inspect
 from collections.abc import Callable, Iterable
 
-from teleop_core.errors import PartError
+from teleop_core.base.errors import PartError
+from teleop_core.base.registry import Registry
 from teleop_core.evaluation.metric import Key, Metric
-from teleop_core.registry import Registry
-from teleop_core.topics import Kind, Topic
+from teleop_core.graph.topics import Kind, Topic
 
 SESSION = "session"
 """Name in JSON that no metric may have."""

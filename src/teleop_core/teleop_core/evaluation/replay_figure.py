@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.bodies import Bodies, Role, bodies_of
-from teleop_core.bodies.meshes import merged, mesh_of
 from teleop_core.evaluation.figure import FIXTURE, MEASURED, SURROUNDING, Figure, Numbers, along
 from teleop_core.evaluation.outlines import Outline, largest
 from teleop_core.evaluation.packing import Packed, pack_to
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.bodies import Bodies, Role, bodies_of
+from teleop_core.robots.bodies.meshes import merged, mesh_of
 from teleop_core.robots.robot import Robot
 
 ROLES: tuple[Role, ...] = ("base", "link", "joint", "leg", "platform", "tool")

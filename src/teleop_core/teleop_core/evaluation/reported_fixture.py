@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.errors import TeleopError
-from teleop_core.fixtures import FIXTURES, Fixture, shape_of
-from teleop_core.fixtures.box import BOX, BoxParameters
-from teleop_core.geometry import Array
+from teleop_core.base.errors import TeleopError
+from teleop_core.base.parameters import build
+from teleop_core.chain.fixtures import FIXTURES, Fixture, shape_of
+from teleop_core.chain.fixtures.box import BOX, BoxParameters
 from teleop_core.kernels import kernel, raise_pending
-from teleop_core.parameters import build
+from teleop_core.kernels.geometry import Array
 
 KIND = "fixture"
 """Name of the kind in reports; its parameters follow as ``fixture.<parameter>``."""

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NoReturn, TypeVar, cast
 
-from teleop_core.errors import EvaluationError, UnknownNameError
+from teleop_core.base.errors import EvaluationError, UnknownNameError
 from teleop_core.evaluation.accumulators import Delay, Spread
 from teleop_core.evaluation.metric import Key
 from teleop_core.evaluation.metrics.counts import Counts, Samples, Ticks, TopicScore

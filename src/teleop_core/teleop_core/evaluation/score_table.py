@@ -7,10 +7,10 @@ from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
+from teleop_core.base.texts import printable
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE, published_for
 from teleop_core.evaluation.rows import MISSING, Row, is_compared, side_by_side
 from teleop_core.evaluation.score import Score, Session
-from teleop_core.texts import printable
 
 MET, NOT_MET = "✓", "✗"
 COLUMN_WIDTH = 18

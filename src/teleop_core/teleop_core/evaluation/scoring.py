@@ -10,7 +10,7 @@ import numpy as np
 
 from teleop_core.bags.arms import arm_names, of_arm
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import EvaluationError, PartError, RecordingError
+from teleop_core.base.errors import EvaluationError, PartError, RecordingError
 from teleop_core.evaluation.bands import Band, bands_of
 from teleop_core.evaluation.context import Accumulator, Context
 from teleop_core.evaluation.figure import Figure
@@ -33,7 +33,7 @@ from teleop_core.evaluation.windows import (
     whole,
     windows,
 )
-from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, Topic
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
 """Topics without which there is no score; what needs others is None without them."""

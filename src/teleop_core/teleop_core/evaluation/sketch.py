@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from teleop_core.bags.arms import topic_prefix
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation.figure import MEASURED, REFERENCE
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 if TYPE_CHECKING:
-    from teleop_core.recording import Recording
+    from teleop_core.session.recording import Recording
 
 _WIDTH, _HEIGHT, _MARGIN, _POINTS = 260, 200, 26, 600
 _PANELS = (("x", "y"), ("x", "z"), ("y", "z"))

@@ -5,7 +5,7 @@ import numpy as np
 from teleop_core.evaluation.accumulators import Distribution
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.windows import Window
-from teleop_core.topics import NO_COMMAND_NS, Topic
+from teleop_core.graph.topics import NO_COMMAND_NS, Topic
 
 
 class StampTally:

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.messages import Report
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import EvaluationError
+from teleop_core.base.errors import EvaluationError
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.pairing import NONE, latest
 from teleop_core.evaluation.reported_fixture import ReportedFixture, reported_fixture
-from teleop_core.geometry import Array
-from teleop_core.signals import STATE, STATE_FIELDS
-from teleop_core.topics import TELEOP_STATE
+from teleop_core.graph.signals import STATE, STATE_FIELDS
+from teleop_core.graph.topics import TELEOP_STATE
+from teleop_core.kernels.geometry import Array
 
 _CENTER = slice(STATE["fixture_center_x"], STATE["fixture_center_x"] + 3)
 # Fields that recordings of earlier versions lack.
@@ -28,7 +28,7 @@ class StateHistory:
 
     Attributes:
         stamp_ns: Time from which a row holds, shape (N,), [ns].
-        rows: Columns as in :data:`~teleop_core.signals.STATE_FIELDS`, shape (N, 13).
+        rows: Columns as in :data:`~teleop_core.graph.signals.STATE_FIELDS`, shape (N, 13).
         fixture: Which of ``fixtures`` each row tells, shape (N,).
         fixtures: All that were told, each once; on or off.
     """

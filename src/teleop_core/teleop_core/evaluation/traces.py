@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.evaluation.accumulators import Integers
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 SAMPLES = 660_000
 """Samples that are kept of a stream as they are: eleven minutes at 1 kHz."""

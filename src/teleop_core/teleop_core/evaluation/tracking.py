@@ -11,14 +11,14 @@ from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.pairing import NONE, latest, same_tick
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
-from teleop_core.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
-from teleop_core.topics import (
+from teleop_core.graph.topics import (
     NO_COMMAND_NS,
     SLAVE_MEASURED_CP,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
     Topic,
 )
+from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 
 DEGENERATE_DEG = 1.0
 """Roll and yaw are not defined where pitch is nearer to ±90° than this, [deg]."""

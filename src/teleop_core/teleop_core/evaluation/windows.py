@@ -16,9 +16,9 @@ import numpy as np
 
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.series import empty, in_order
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.evaluation.state_history import NO_HISTORY, StateHistory, States
-from teleop_core.topics import Topic
+from teleop_core.graph.topics import Topic
 
 CONTEXT_NS = 1_000_000_000
 WINDOW_NS = 4_000_000_000

@@ -6,7 +6,7 @@ from typing import Any
 import plotly.graph_objects as plots
 from plotly.subplots import make_subplots
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
 # More points than this make the page slow and the picture no clearer.

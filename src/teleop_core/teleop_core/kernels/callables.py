@@ -16,7 +16,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from teleop_core.errors import KernelError
+from teleop_core.base.errors import KernelError
 from teleop_core.kernels.mistakes import place_of
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any
 
 from numba import types
 
-from teleop_core.errors import KernelError
+from teleop_core.base.errors import KernelError
 
 _PACKAGE = Path(__file__).parents[1]
 _LONGEST = 300  # characters of a reason: two lines of a terminal or three

@@ -3,10 +3,10 @@
 import time
 from typing import Any
 
+from teleop_core.graph.signals import DT
+from teleop_core.graph.topics import Topic
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.streams import Waiter
-from teleop_core.signals import DT
-from teleop_core.topics import Topic
 
 
 class AnsweringNode(CoreNode):

@@ -16,7 +16,12 @@ from rclpy.task import Future
 
 from teleop_core.bags.messages import BUTTONS
 from teleop_core.bags.reports import read_reports
-from teleop_core.errors import ParameterError, SessionError, TeleopError
+from teleop_core.base.errors import ParameterError, SessionError, TeleopError
+from teleop_core.base.parameters import build, parameter, specs, values_of
+from teleop_core.graph.layers import RealTimeParameters
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.stage import Runner, Stage, joints_of
+from teleop_core.graph.topics import Kind, Topic
 from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.loop import Loop
@@ -27,12 +32,7 @@ from teleop_core.nodes.rate import Recent, Schedule, TickCounts
 from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Input, Unattended, message_type
-from teleop_core.parameters import build, parameter, specs, values_of
-from teleop_core.session.layers import RealTimeParameters
 from teleop_core.session.runner import report_of
-from teleop_core.signals import TICK_NS
-from teleop_core.stage import Runner, Stage, joints_of
-from teleop_core.topics import Kind, Topic
 
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE,

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import IO, Any, cast
 
-from teleop_core.errors import SessionError
+from teleop_core.base.errors import SessionError
 from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.parent import VARIABLE

@@ -21,18 +21,10 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import Layout, layout, read_any, read_numbers, read_reports
+from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.console.link import Arm, ArmView, ParameterInfo, Parameters, Setting, View
-from teleop_core.errors import ParameterError, SessionError
-from teleop_core.geometry import Array
-from teleop_core.graph import RECORDER_NAME
-from teleop_core.nodes.display import SEEN, displayed
-from teleop_core.nodes.observer import WARNING, Status
-from teleop_core.nodes.operation import StopButton
-from teleop_core.nodes.parameter_client import ParameterClient, ParameterEvents, call
-from teleop_core.nodes.streams import Subscription, message_type
-from teleop_core.operation import operation_text
-from teleop_core.robots import load_robot_set
-from teleop_core.topics import (
+from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.topics import (
     DIAGNOSTICS,
     OPERATION,
     OPERATOR_BUTTONS,
@@ -41,6 +33,14 @@ from teleop_core.topics import (
     TELEOP_STATE,
     Topic,
 )
+from teleop_core.kernels.geometry import Array
+from teleop_core.nodes.display import SEEN, displayed
+from teleop_core.nodes.observer import WARNING, Status
+from teleop_core.nodes.operation import StopButton
+from teleop_core.nodes.parameter_client import ParameterClient, ParameterEvents, call
+from teleop_core.nodes.streams import Subscription, message_type
+from teleop_core.robots import load_robot_set
+from teleop_core.slave.operation import operation_text
 
 PATIENCE = 5.0
 """Time in which an arm must be found, and answer [s]."""

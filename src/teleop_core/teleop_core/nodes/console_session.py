@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from teleop_core.errors import SessionError, TeleopError
+from teleop_core.base.errors import SessionError, TeleopError
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.console_link import LiveLink
 from teleop_core.nodes.interrupt import Interrupt

@@ -2,8 +2,8 @@
 
 ``operating_state`` (crtk_msgs/OperatingState) is sent where it changes and five times a second;
 ``state_command`` (crtk_msgs/StringStamped) takes the commands of
-:mod:`teleop_core.operation.states`. Both need the package crtk_msgs; where it is not installed,
-an arm has its services and reports alone.
+:mod:`teleop_core.slave.operation.states`. Both need the package crtk_msgs; where it is not
+installed, an arm has its services and reports alone.
 """
 
 import time
@@ -14,9 +14,9 @@ from typing import Any
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from teleop_core.bags.messages import SECOND_NS
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
 from teleop_core.nodes.streams import message_type
-from teleop_core.operation.states import COMMANDS, Answer
+from teleop_core.slave.operation.states import COMMANDS, Answer
 
 OPERATING_STATE = "crtk_msgs/msg/OperatingState"
 STATE_COMMAND = "crtk_msgs/msg/StringStamped"

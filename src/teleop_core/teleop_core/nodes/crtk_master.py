@@ -3,7 +3,14 @@
 from typing import Any
 
 from teleop_core.nodes.crtk import Condition, OperatingState, is_installed
-from teleop_core.operation.states import TABLE, Answer, Event, State, answer_text, command_event
+from teleop_core.slave.operation.states import (
+    TABLE,
+    Answer,
+    Event,
+    State,
+    answer_text,
+    command_event,
+)
 
 
 class CrtkMaster:

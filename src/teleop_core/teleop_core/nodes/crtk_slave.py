@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.messages import Refusal, layout, read_joints
-from teleop_core.errors import TeleopError
-from teleop_core.geometry import Array, pose_from_transform, transform_from_pose
+from teleop_core.base.errors import TeleopError
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, Kind, Topic
+from teleop_core.kernels.geometry import Array, pose_from_transform, transform_from_pose
 from teleop_core.nodes.crtk import (
     Condition,
     OperatingState,
@@ -23,9 +24,8 @@ from teleop_core.nodes.crtk import (
     streamed,
 )
 from teleop_core.nodes.streams import message_type, profile
-from teleop_core.operation.states import Answer, State
 from teleop_core.slave.motion import Told
-from teleop_core.topics import SLAVE_MEASURED_CP, Kind, Topic
+from teleop_core.slave.operation.states import Answer, State
 
 _FRAME = SLAVE_MEASURED_CP.frame_id
 MEASURED_CV = Topic("slave/measured_cv", Kind.TWIST, frame_id=_FRAME)

@@ -8,7 +8,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from teleop_core.parameters import Spec, Value
+from teleop_core.base.parameters import Spec, Value
 
 _SCALARS = {
     bool: Parameter.Type.BOOL,

@@ -5,11 +5,11 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
-from teleop_core.devices import Device
-from teleop_core.devices.pilot import Pilot, PilotParameters
-from teleop_core.errors import SessionError, TeleopError
+from teleop_core.base.errors import SessionError, TeleopError
+from teleop_core.chain.devices import Device
+from teleop_core.chain.devices.pilot import Pilot, PilotParameters
+from teleop_core.chain.operators.remote import RemoteHand
 from teleop_core.nodes.loop import Loop
-from teleop_core.operators.remote import RemoteHand
 
 PERIOD = 0.01
 """Time from one look at the device to the next [s]."""

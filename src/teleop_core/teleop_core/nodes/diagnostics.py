@@ -9,11 +9,11 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from teleop_core.bags.messages import Refusal
+from teleop_core.graph.topics import DIAGNOSTICS
 from teleop_core.nodes.quality import NO_OVERRIDES, profile
 from teleop_core.nodes.rate import Recent, TickCounts
 from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Input
-from teleop_core.topics import DIAGNOSTICS
 
 _STEP_NS = 50_000_000
 """A clock that moves by more against the monotonic one within a second was stepped [ns]."""

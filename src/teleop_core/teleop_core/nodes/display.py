@@ -6,9 +6,7 @@ recorder has all of them already, and says again what people can see.
 
 from dataclasses import replace
 
-from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.newest import Cadence, Newest
-from teleop_core.topics import (
+from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
@@ -17,6 +15,8 @@ from teleop_core.topics import (
     SLAVE_SETPOINT_JS,
     Topic,
 )
+from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.newest import Cadence, Newest
 
 SEEN = (
     MASTER_MEASURED_CP, MASTER_MEASURED_CF, SLAVE_SERVO_CP, SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS,

@@ -10,10 +10,10 @@ from typing import IO, Any
 
 import yaml
 
-from teleop_core.errors import TeleopError
-from teleop_core.graph import Graph, build_graph
-from teleop_core.parameters import build
-from teleop_core.session.layers import SESSION, SessionParameters
+from teleop_core.base.errors import TeleopError
+from teleop_core.base.parameters import build
+from teleop_core.graph.graph import Graph, build_graph
+from teleop_core.graph.layers import SESSION, SessionParameters
 
 _FLAG = "--params-file"
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from teleop_core.chain.operators.remote import BUTTONS, RemoteHand
+from teleop_core.graph.topics import OPERATOR_BUTTONS, OPERATOR_SERVO_CP, Topic
 from teleop_core.nodes.streams import Input
-from teleop_core.operators.remote import BUTTONS, RemoteHand
-from teleop_core.topics import OPERATOR_BUTTONS, OPERATOR_SERVO_CP, Topic
 
 _SELDOM = 4
 """Buttons are looked at in every so many ticks."""

@@ -1,10 +1,10 @@
 """Node ``haptic_master``: the simulated haptic device, and the hand that holds it."""
 
-from teleop_core.master.haptic_master import HapticMasterParameters
+from teleop_core.chain.master.haptic_master import HapticMasterParameters
+from teleop_core.graph.topics import HAND_SERVO_CP, MASTER_CONTACT, MASTER_SERVO_CF, Topic
 from teleop_core.nodes.crtk_master import CrtkMaster
 from teleop_core.nodes.operation import StopInput
 from teleop_core.nodes.ticking import TickingNode
-from teleop_core.topics import HAND_SERVO_CP, MASTER_CONTACT, MASTER_SERVO_CF, Topic
 
 _MOST = MASTER_CONTACT.columns.index("largest_force")
 

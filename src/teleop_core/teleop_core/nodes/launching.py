@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from teleop_core.errors import ParameterError
-from teleop_core.graph import RECORDER_NAME
+from teleop_core.base.errors import ParameterError
+from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.nodes.files import temporary_file
 from teleop_core.nodes.live import parameter_file
 from teleop_core.nodes.start import SESSION as SESSION_NODE

@@ -10,8 +10,11 @@ from typing import IO, Any
 import yaml
 from rich.console import Console
 
-from teleop_core.errors import RecordingError, SessionError
-from teleop_core.graph import HAND, RECORDER_NAME, Graph
+from teleop_core.base.errors import RecordingError, SessionError
+from teleop_core.base.texts import printable
+from teleop_core.graph.graph import HAND, RECORDER_NAME, Graph
+from teleop_core.graph.layers import SESSION
+from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.keys import Keys
@@ -21,11 +24,8 @@ from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.layers import SESSION
 from teleop_core.session.links import link_texts
 from teleop_core.session.notes import notes_of
-from teleop_core.texts import printable
-from teleop_core.topics import SLAVE_SETPOINT_JS
 
 START_TIMEOUT = 180.0
 """A node that is not at work, and gets no further, for this long never will be [s]."""

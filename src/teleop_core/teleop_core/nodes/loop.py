@@ -5,7 +5,7 @@ import threading
 import traceback
 from collections.abc import Callable
 
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
 
 _END_PATIENCE = 8.0  # the last turn may compile a kernel, or wait for a slow disk
 

@@ -3,8 +3,8 @@
 from importlib import import_module
 from typing import Any
 
+from teleop_core.graph.stage import Stage
 from teleop_core.nodes.base import CoreNode
-from teleop_core.stage import Stage
 
 
 def node_class(stage: Stage) -> Any:

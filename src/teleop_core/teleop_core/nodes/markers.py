@@ -7,11 +7,7 @@ import numpy as np
 
 from teleop_core.bags.markers import MARKERS, Marker, marker_message
 from teleop_core.bags.messages import read_reports
-from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.model import absolute
-from teleop_core.nodes.newest import Cadence, Newest
-from teleop_core.session.markers import ArmMarkers
-from teleop_core.topics import (
+from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
     SLAVE_MEASURED_CP,
@@ -19,6 +15,10 @@ from teleop_core.topics import (
     TELEOP_STATE,
     Topic,
 )
+from teleop_core.nodes.base import CoreNode
+from teleop_core.nodes.model import absolute
+from teleop_core.nodes.newest import Cadence, Newest
+from teleop_core.session.markers import ArmMarkers
 
 PERIOD_NS = 50_000_000
 """Time from one message to the next [ns]."""

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from teleop_core.bags.transforms import TF
+from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_JS, Topic
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.newest import Newest
 from teleop_core.session.model import ArmModel, Model
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_JS, Topic
 
 _NOWHERE = np.zeros(7)
 

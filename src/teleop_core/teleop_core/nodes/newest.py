@@ -4,8 +4,8 @@ import time
 
 from teleop_core.bags.layouts import layout
 from teleop_core.bags.messages import Refusal, read_any
-from teleop_core.geometry import Array
-from teleop_core.topics import Topic
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
 
 Arrival = tuple[int, Topic, bytes, int]
 """Time of arrival [ns], topic, bytes, time of sending [ns]."""

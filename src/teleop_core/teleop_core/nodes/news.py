@@ -5,8 +5,8 @@ from typing import Any
 
 from rclpy.node import Node
 
+from teleop_core.graph.stage import Stage
 from teleop_core.nodes.streams import Input
-from teleop_core.stage import Stage
 
 _COMMANDS = ("servo_", "move_", "interpolate_")
 

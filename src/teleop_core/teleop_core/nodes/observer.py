@@ -8,9 +8,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from teleop_core.bags.messages import read_reports
+from teleop_core.graph.topics import DIAGNOSTICS
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription, Waiter
-from teleop_core.topics import DIAGNOSTICS
 
 WARNING = 1
 

@@ -9,8 +9,8 @@ from std_srvs.srv import Trigger
 
 from teleop_core.nodes.streams import Unattended
 from teleop_core.nodes.taking import Taker
-from teleop_core.operation.presses import Presses
-from teleop_core.operation.states import COMMANDS, Answer
+from teleop_core.slave.operation.presses import Presses
+from teleop_core.slave.operation.states import COMMANDS, Answer
 
 STOP_TOPIC = "/teleop/stop"
 """Emergency stop of all arms, std_msgs/Bool: true stops; false says that it is alive."""
@@ -67,8 +67,8 @@ class StopInput:
 
     The first reader is looked at in every tick, the two others in every fourth. No press is lost:
     readers keep all messages, a missing message counts as a press
-    (:class:`~teleop_core.operation.presses.Presses`), and a :class:`StopButton` that was pressed
-    before it was found tells so.
+    (:class:`~teleop_core.slave.operation.presses.Presses`), and a :class:`StopButton` that was
+    pressed before it was found tells so.
 
     Args:
         node: Node that owns it.

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from teleop_core.errors import PartError
+from teleop_core.base.errors import PartError
+from teleop_core.chain.operators import OPERATORS
+from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.graph.topics import MASTER_MEASURED_CF, Topic
 from teleop_core.nodes.device_hand import DeviceHand
 from teleop_core.nodes.hand import HandInput
 from teleop_core.nodes.ticking import TickingNode
-from teleop_core.operators import OPERATORS
-from teleop_core.operators.parameters import OperatorParameters
-from teleop_core.topics import MASTER_MEASURED_CF, Topic
 
 _FULL = 3.3
 """Force that is told a person in full [N]; a rumble has no more."""

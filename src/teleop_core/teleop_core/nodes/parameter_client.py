@@ -11,8 +11,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import qos_profile_parameter_events
 
+from teleop_core.base.errors import SessionError
 from teleop_core.console.link import ParameterInfo, Setting
-from teleop_core.errors import SessionError
 
 PATIENCE = 3.0
 """Time that a node has for an answer [s]."""

@@ -19,11 +19,11 @@ from rosgraph_msgs.msg import Clock
 
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
-from teleop_core.errors import ParameterError, RecordingError
+from teleop_core.base.errors import ParameterError, RecordingError
+from teleop_core.graph.topics import BY_NAME, Quality
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import message_type
-from teleop_core.topics import BY_NAME, Quality
 
 CLOCK = "clock"
 _KNOWN = BY_NAME | {topic.name: topic for topic in (TF, ROBOT_DESCRIPTION)}

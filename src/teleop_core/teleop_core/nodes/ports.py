@@ -9,14 +9,14 @@ from rclpy.publisher import Publisher
 
 from teleop_core.bags.layouts import layout
 from teleop_core.bags.messages import BUTTONS
-from teleop_core.geometry import Array
-from teleop_core.graph import BUILT_IN
+from teleop_core.base.parameters import NoParameters
+from teleop_core.graph.graph import BUILT_IN
+from teleop_core.graph.signals import make_signals
+from teleop_core.graph.stage import Stage
+from teleop_core.graph.topics import Kind, Topic
 from teleop_core.kernels import bare
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.streams import Input, Output
-from teleop_core.parameters import NoParameters
-from teleop_core.signals import make_signals
-from teleop_core.stage import Stage
-from teleop_core.topics import Kind, Topic
 
 Feeds = Callable[[str], list[tuple[str, float]]]
 """Port to the topics that feed it, each with its delay [s]."""

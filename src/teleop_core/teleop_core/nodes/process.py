@@ -14,7 +14,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
 from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.discovery import beyond_this_machine, choose_transport
 from teleop_core.nodes.files import checked_arguments

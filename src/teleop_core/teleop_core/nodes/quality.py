@@ -10,8 +10,8 @@ from typing import Literal
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from teleop_core.errors import ParameterError
-from teleop_core.topics import Quality, Topic
+from teleop_core.base.errors import ParameterError
+from teleop_core.graph.topics import Quality, Topic
 
 PREFIX = "qos_overrides."
 Side = Literal["publisher", "subscription"]

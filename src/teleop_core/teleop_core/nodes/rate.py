@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.signals import TICK_NS
+from teleop_core.graph.signals import TICK_NS
 
 
 @dataclass

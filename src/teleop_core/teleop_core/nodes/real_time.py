@@ -6,7 +6,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
-from teleop_core.session.layers import RealTimeParameters
+from teleop_core.graph.layers import RealTimeParameters
 
 _EVERYTHING = 3  # MCL_CURRENT | MCL_FUTURE of mlockall(2)
 _LOWEST = 1

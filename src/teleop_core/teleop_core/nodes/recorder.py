@@ -13,8 +13,12 @@ from teleop_core.bags.arms import NAMESPACE_KEY
 from teleop_core.bags.recording import MARKS, RECORDER, RecordingParameters
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError, SessionError, TeleopError
-from teleop_core.graph import RECORDER_NAME, Graph
+from teleop_core.base.errors import RecordingError, SessionError, TeleopError
+from teleop_core.base.parameters import build, parameter, specs, values_of
+from teleop_core.graph.graph import RECORDER_NAME, Graph
+from teleop_core.graph.layers import SESSION, parse_text
+from teleop_core.graph.stage import Stage
+from teleop_core.graph.topics import DIAGNOSTICS, Quality, Topic
 from teleop_core.nodes.base import SUCCESS, CoreNode
 from teleop_core.nodes.display import LiveDisplay
 from teleop_core.nodes.files import graph_of, session_of
@@ -24,13 +28,9 @@ from teleop_core.nodes.newest import Arrival, Newest
 from teleop_core.nodes.recorder_services import serve
 from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Subscription
-from teleop_core.parameters import build, parameter, specs, values_of
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.layers import SESSION, parse_text
 from teleop_core.session.model import Model
 from teleop_core.session.runner import describe
-from teleop_core.stage import Stage
-from teleop_core.topics import DIAGNOSTICS, Quality, Topic
 
 DEPTH = 2000
 """Messages of one topic that wait while the disk or another process is slow: two seconds."""

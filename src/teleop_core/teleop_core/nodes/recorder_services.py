@@ -6,7 +6,7 @@ from typing import Protocol
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from teleop_core.errors import RecordingError, SessionError
+from teleop_core.base.errors import RecordingError, SessionError
 
 
 class Recorder(Protocol):

@@ -11,12 +11,12 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import read_reports
-from teleop_core.errors import SessionError
+from teleop_core.base.errors import SessionError
+from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription
-from teleop_core.operation import State, operation_text
-from teleop_core.operation.states import AT_REST_ONLY
-from teleop_core.topics import OPERATION, SLAVE_OPERATION
+from teleop_core.slave.operation import State, operation_text
+from teleop_core.slave.operation.states import AT_REST_ONLY
 
 _PERIOD = 0.01
 """A stop is said again this often until every arm has answered [s]."""
@@ -148,7 +148,7 @@ class RemoteControl:
         """Send a state command to an arm; whether it was taken, and the arm's answer.
 
         Args:
-            name: One of :data:`~teleop_core.operation.states.COMMANDS`.
+            name: One of :data:`~teleop_core.slave.operation.states.COMMANDS`.
             arm: Its namespace.
 
         Raises:

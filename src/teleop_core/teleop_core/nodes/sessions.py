@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from teleop_core.errors import SessionError
+from teleop_core.base.errors import SessionError
 
 
 def _folder() -> Path:

@@ -4,14 +4,14 @@ import time
 from collections.abc import Callable, Iterable
 
 from teleop_core.bags.messages import Refusal
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION, SLAVE_SERVO_JP
 from teleop_core.nodes.crtk_slave import CrtkSlave
 from teleop_core.nodes.operation import CommandServices, StopInput
 from teleop_core.nodes.ticking import TickingNode
-from teleop_core.operation import Fault, State, operation_text
-from teleop_core.signals import TICK_NS
 from teleop_core.slave.commands import CommandStatus
+from teleop_core.slave.operation import Fault, State, operation_text
 from teleop_core.slave.slave import SlaveParameters
-from teleop_core.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION, SLAVE_SERVO_JP
 
 _SERVO = SLAVE_SERVO_JP.name
 _SELDOM = 10

@@ -1,7 +1,7 @@
 """Node ``slave_sim``: the simulated arm, exactly one step per elapsed millisecond."""
 
+from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.nodes.ticking import TickingNode
-from teleop_core.topics import SLAVE_SETPOINT_JS
 
 
 class SlaveSimNode(TickingNode):

@@ -7,12 +7,12 @@
 import sys
 from pathlib import Path
 
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
+from teleop_core.base.own_parts import load_own_parts
+from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.making import make_node
 from teleop_core.nodes.naming import taken_names
 from teleop_core.nodes.process import run
-from teleop_core.own_parts import load_own_parts
-from teleop_core.stage import STAGES
 
 SESSION = "teleop_session"
 """Executable of a whole session in one process."""

@@ -31,11 +31,11 @@ from teleop_core.bags.messages import (
     read_reports,
     report,
 )
-from teleop_core.geometry import Array
+from teleop_core.graph.topics import NO_COMMAND_NS, Kind, Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
 from teleop_core.nodes.quality import profile as profile  # noqa: PLC0414  for importers of both
 from teleop_core.nodes.sender import Sender
-from teleop_core.topics import NO_COMMAND_NS, Kind, Topic
 
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""

@@ -12,7 +12,8 @@ import time
 
 from rclpy.parameter import Parameter
 
-from teleop_core.graph import RECORDER_NAME, Graph, Member
+from teleop_core.graph.graph import RECORDER_NAME, Graph, Member
+from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.loop import Loop
@@ -21,7 +22,6 @@ from teleop_core.nodes.rate import Schedule
 from teleop_core.nodes.recorder import RecorderNode
 from teleop_core.nodes.streams import Output
 from teleop_core.session.links import link_texts
-from teleop_core.stage import STAGES
 
 
 class TeleopSession:

@@ -22,7 +22,7 @@ entry-point group ``teleop_core.robots`` of an installed package, gives a robot 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.robots.kinematics import (
     FkBatch,
     FkOne,

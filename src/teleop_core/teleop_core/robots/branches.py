@@ -2,8 +2,8 @@
 
 import math
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
 
 # Rounding that a joint on its limit may show [rad or m].
 _SLACK = 1e-12

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import dh_kernels
 from teleop_core.robots.dh import robot_from_table
 from teleop_core.robots.link_errors import Chain, LinkErrors

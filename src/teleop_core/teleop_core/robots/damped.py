@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 
 # Squared weighted error that counts as zero: 1e-12 m at a length of 0.1 m, 1e-11 rad.
 ZERO = 1e-22

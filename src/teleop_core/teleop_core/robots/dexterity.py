@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.kinematics import FkStatus
 from teleop_core.robots.robot import Robot
 

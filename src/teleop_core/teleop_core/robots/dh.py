@@ -42,9 +42,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from teleop_core import plain_yaml
-from teleop_core.damage import damage_told
-from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.base import plain_yaml
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.robots.dh_chain import (
     CONVENTIONS,
     DhJoint,

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.errors import ShapeError
-from teleop_core.geometry import Array, checked_array, rotation, transform
-from teleop_core.portable import product
+from teleop_core.base.errors import ShapeError
+from teleop_core.kernels.geometry import Array, checked_array, rotation, transform
+from teleop_core.kernels.portable import product
 from teleop_core.robots import dh_kernels
 from teleop_core.robots.dh_drives import drives_of
 from teleop_core.robots.kinematics import DIRECTIONS, Kernels

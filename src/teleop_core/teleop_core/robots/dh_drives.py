@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.robots.drives import ENTRIES, MAY_BE_ZERO, Drives
 
 # All assumed, [rad, N·m, s] of turning joints, [m, N, s] of sliding ones.

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.damped import ZERO, damped_move, factorise, free_joints, gram, pose_error
 from teleop_core.robots.kinematics import REACHED, IkStatus, is_askable, pose_residual
 

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from teleop_core.errors import ClosureError, ParameterError, ShapeError
-from teleop_core.geometry import Array, checked_array, is_rigid
+from teleop_core.base.errors import ClosureError, ParameterError, ShapeError
 from teleop_core.kernels import raise_pending
+from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.robots import kinematics
 from teleop_core.robots.kinematics import (
     MAX_ASSEMBLIES,

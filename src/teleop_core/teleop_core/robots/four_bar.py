@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import bounded, turned, wrapped
 from teleop_core.robots.drives import geared_motors
 from teleop_core.robots.four_bar_loop import Assembly, Closure, FourBar

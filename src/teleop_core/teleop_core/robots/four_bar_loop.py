@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
-from teleop_core.portable import arctangent
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import arctangent
 
 _ROUNDING = 1e-12
 

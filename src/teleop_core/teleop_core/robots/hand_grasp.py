@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, ShapeError
-from teleop_core.geometry import Array, checked_array, is_rigid
+from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.robots.hand_fingers import (
     Triple,
     finger_branch,

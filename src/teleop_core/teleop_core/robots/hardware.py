@@ -6,9 +6,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.geometry import Array
-from teleop_core.parameters import MARKS
+from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.base.parameters import MARKS
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.drives import read_only
 from teleop_core.robots.link_errors import LinkErrors
 
@@ -33,7 +33,7 @@ class Hardware:
         dynamics: Parameter row of the true dynamics; empty when they are as the control law knows.
         motors: Inertias of the motors through their gears (n,) [kg·m² or kg]; empty: not known.
         sources: Each name above to how its numbers are known, as of
-            :func:`teleop_core.parameters.parameter`.
+            :func:`teleop_core.base.parameters.parameter`.
 
     Raises:
         ShapeError: An array has another shape than ``coulomb`` asks for.

@@ -10,8 +10,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from teleop_core.geometry import Array, is_rigid, rotation_angle_between
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array, is_rigid, rotation_angle_between
 
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
 # Signatures that let one compiled graph run any robot: see Kernels for the arguments.

@@ -27,9 +27,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.geometry import Array, rotation, transform
-from teleop_core.portable import inverse_motion, product
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kernels.portable import inverse_motion, product
 from teleop_core.robots.drives import read_only
 
 if TYPE_CHECKING:

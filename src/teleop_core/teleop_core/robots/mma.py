@@ -20,9 +20,9 @@ import math
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.geometry import Array
-from teleop_core.portable import product
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import product
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import Kernels
 from teleop_core.robots.mma_balance import ShoulderSpring, shoulder_load

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array
 
 STANDARD_GRAVITY = 9.8  # [m/s²], as the source takes it
 # Table 5.1 [kg]; the printed total, 310.36 g, is not the sum of its rows.

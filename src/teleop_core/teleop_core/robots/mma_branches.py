@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.mma_forward import groups
 
 BRANCHES = 8

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import bounded
 from teleop_core.robots.damped import (
     ZERO,

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 
 SPATIAL, PLANAR = 6, 3
 

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from teleop_core.parameters import parameter
+from teleop_core.base.parameters import parameter
+from teleop_core.robots import load_robot_set
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,3 +14,12 @@ class RobotParameters:
     geometry: tuple[str, ...] = parameter(
         (), fixed=True, doc="symbol=value in place of the robot's lengths and options [m, rad]"
     )
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of its joints.
+
+        Raises:
+            TeleopError: There is no such robot, or it has no such lengths.
+        """
+        return load_robot_set(self.robot, self.geometry).joint_names

@@ -7,8 +7,8 @@ from typing import Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.registry import Registry
+from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
+from teleop_core.base.registry import Registry
 from teleop_core.robots.robot import Robot
 
 _BUILT_IN = (

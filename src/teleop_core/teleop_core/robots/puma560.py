@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import (
     BESIDE,
     bounded,

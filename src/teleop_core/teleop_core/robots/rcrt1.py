@@ -12,9 +12,9 @@ import math
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import rcrt1_dynamics, rcrt1_hardware
 from teleop_core.robots.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped
 from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual

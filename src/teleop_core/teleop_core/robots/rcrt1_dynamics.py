@@ -20,8 +20,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.drives import Drives, Dynamics
 from teleop_core.robots.inertias import LinkInertia
 

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 
 
 @kernel

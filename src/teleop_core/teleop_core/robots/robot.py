@@ -9,9 +9,9 @@ from typing import cast, overload
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, ShapeError, UnknownNameError
-from teleop_core.geometry import Array, checked_array, is_rigid
+from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels import pointer, raise_pending
+from teleop_core.kernels.geometry import Array, checked_array, is_rigid
 from teleop_core.robots import forward_kinematics, kinematics
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.hardware import Hardware

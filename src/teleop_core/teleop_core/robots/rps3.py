@@ -23,9 +23,9 @@ import math
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.drives import electric_cylinders
 from teleop_core.robots.kinematics import (

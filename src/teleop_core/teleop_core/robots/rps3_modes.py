@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from teleop_core.errors import ParameterError, ShapeError
-from teleop_core.geometry import Array, checked_array
+from teleop_core.base.errors import ParameterError, ShapeError
+from teleop_core.kernels.geometry import Array, checked_array
 from teleop_core.robots.rps3_loop import frame, points, settle
 
 _CLOSED = 1e-10  # what is left of the loop equations in an assembly mode, over a²

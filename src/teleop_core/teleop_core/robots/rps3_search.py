@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from teleop_core.geometry import Array, rotation_angle_between
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array, rotation_angle_between
 from teleop_core.robots.kinematics import MAX_ASSEMBLIES, REACHED, SEARCH_ALL, FkStatus
 from teleop_core.robots.rps3_loop import COSINES, SINES, frame, loop, points, settle
 

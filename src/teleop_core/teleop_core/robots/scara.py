@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import hold, is_allowed, move_cost, turn, wrapped
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual

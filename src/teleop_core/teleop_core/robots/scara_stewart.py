@@ -19,9 +19,9 @@ import math
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import scara_stewart_drives
 from teleop_core.robots.branches import bounded, hold, is_allowed, move_cost, slowed, turned
 from teleop_core.robots.kinematics import (

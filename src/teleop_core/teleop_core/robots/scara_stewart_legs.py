@@ -16,8 +16,8 @@ import math
 
 import numpy as np
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.kinematics import AGREED, FkStatus
 from teleop_core.robots.stewart_legs import direct, leg_system
 from teleop_core.robots.stewart_search import close_legs, side_of

@@ -24,10 +24,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, ShapeError
-from teleop_core.geometry import Array, checked_array, is_rigid
+from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels import inner, kernel
-from teleop_core.portable import length
+from teleop_core.kernels.geometry import Array, checked_array, is_rigid
+from teleop_core.kernels.portable import length
 from teleop_core.robots.branches import slowed
 from teleop_core.robots.damped import is_near_singular
 from teleop_core.robots.drives import electric_cylinders

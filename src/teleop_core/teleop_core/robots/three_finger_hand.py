@@ -15,9 +15,9 @@ import math
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.drives import finger_motors
 from teleop_core.robots.hand_fingers import Triple, finger_branch, finger_joints
 from teleop_core.robots.hand_grasp import (

@@ -12,8 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from teleop_core.errors import PartError, TeleopError
-from teleop_core.graph import Graph, Link, Member
+from teleop_core.base.errors import PartError, TeleopError
+from teleop_core.graph.graph import Graph, Link, Member
+from teleop_core.graph.signals import add, copy, topic_fields
+from teleop_core.graph.stage import Runner
 from teleop_core.kernels import (
     bound,
     is_kernel,
@@ -22,8 +24,6 @@ from teleop_core.kernels import (
     record_dtype,
     records,
 )
-from teleop_core.signals import add, copy, topic_fields
-from teleop_core.stage import Runner
 
 __all__ = ["Tick", "block_dtype", "compose"]
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import yaml
 
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.graph import DEVICE, HAND, RECORDER_NAME, Graph, Member, build_graph
-from teleop_core.parameters import Value, build, specs, values_of
-from teleop_core.session.layers import (
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.parameters import Value, build, specs, values_of
+from teleop_core.graph.graph import DEVICE, HAND, RECORDER_NAME, Graph, Member, build_graph
+from teleop_core.graph.layers import (
     SESSION,
     Layer,
     SessionParameters,
@@ -20,7 +20,7 @@ from teleop_core.session.layers import (
     parse_setting,
     scenario_file,
 )
-from teleop_core.stage import STAGES
+from teleop_core.graph.stage import STAGES
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from teleop_core.operators import OPERATORS, Setting
-from teleop_core.operators.parameters import OperatorParameters
-from teleop_core.operators.shapes import PHASES
+from teleop_core.chain.operators import OPERATORS, Setting
+from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.graph.layers import SESSION, Layer, SessionParameters
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.layers import SESSION, Layer, SessionParameters
 
 
 def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configuration:

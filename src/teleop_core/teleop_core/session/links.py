@@ -1,6 +1,6 @@
 """Links as texts: how a graph tells a node in another process what feeds its ports."""
 
-from teleop_core.graph import Graph, Member
+from teleop_core.graph.graph import Graph, Member
 
 
 def link_texts(graph: Graph, member: Member) -> list[str]:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.bags.markers import Color, Marker, Shape
-from teleop_core.fixtures.sphere import SPHERE
-from teleop_core.geometry import Array
-from teleop_core.portable import length
+from teleop_core.chain.fixtures.sphere import SPHERE
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import length
 from teleop_core.session.model import MASTER, SLAVE
 
 TAIL = 200

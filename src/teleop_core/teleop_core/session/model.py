@@ -20,14 +20,14 @@ from teleop_core.bags.transforms import (
     text_message,
 )
 from teleop_core.bags.writer import BagWriter
-from teleop_core.bodies import bodies_of, urdf_of
-from teleop_core.geometry import Array, quaternion_from_rotation
-from teleop_core.graph import RECORDER_NAME
-from teleop_core.mapping.parameters import axis_map
+from teleop_core.chain.mapping.parameters import axis_map
+from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_JS, Topic
+from teleop_core.kernels.geometry import Array, quaternion_from_rotation
 from teleop_core.robots import load_robot_set
+from teleop_core.robots.bodies import bodies_of, urdf_of
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_JS, Topic
 
 SLAVE, MASTER = "slave_", "master_"
 """What stands before the names of frames."""

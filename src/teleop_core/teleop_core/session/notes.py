@@ -1,13 +1,13 @@
 """Notes: what runs but may not be meant, of a configuration before its session begins."""
 
-from teleop_core.graph import BUILT_IN
-from teleop_core.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.mapping.walls import WALLS, passive_stiffness
-from teleop_core.master.device import DeviceParameters
-from teleop_core.master.haptic_master import HapticMasterParameters
+from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
+from teleop_core.chain.mapping.walls import WALLS, passive_stiffness
+from teleop_core.chain.master.device import DeviceParameters
+from teleop_core.chain.master.haptic_master import HapticMasterParameters
+from teleop_core.graph.graph import BUILT_IN
+from teleop_core.graph.signals import DT
+from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
 from teleop_core.session.configuration import Configuration
-from teleop_core.signals import DT
-from teleop_core.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
 
 _MASTER, _MAPPING = BUILT_IN[1:3]
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.series import Series
-from teleop_core.errors import RecordingError
-from teleop_core.signals import TICK_NS
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph.signals import TICK_NS
 
 LONGEST_GAP_NS = 60_000_000_000
 """Longest pause of a hand within one session [ns]; a stamp beyond it is a mistake of a clock, and

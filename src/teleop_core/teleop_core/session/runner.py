@@ -11,18 +11,18 @@ from teleop_core.bags.arms import ARMS_KEY
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.errors import RecordingError
-from teleop_core.geometry import Array
-from teleop_core.graph import DEVICE, RECORDER_NAME, Member
-from teleop_core.operation import operation_level, operation_text
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph.graph import DEVICE, RECORDER_NAME, Member
+from teleop_core.graph.layers import SESSION, Layer, parse_text
+from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
+from teleop_core.graph.topics import OPERATION, TELEOP_STATE, Kind, Topic, limit_text
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.layers import SESSION, Layer, parse_text
 from teleop_core.session.model import Model, ModelRecords
 from teleop_core.session.replayed_span import in_order, replayed_span, tick_times
 from teleop_core.session.virtual import BLOCK, VirtualTime
-from teleop_core.signals import STATE_FIELDS, TICK_NS
-from teleop_core.topics import OPERATION, TELEOP_STATE, Kind, Topic, limit_text
+from teleop_core.slave.operation import operation_level, operation_text
 
 Progress = Callable[[int, int], None]
 
@@ -261,7 +261,7 @@ def report_of(
     """Message of a report's topic, as CDR bytes.
 
     Args:
-        topic: Such as :data:`~teleop_core.topics.TELEOP_STATE`.
+        topic: Such as :data:`~teleop_core.graph.topics.TELEOP_STATE`.
         stamp_ns: Stamp [ns].
         row: Its numbers (columns,).
         described: Further names and texts, such as what the fixture is.

@@ -5,15 +5,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.errors import PartError
-from teleop_core.graph import BUILT_IN
+from teleop_core.base.errors import PartError
+from teleop_core.chain.operators.parameters import insist_on_virtual
+from teleop_core.graph.graph import BUILT_IN
+from teleop_core.graph.signals import TICK_NS, assign
+from teleop_core.graph.stage import Runner, joints_of
+from teleop_core.graph.topics import Kind, Topic
 from teleop_core.kernels import records
-from teleop_core.operators.parameters import insist_on_virtual
 from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration
-from teleop_core.signals import TICK_NS, assign
-from teleop_core.stage import Runner, joints_of
-from teleop_core.topics import Kind, Topic
 
 BLOCK = 1000
 """Ticks that are made at once, at most."""
@@ -23,7 +23,7 @@ class VirtualTime:
     """A session in virtual time, to be run, or to be stepped by a program of yours.
 
     Between two ticks the program may read the row of the last one, lead the hand
-    (:class:`~teleop_core.operators.remote.RemoteHand`), and command or retune the stages.
+    (:class:`~teleop_core.chain.operators.remote.RemoteHand`), and command or retune the stages.
 
     Args:
         configuration: What runs.

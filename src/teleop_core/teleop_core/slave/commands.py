@@ -4,14 +4,14 @@ import math
 from enum import IntEnum
 from typing import Any
 
-from teleop_core.geometry import Array
+from teleop_core.graph.signals import copy
 from teleop_core.kernels import inner
-from teleop_core.mapping.filters import lag_step
-from teleop_core.operation.faults import Fault
-from teleop_core.operation.states import State
-from teleop_core.operation.watch import fail
-from teleop_core.signals import copy
+from teleop_core.kernels.filters import lag_step
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.interpolation import begin_way
+from teleop_core.slave.operation.faults import Fault
+from teleop_core.slave.operation.states import State
+from teleop_core.slave.operation.watch import fail
 
 
 class CommandStatus(IntEnum):

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.rigid_body import invert_positive, write_model
 from teleop_core.slave.friction import bend, friction
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.simulation import Arm
 
 _NO_LIMIT = 1e6  # times a drive's: what would be cut off counts as well

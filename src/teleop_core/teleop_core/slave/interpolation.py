@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
 
 WAY_FIELDS = ("begin", "slope", "bend", "end_slope")
 """Joints at the beginning of the way, their first and second slope there and their slope at its

@@ -13,13 +13,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from teleop_core.errors import ShapeError
-from teleop_core.geometry import Array
-from teleop_core.operation.states import Answer, Event, State
+from teleop_core.base.errors import ShapeError
+from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.robot import Robot
+from teleop_core.slave.operation.states import Answer, Event, State
 from teleop_core.slave.velocity import Motion
-from teleop_core.topics import NO_COMMAND_NS
 
 _REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 # Goals beyond a limit by rounding, as of a setpoint that is there [rad or m].
@@ -42,8 +42,8 @@ class Commanded(Protocol):
 class MotionCommands:
     """Takes motion commands for a slave, between two ticks.
 
-    Every command returns an :class:`~teleop_core.operation.Answer` and the same in words: what the
-    arm cannot do, or may not do in its state, is refused and changes nothing.
+    Every command returns an :class:`~teleop_core.slave.operation.Answer` and the same in words:
+    what the arm cannot do, or may not do in its state, is refused and changes nothing.
 
     Args:
         slave: The slave; its state is written.

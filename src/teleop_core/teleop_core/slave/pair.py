@@ -3,13 +3,13 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
+from teleop_core.graph.signals import DT, assign
+from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.kernels import kernel
-from teleop_core.signals import DT, assign
 from teleop_core.slave.simulation import simulation_step
 from teleop_core.slave.slave import SLAVE, Slave, SlaveParameters
 from teleop_core.slave.slave_sim import SLAVE_SIM, SlaveSim, SlaveSimParameters
 from teleop_core.slave.step import slave_step
-from teleop_core.stage import RunningStage, Stage
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,16 +3,16 @@
 import math
 from typing import Any, NamedTuple
 
-from teleop_core.geometry import Array, pose_from_transform
+from teleop_core.graph.signals import Field, copy
+from teleop_core.graph.topics import OPERATION
 from teleop_core.kernels import inner, kernel, records
-from teleop_core.plants import PER_JOINT
+from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots.rigid_body import write_model
-from teleop_core.signals import Field, copy
 from teleop_core.slave.elastic import integrate_elastic
 from teleop_core.slave.friction import wander
 from teleop_core.slave.joints import integrate
+from teleop_core.slave.plants import PER_JOINT
 from teleop_core.slave.transmission import LONGEST_DELAY, drive, follow_encoders
-from teleop_core.topics import OPERATION
 
 # A joint that is farther from its setpoint [rad or m] is no joint of a simulation in its senses.
 _ASTRAY = 10.0

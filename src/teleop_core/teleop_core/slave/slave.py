@@ -10,32 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array, pose_from_transform
-from teleop_core.kernels import kernel, pointer, records
-from teleop_core.operation import (
-    Answer,
-    Event,
-    Fault,
-    OperationParameters,
-    State,
-    command_event,
-)
-from teleop_core.operation.states import answer_text, change
-from teleop_core.operation.watch import fail
-from teleop_core.parameters import parameter
-from teleop_core.portable import length
-from teleop_core.robots import load_robot_set
-from teleop_core.robots.kinematics import FK
-from teleop_core.robots.parameters import RobotParameters
-from teleop_core.robots.robot import Robot
-from teleop_core.signals import DT, assign
-from teleop_core.slave.motion import MotionCommands
-from teleop_core.slave.simulation import SPEED_LAG
-from teleop_core.slave.step import ArmModel, slave_records, slave_step
-from teleop_core.slave.trajectory import shortest_move_time
-from teleop_core.stage import RunningStage, Stage
-from teleop_core.topics import (
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import parameter
+from teleop_core.graph.signals import DT, assign
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
     NO_COMMAND_NS,
     OPERATION,
     SLAVE_MEASURED_CP,
@@ -45,6 +24,27 @@ from teleop_core.topics import (
     SLAVE_SETPOINT_CP,
     SLAVE_SETPOINT_JS,
 )
+from teleop_core.kernels import kernel, pointer, records
+from teleop_core.kernels.geometry import Array, pose_from_transform
+from teleop_core.kernels.portable import length
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.kinematics import FK
+from teleop_core.robots.parameters import RobotParameters
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.motion import MotionCommands
+from teleop_core.slave.operation import (
+    Answer,
+    Event,
+    Fault,
+    OperationParameters,
+    State,
+    command_event,
+)
+from teleop_core.slave.operation.states import answer_text, change
+from teleop_core.slave.operation.watch import fail
+from teleop_core.slave.simulation import SPEED_LAG
+from teleop_core.slave.step import ArmModel, slave_records, slave_step
+from teleop_core.slave.trajectory import shortest_move_time
 
 _TIMES = {
     "heartbeat": "heartbeat_ns", "longest_outage": "outage_ns", "longest_silence": "silence_ns",
@@ -242,7 +242,7 @@ class Slave(RunningStage):
         """Take a command such as ``"enable"`` between two ticks.
 
         Args:
-            event: The command, one of :data:`~teleop_core.operation.states.COMMANDS`.
+            event: The command, one of :data:`~teleop_core.slave.operation.states.COMMANDS`.
 
         Returns:
             What became of it, and the same in words.
@@ -270,7 +270,7 @@ class Slave(RunningStage):
         """Take note of a fault that was found outside, as two publishers of commands.
 
         Args:
-            fault: What was found; it does what :data:`~teleop_core.operation.FAULTS` says.
+            fault: What was found; it does what :data:`~teleop_core.slave.operation.FAULTS` says.
             value: What was found, in the fault's unit.
             bound: What it must not exceed.
         """

@@ -4,31 +4,31 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from teleop_core.controllers import CONTROLLERS, per_joint
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
-from teleop_core.kernels import pointer
-from teleop_core.parameters import Choice, choice, parameter
-from teleop_core.plants import PER_JOINT, PLANTS, Physics
-from teleop_core.robots import dh_kernels, load_robot_set
-from teleop_core.robots.drives import ACCELERATION, GRAVITY
-from teleop_core.robots.kinematics import FK
-from teleop_core.robots.parameters import RobotParameters
-from teleop_core.signals import DT, assign
-from teleop_core.slave.elastic import gear_damping
-from teleop_core.slave.friction import bristle_damping
-from teleop_core.slave.handover import missing_effort
-from teleop_core.slave.simulation import Arm, simulation_records, simulation_step
-from teleop_core.slave.stability import check_friction, check_stable, loop_key
-from teleop_core.slave.transmission import LONGEST_DELAY
-from teleop_core.stage import RunningStage, Stage
-from teleop_core.topics import (
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.graph.signals import DT, assign
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
     NO_COMMAND_NS,
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
     SLAVE_SETPOINT_JS,
     SLAVE_TRUE_CP,
 )
+from teleop_core.kernels import pointer
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots import dh_kernels, load_robot_set
+from teleop_core.robots.drives import ACCELERATION, GRAVITY
+from teleop_core.robots.kinematics import FK
+from teleop_core.robots.parameters import RobotParameters
+from teleop_core.slave.controllers import CONTROLLERS, per_joint
+from teleop_core.slave.elastic import gear_damping
+from teleop_core.slave.friction import bristle_damping
+from teleop_core.slave.handover import missing_effort
+from teleop_core.slave.plants import PER_JOINT, PLANTS, Physics
+from teleop_core.slave.simulation import Arm, simulation_records, simulation_step
+from teleop_core.slave.stability import check_friction, check_stable, loop_key
+from teleop_core.slave.transmission import LONGEST_DELAY
 
 
 @dataclass(frozen=True, kw_only=True)

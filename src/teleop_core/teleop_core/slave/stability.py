@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.controllers import Controller
-from teleop_core.errors import ParameterError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import IS_COMPILED, bound, records
 from teleop_core.kernels.callables import raise_pending
-from teleop_core.plants import PER_JOINT
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
+from teleop_core.slave.controllers import Controller
+from teleop_core.slave.plants import PER_JOINT
 from teleop_core.slave.simulation import Arm, simulation_step
 
 _TICKS, _LAST = 400, 100

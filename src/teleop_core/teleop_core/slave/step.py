@@ -2,24 +2,10 @@
 
 from typing import Any, NamedTuple
 
-from teleop_core.geometry import Array, pose_from_transform
+from teleop_core.graph.signals import Field, copy
+from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.kernels import inner, kernel, records
-from teleop_core.operation.states import Event, State, change
-from teleop_core.operation.watch import (
-    OPERATION_PARAMETERS,
-    OPERATION_STATE,
-    begin_tick,
-    find_rest,
-    is_blind,
-    is_braked,
-    measure_rest,
-    tell,
-    watch_feedback,
-    watch_joints,
-    watch_limits,
-    watch_tip,
-)
-from teleop_core.signals import Field, copy
+from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.slave.commands import (
     AT_LIMITS,
     AT_ONCE,
@@ -34,8 +20,22 @@ from teleop_core.slave.commands import (
     take_command,
 )
 from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way
+from teleop_core.slave.operation.states import Event, State, change
+from teleop_core.slave.operation.watch import (
+    OPERATION_PARAMETERS,
+    OPERATION_STATE,
+    begin_tick,
+    find_rest,
+    is_blind,
+    is_braked,
+    measure_rest,
+    tell,
+    watch_feedback,
+    watch_joints,
+    watch_limits,
+    watch_tip,
+)
 from teleop_core.slave.velocity import advance_velocity
-from teleop_core.topics import NO_COMMAND_NS
 
 _ENABLED, _FAULT = int(State.ENABLED), int(State.FAULT)
 _ARRIVED, _HOME, _BLIND = int(Event.ARRIVED), int(Event.HOME), int(CommandStatus.BLIND)

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, ShapeError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError, ShapeError
+from teleop_core.kernels.geometry import Array
 
 
 def cubic_move(start: Array, end: Array, move_time: float, times: Array) -> tuple[Array, Array]:

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from teleop_core.geometry import Array
 from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
 
 LONGEST_DELAY = 30
 """Largest delay of efforts [ticks]."""

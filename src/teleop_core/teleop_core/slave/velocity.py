@@ -4,10 +4,10 @@ import math
 from enum import IntEnum
 from typing import Any
 
-from teleop_core.geometry import Array
+from teleop_core.graph.signals import copy
 from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.damped import eliminate, gram, weigh
-from teleop_core.signals import copy
 
 
 class Motion(IntEnum):

@@ -4,8 +4,8 @@ import argparse
 import sys
 from typing import Any
 
+from teleop_core.base.errors import SessionError
 from teleop_core.commands.arguments import command, ros_module
-from teleop_core.errors import SessionError
 
 _EPILOG = """\
 tests an arm, ours or any other, against CRTK (Collaborative Robotics Toolkit): which topics there

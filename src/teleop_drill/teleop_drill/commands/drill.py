@@ -8,8 +8,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.commands.arguments import command, ros_module, setting_arguments
-from teleop_core.errors import ParameterError, RecordingError
 
 if TYPE_CHECKING:
     from teleop_drill.drill import Exercise, Outcome

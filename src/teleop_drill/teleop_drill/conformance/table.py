@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from rich.markup import escape
 from rich.table import Table
 
-from teleop_core.texts import one_line
+from teleop_core.base.texts import one_line
 from teleop_drill.conformance.rows import Finding, Verdict
 
 _STYLES = {

@@ -1,7 +1,7 @@
 """Drill: breaks a running session in all ways that are known, and measures what the arm does."""
 
-from teleop_core.errors import PartError, UnknownNameError
-from teleop_core.registry import Registry
+from teleop_core.base.errors import PartError, UnknownNameError
+from teleop_core.base.registry import Registry
 from teleop_drill.drill.exercise import Cure, Exercise, Master, Motion, Rig
 from teleop_drill.drill.outcome import Outcome
 from teleop_drill.drill.processes import PROCESSES

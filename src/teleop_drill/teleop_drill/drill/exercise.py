@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from teleop_core.geometry import Array
-from teleop_core.operation import Fault, State
-from teleop_core.topics import Topic
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
+from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill.hand import SPEED, Distortion
 from teleop_drill.drill.numbers import Numbers
 

@@ -11,8 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
-from teleop_core.geometry import Array
-from teleop_core.operators.rest import rest_pose
+from teleop_core.chain.operators.rest import rest_pose
+from teleop_core.kernels.geometry import Array
 
 PERIOD = 2e-3
 """Time from sample to sample [s], as of a device at 500 Hz."""

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
-from teleop_core.errors import PartError
-from teleop_core.geometry import Array
-from teleop_core.parameters import NoParameters
+from teleop_core.base.errors import PartError
+from teleop_core.base.parameters import NoParameters
+from teleop_core.graph.stage import STAGES, RunningStage, Stage, register_stage
+from teleop_core.graph.topics import SLAVE_SERVO_CP, Kind, Topic, passed_on
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave_sim import SlaveSim
-from teleop_core.stage import STAGES, RunningStage, Stage, register_stage
-from teleop_core.topics import SLAVE_SERVO_CP, Kind, Topic, passed_on
 
 VARIABLE = "TELEOP_DRILL"
 """Environment variable with the name of the file that says what is to break."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.operation import State
+from teleop_core.slave.operation import State
 from teleop_drill.drill import measure
 from teleop_drill.drill.exercise import Exercise, Motion
 from teleop_drill.drill.hand import RADIUS

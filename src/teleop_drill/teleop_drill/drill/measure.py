@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 
 Stamps = NDArray[np.int64]
 RESOLUTION = 2e-4

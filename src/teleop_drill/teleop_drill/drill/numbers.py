@@ -5,18 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.geometry import Array
+from teleop_core.graph.signals import DT
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
-from teleop_core.signals import DT
 from teleop_core.slave.slave import Slave
 from teleop_drill.drill import hand
 
 OVERSHOOT = 1.5
 """Speed of the tip over that of its setpoint, at most: three equal poles with a zero at a third of
 them answer a step by a quarter too much
-(:func:`~teleop_core.controllers.pid.critically_damped_gains`), and a setpoint that turns round at
-full speed makes a step of twice its speed."""
+(:func:`~teleop_core.slave.controllers.pid.critically_damped_gains`), and a setpoint that turns
+round at full speed makes a step of twice its speed."""
 _COAST = 0.84
 """Way of such a loop beyond a setpoint that stops at once, in speeds over its pole: the maximum of
 :math:`(x + x^2) e^{-x}`, the answer to a ramp that ends."""

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from teleop_core.operation import Fault, State
+from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill.exercise import Cure, Exercise
 from teleop_drill.drill.judging import Measured
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 
-from teleop_core.operation import Fault, State
+from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill.exercise import (
     Cure,
     Exercise,

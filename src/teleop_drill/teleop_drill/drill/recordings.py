@@ -9,8 +9,8 @@ from mcap.reader import make_reader
 
 from teleop_core.bags.finding import mcap_files
 from teleop_core.bags.reader import Bag, recover
-from teleop_core.errors import TeleopError
-from teleop_core.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION
+from teleop_core.base.errors import TeleopError
+from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION
 from teleop_drill.drill.measure import Stamps
 from teleop_drill.drill.outcome import Outcome
 

@@ -5,8 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from teleop_core.operation import Fault, State
-from teleop_core.topics import (
+from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
     SLAVE_SERVO_JP,
@@ -14,6 +13,7 @@ from teleop_core.topics import (
     TELEOP_STATE,
     Topic,
 )
+from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill import hand
 from teleop_drill.drill.exercise import Cure, Exercise, Motion, Rig, Time, after, never, outage
 from teleop_drill.drill.hand import Distortion

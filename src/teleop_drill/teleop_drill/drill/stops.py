@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from teleop_core.operation import Fault, State
+from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill import hand
 from teleop_drill.drill.exercise import Cure, Exercise, Motion, Rig, Time, after, at_once
 from teleop_drill.drill.inside import STICKS, WORKS

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.errors import SessionError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import SessionError
+from teleop_core.kernels.geometry import Array
 from teleop_drill.conformance.rows import Verdict
 from teleop_drill.nodes.conformance_arm import Arm, numbers_of
 

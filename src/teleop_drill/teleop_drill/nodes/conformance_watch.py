@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from teleop_core.bags.messages import SECOND_NS
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_drill.conformance.agreement import Trail, adds_up, follows, obeys
 from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
 

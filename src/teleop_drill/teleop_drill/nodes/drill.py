@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from teleop_core import api
-from teleop_core.errors import SessionError
+from teleop_core.base.errors import SessionError
+from teleop_core.base.own_parts import VARIABLE, load_own_parts
 from teleop_core.nodes.children import environment, free_domain
-from teleop_core.own_parts import VARIABLE, load_own_parts
+from teleop_core.session import api
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill import hand, inside
 from teleop_drill.drill.exercise import Exercise, Master

@@ -2,8 +2,7 @@
 
 import time
 
-from teleop_core.operation import Fault, State
-from teleop_core.topics import (
+from teleop_core.graph.topics import (
     SLAVE_MEASURED_CP,
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
@@ -11,6 +10,7 @@ from teleop_core.topics import (
     SLAVE_TRUE_CP,
     TELEOP_STATE,
 )
+from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill.exercise import Cure, Exercise
 from teleop_drill.drill.judging import Seen
 from teleop_drill.drill.numbers import Scheduling

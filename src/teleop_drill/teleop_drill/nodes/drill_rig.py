@@ -19,16 +19,16 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import layout
-from teleop_core.geometry import Array
+from teleop_core.graph.layers import SESSION
+from teleop_core.graph.topics import SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.operation import STOP_TOPIC
 from teleop_core.nodes.streams import message_type, profile
-from teleop_core.operation import State
-from teleop_core.operation.states import COMMANDS
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.layers import SESSION
-from teleop_core.topics import SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
+from teleop_core.slave.operation import State
+from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.drill import inside
 from teleop_drill.drill.exercise import Master
 from teleop_drill.drill.hand import Distortion

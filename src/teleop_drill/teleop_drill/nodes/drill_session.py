@@ -14,8 +14,8 @@ from typing import IO, Any
 
 import yaml
 
-from teleop_core.errors import SessionError
-from teleop_core.graph import RECORDER_NAME
+from teleop_core.base.errors import SessionError
+from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.nodes.children import Child, end_all
 from teleop_core.nodes.live import parameter_file
 from teleop_core.nodes.observer import Observer

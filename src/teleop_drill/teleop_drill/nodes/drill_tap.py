@@ -19,11 +19,8 @@ from teleop_core.bags.messages import (
     read_any,
     read_numbers,
 )
-from teleop_core.geometry import Array
-from teleop_core.nodes.real_time import apply_options
-from teleop_core.nodes.streams import Subscription, message_type, profile
-from teleop_core.session.layers import RealTimeParameters
-from teleop_core.topics import (
+from teleop_core.graph.layers import RealTimeParameters
+from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
     NO_COMMAND_NS,
@@ -35,6 +32,9 @@ from teleop_core.topics import (
     TELEOP_STATE,
     Topic,
 )
+from teleop_core.kernels.geometry import Array
+from teleop_core.nodes.real_time import apply_options
+from teleop_core.nodes.streams import Subscription, message_type, profile
 from teleop_drill.drill import hand
 from teleop_drill.drill.hand import Distortion, Sample
 from teleop_drill.drill.measure import Trace
@@ -231,7 +231,7 @@ def stand_by() -> None:
     """Listen to all streams as a process of others, and say so; until it is killed."""
     import rclpy
 
-    from teleop_core.topics import STREAMS
+    from teleop_core.graph.topics import STREAMS
 
     rclpy.init()
     node = rclpy.create_node("drill_bystander")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_lab.calibration.identify import Found, identify, residuals
 from teleop_lab.calibration.measured import Measured
 from teleop_lab.calibration.model import FRAME

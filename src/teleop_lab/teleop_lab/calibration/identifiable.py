@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_lab.calibration.model import FRAME, Model
 
 WORST_CONDITION = 100.0

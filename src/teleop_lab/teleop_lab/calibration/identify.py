@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.link_errors import LinkErrors
 from teleop_lab.calibration.identifiable import WORST_CONDITION, Left, condition, select
 from teleop_lab.calibration.measured import CalibrationError, Measured

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_lab.calibration.model import Model
 

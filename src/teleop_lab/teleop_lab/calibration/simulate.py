@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from teleop_core.errors import ParameterError, UnknownNameError
-from teleop_core.geometry import Array
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.link_errors import LinkErrors
 from teleop_core.robots.robot import Robot
 from teleop_lab.calibration import appendix_e

@@ -5,8 +5,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.commands.arguments import command, geometry_argument
-from teleop_core.errors import ParameterError, TeleopError
 
 if TYPE_CHECKING:
     from teleop_core.robots import Robot

@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from teleop_core.base.errors import UnknownNameError
 from teleop_core.commands.arguments import command
-from teleop_core.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from teleop_lab.experiments import Outcome

@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from teleop_core.base.errors import TeleopError
 from teleop_core.commands.arguments import command, geometry_argument, setting_arguments
-from teleop_core.errors import TeleopError
 
 if TYPE_CHECKING:
     from teleop_lab.planning.reach import Reach

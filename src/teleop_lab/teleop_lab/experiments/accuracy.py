@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure
-from teleop_core.geometry import Array, rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import Robot, load_robot
 from teleop_core.slave.pair import ArmParameters
 from teleop_lab.calibration.appendix_e import ESCAPE, OFFSET_OF_D3, READ, STEP

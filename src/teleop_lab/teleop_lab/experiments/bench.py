@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.errors import ParameterError, UnknownNameError
+from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.evaluation import Score
-from teleop_core.geometry import Array
-from teleop_core.recording import Stream
+from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.kernels.geometry import Array
+from teleop_core.session.recording import Stream
 from teleop_core.slave.pair import ArmParameters
-from teleop_core.topics import NO_COMMAND_NS
 
 Setting = float | str | bool | tuple[float, ...] | tuple[str, ...]
 Settings = Mapping[str, Setting]
@@ -155,7 +155,7 @@ class Bench:
         Raises:
             TeleopError: A setting is wrong.
         """
-        from teleop_core.api import configuration
+        from teleop_core.session.api import configuration
 
         given = {"seed": self.seed, **self._settings, **dict(settings or {})}
         made = configuration(settings=given)
@@ -164,7 +164,7 @@ class Bench:
     def _run(
         self, scenario: str, seed: int, settings: Settings
     ) -> tuple[Score, Mapping[str, Stream]]:
-        from teleop_core.api import run
+        from teleop_core.session.api import run
 
         recording = run(scenario, seed=seed, settings=settings, progress=self.progress)
         return recording.score(), _aligned({name: recording[name] for name in _KEPT})

@@ -16,7 +16,7 @@ from teleop_core.evaluation.figure import (
     time_axis,
 )
 from teleop_core.evaluation.published import COARSE, FINE
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean, pooled
 from teleop_lab.experiments.drawing import DARK, Trace, axis, level, line, points

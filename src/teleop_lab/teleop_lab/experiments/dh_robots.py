@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.hand_fingers import finger_point
 from teleop_core.robots.rps3 import joint_points

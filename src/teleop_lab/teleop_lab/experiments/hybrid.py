@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, SECOND, THIRD, Figure
-from teleop_core.geometry import Array, rotation, transform
+from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import load_robot
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.drawing import in_space, scene

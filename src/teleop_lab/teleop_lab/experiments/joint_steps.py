@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.geometry import Array
-from teleop_core.signals import TICK_NS
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 _STEP_S = 0.02  # a step is as large as what a joint makes in this time at full speed

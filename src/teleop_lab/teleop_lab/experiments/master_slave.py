@@ -24,7 +24,7 @@ from teleop_core.evaluation.published import (
     POSITION_SHARE,
     Published,
 )
-from teleop_core.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
+from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_lab.experiments.bench import Bench, Session, mean, pooled
 from teleop_lab.experiments.conditions import OURS, PREDICTED
 from teleop_lab.experiments.drawing import (

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.evaluation.figure import Figure
 
 Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
@@ -198,7 +198,7 @@ class Outcome:
         Raises:
             UnknownNameError: There is none; those there are are listed.
         """
-        from teleop_core.errors import UnknownNameError
+        from teleop_core.base.errors import UnknownNameError
 
         for row in self.rows:
             if row.quantity == quantity and (not group or row.group == group):

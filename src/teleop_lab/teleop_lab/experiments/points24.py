@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
+from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
+from teleop_core.chain.operators.tour import TourParameters
 from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure
-from teleop_core.geometry import Array
-from teleop_core.mapping.parameters import MotionScalingParameters, axis_map
-from teleop_core.operators.tour import TourParameters
-from teleop_core.signals import DT
+from teleop_core.graph.signals import DT
+from teleop_core.kernels.geometry import Array
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean
 from teleop_lab.experiments.conditions import OURS, PREDICTED
 from teleop_lab.experiments.drawing import axis, line
@@ -92,7 +92,7 @@ def _in_plane(off: Array) -> Array:
 
 def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
     """How each hand does the task; one that sees aims again, by what it missed before."""
-    from teleop_core.api import configuration
+    from teleop_core.session.api import configuration
 
     made = configuration(SCENARIO).group("operator")
     center, p, approach = np.array(made.center), made.kind.parameters, float(made.approach_time)

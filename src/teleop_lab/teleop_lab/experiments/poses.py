@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.evaluation.figure import MEASURED, SURROUNDING, Figure
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import Robot, load_robot
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.drawing import PUBLISHED, in_space, scene

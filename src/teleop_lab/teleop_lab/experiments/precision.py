@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, MEASURED, SECOND, Figure
-from teleop_core.geometry import Array
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters

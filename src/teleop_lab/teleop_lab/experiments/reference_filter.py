@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure, time_axis
-from teleop_core.geometry import Array
-from teleop_core.mapping.filters import lag_step
-from teleop_core.signals import DT
+from teleop_core.graph.signals import DT
+from teleop_core.kernels.filters import lag_step
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_lab.experiments.bench import Bench, Session, Settings
 from teleop_lab.experiments.drawing import axis, level, line, points

@@ -17,9 +17,9 @@ from teleop_core.evaluation.figure import (
     stacked_axes,
     time_axis,
 )
-from teleop_core.geometry import Array
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.signals import TICK_NS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 from teleop_lab.experiments.bench import Bench, Settings

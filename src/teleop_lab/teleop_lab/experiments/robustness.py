@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from teleop_core.errors import ParameterError
+from teleop_core.base.errors import ParameterError
 from teleop_core.evaluation.figure import COMMAND, FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure
-from teleop_core.plants.hardware import faults_of
 from teleop_core.robots import load_robot
 from teleop_core.slave.pair import SimulatedArm
+from teleop_core.slave.plants.hardware import faults_of
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.controllers import tracking_of
 from teleop_lab.experiments.drawing import DARK, axis

@@ -3,7 +3,7 @@
 import numpy as np
 
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure
-from teleop_core.plants.hardware import FAULTS
+from teleop_core.slave.plants.hardware import FAULTS
 from teleop_lab.experiments.bench import Bench, Session, Settings
 from teleop_lab.experiments.conditions import PREDICTED
 from teleop_lab.experiments.drawing import axis

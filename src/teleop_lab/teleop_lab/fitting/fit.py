@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2, t
 
-from teleop_core.errors import ParameterError, TeleopError, UnknownNameError
-from teleop_core.geometry import Array
-from teleop_core.plants.hardware import faults_of
+from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.pair import ArmParameters
+from teleop_core.slave.plants.hardware import faults_of
 from teleop_core.slave.slave_sim import SlaveSim
 from teleop_lab.fitting.rests import rest_positions
 from teleop_lab.fitting.table import RestTable
@@ -205,7 +205,7 @@ def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
     among them that are approached from both sides and not loaded by gravity, and weights that no
     source states.
     """
-    from teleop_core.controllers.source_pid import loaded_axes
+    from teleop_core.slave.controllers.source_pid import loaded_axes
 
     model, loaded, single = robot.dynamics, loaded_axes(robot), one_sided(robot, table)
     assert model is not None

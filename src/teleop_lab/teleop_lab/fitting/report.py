@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import yaml
 
-from teleop_core.plants.hardware import faults_of
 from teleop_core.robots import load_robot
+from teleop_core.slave.plants.hardware import faults_of
 
 if TYPE_CHECKING:
     from teleop_lab.fitting.fit import FitResult

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.geometry import Array
+from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.hardware import Hardware
-from teleop_core.signals import TICK_NS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm, arm_step
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from teleop_core.damage import damage_told
-from teleop_core.errors import TeleopError
-from teleop_core.geometry import Array
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import TeleopError
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
 PUBLISHED = Path(__file__).with_name("rcrt1_precision.csv")

@@ -11,8 +11,8 @@ from functools import cache
 
 import numpy as np
 
-from teleop_core.geometry import Array, rotation, rotations_from_quaternions
-from teleop_core.mapping.parameters import axis_map
+from teleop_core.chain.mapping.parameters import axis_map
+from teleop_core.kernels.geometry import Array, rotation, rotations_from_quaternions
 from teleop_core.robots.robot import Robot
 from teleop_lab.planning.placement import Placement
 from teleop_lab.planning.turns import turns

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import RecordingError
-from teleop_core.geometry import Array
-from teleop_core.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.base.errors import RecordingError
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.kernels.geometry import Array
 
 STRETCHES = 10
 """Stretches of a long path that stand for the whole."""

@@ -10,9 +10,9 @@ import plotly.graph_objects as plots
 from plotly.subplots import make_subplots
 
 from teleop_core.evaluation.bands import LIMIT_COLORS
-from teleop_core.geometry import Array, rotation_vectors
+from teleop_core.graph.topics import Limit
+from teleop_core.kernels.geometry import Array, rotation_vectors
 from teleop_core.robots.dexterity import sample_workspace
-from teleop_core.topics import Limit
 from teleop_lab.planning.asked import AskedPath
 from teleop_lab.planning.table import LABELS, text
 from teleop_lab.planning.walk import Walked

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import yaml
 
-from teleop_core.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.robots.parameters import RobotParameters
 
 Setting = float | str | list[float] | list[str]

@@ -4,15 +4,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from teleop_core.api import run
 from teleop_core.bags.arms import of_arm
 from teleop_core.bags.reader import Bag
-from teleop_core.errors import ParameterError, RecordingError, UnknownNameError
-from teleop_core.exchange import as_master_bag
-from teleop_core.recording import Recording
-from teleop_core.robots.robot import Robot
-from teleop_core.session.configuration import Configuration
-from teleop_core.session.layers import (
+from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
+from teleop_core.graph.layers import (
     Layer,
     config_folder,
     list_scenarios,
@@ -21,6 +16,11 @@ from teleop_core.session.layers import (
     scenario_file,
     setting,
 )
+from teleop_core.robots.robot import Robot
+from teleop_core.session.api import run
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.exchange import as_master_bag
+from teleop_core.session.recording import Recording
 from teleop_core.session.runner import recorded_configuration
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.asked import AskedPath, asked_path

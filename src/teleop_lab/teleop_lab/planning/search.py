@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from teleop_core.geometry import Array, multiply_quaternions, transform_from_pose
+from teleop_core.kernels.geometry import Array, multiply_quaternions, transform_from_pose
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.robots.room import roomy_postures
 from teleop_lab.planning.aim import Aim

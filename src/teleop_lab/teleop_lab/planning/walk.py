@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.geometry import Array, pose_from_transform
-from teleop_core.kernels import bound, kernel_from_source, raise_pending, records
-from teleop_core.mapping.inverse_kinematics import (
+from teleop_core.chain.mapping.inverse_kinematics import (
     InverseKinematics,
     InverseKinematicsParameters,
 )
-from teleop_core.mapping.motion_scaling import MotionScaling
-from teleop_core.mapping.parameters import MotionScalingParameters
-from teleop_core.signals import DT, assign, copy
-from teleop_core.topics import SLAVE_REACH, Limit
+from teleop_core.chain.mapping.motion_scaling import MotionScaling
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.graph.signals import DT, assign, copy
+from teleop_core.graph.topics import SLAVE_REACH, Limit
+from teleop_core.kernels import bound, kernel_from_source, raise_pending, records
+from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_lab.planning.asked import AskedPath
 from teleop_lab.planning.placement import Placement
 
@@ -62,7 +62,7 @@ class Walked:
         asked: Poses (N, 7) [m] that the slave was asked for.
         reached: Poses (N, 7) [m] of its answer.
         q: Joints (N, n) [rad, m] of its answer.
-        limit: :class:`~teleop_core.topics.Limit` (N,) that kept it from following.
+        limit: :class:`~teleop_core.graph.topics.Limit` (N,) that kept it from following.
         joint: Joint (N,) that was at its limit; -1 for none.
         residual: Distance [m] and angle [rad] (N, 2) from what was asked for.
     """

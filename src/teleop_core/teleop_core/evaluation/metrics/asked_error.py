@@ -9,9 +9,9 @@ from teleop_core.evaluation.metric import SPREAD_MEANING, Key, SpreadMetric
 from teleop_core.evaluation.pairing import NONE, latest, same_stamp
 from teleop_core.evaluation.tracking import angles_between
 from teleop_core.evaluation.windows import Window
-from teleop_core.geometry import Array, quaternion_products
-from teleop_core.signals import STATE
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
+from teleop_core.graph.signals import STATE
+from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
+from teleop_core.kernels.geometry import Array, quaternion_products
 
 ASKED_TOPICS = (MASTER_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_MEASURED_CP)
 """Topics that :class:`Asked` reads."""

@@ -9,8 +9,8 @@ from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.metrics.fixture import GROUP
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.windows import Window
-from teleop_core.geometry import Array
-from teleop_core.topics import MASTER_CONTACT
+from teleop_core.graph.topics import MASTER_CONTACT
+from teleop_core.kernels.geometry import Array
 
 TOUCH_J = 14e-6
 """What takes less energy is a touch [J]: less than the device's dry friction, 0.26 N, takes over a

@@ -11,7 +11,7 @@ from teleop_core.evaluation.rows import MISSING, Row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.tracking import TRACKED, tracked
 from teleop_core.evaluation.windows import Window
-from teleop_core.topics import DIAGNOSTICS, SLAVE_MEASURED_CP
+from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_CP
 
 Counts = dict[str, dict[str, int]]
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from teleop_core.chain.fixtures.box import BOX
 from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import Metric, figure, keys_of
@@ -14,9 +15,8 @@ from teleop_core.evaluation.rows import MISSING, Row, row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.state_history import States
 from teleop_core.evaluation.windows import Window
-from teleop_core.fixtures.box import BOX
-from teleop_core.geometry import Array
-from teleop_core.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Topic
+from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Topic
+from teleop_core.kernels.geometry import Array
 
 
 def fixture_depth(positions: Array, states: States, axes: Array) -> Array:

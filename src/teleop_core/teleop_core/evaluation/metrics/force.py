@@ -11,7 +11,7 @@ from teleop_core.evaluation.outlines import kinds_of, outlines_of
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
-from teleop_core.topics import MASTER_MEASURED_CF
+from teleop_core.graph.topics import MASTER_MEASURED_CF
 
 
 class ForceMetric(Metric):

@@ -11,7 +11,7 @@ from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.evaluation.pairing import NONE, same_stamp
 from teleop_core.evaluation.rows import MISSING, Row, number
 from teleop_core.evaluation.windows import Window
-from teleop_core.topics import Topic
+from teleop_core.graph.topics import Topic
 
 _NEVER = 2**62
 _BINS = 150

@@ -5,7 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
+from teleop_core.base.parameters import build
+from teleop_core.chain.operators import OPERATORS
+from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.metric import Key, Metric, keys_of
@@ -15,11 +18,8 @@ from teleop_core.evaluation.motion_samples import MotionSamples
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.state_history import States
 from teleop_core.evaluation.windows import Window
-from teleop_core.operators import OPERATORS
-from teleop_core.operators.parameters import OperatorParameters
-from teleop_core.parameters import build
-from teleop_core.signals import STATE
-from teleop_core.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Topic
+from teleop_core.graph.signals import STATE
+from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Topic
 
 
 def approach_end_ns(context: Context) -> int:

@@ -31,7 +31,7 @@ from teleop_core.evaluation.rows import number
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.tracking import TRACKED, tracked
 from teleop_core.evaluation.windows import Window
-from teleop_core.signals import STATE
+from teleop_core.graph.signals import STATE
 
 _PLANES = ((0, 1), (0, 2), (1, 2))
 _TIME_BAR = {

@@ -14,8 +14,8 @@ from teleop_core.evaluation.published import POSITION_SHARE, Gains, agrees
 from teleop_core.evaluation.rows import Row, number, spread_rows
 from teleop_core.evaluation.tracking import TRACKED, ErrorTrace, pose_errors, rows_of, tracked
 from teleop_core.evaluation.windows import Window
-from teleop_core.geometry import Array
-from teleop_core.topics import SLAVE_TRUE_CP
+from teleop_core.graph.topics import SLAVE_TRUE_CP
+from teleop_core.kernels.geometry import Array
 
 GROUP, COMMAND_GROUP = "against filtered reference", "against unfiltered command"
 

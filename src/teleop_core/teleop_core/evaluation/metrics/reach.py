@@ -12,9 +12,9 @@ from teleop_core.evaluation.metric import SPREAD_MEANING, Metric, figure, keys_o
 from teleop_core.evaluation.rows import MISSING, Row, error_rows, row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.windows import Window
-from teleop_core.geometry import Array
-from teleop_core.signals import DT
-from teleop_core.topics import SLAVE_REACH, SLAVE_SERVO_CP, Limit
+from teleop_core.graph.signals import DT
+from teleop_core.graph.topics import SLAVE_REACH, SLAVE_SERVO_CP, Limit
+from teleop_core.kernels.geometry import Array
 
 GROUP = "slave follows the hand"
 COMPARABLE = 0.99

@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from teleop_core.errors import TeleopError
+from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.metric import Metric
@@ -13,10 +13,10 @@ from teleop_core.evaluation.outlines import outlines_of
 from teleop_core.evaluation.plain import Values
 from teleop_core.evaluation.replay_figure import replay_figure
 from teleop_core.evaluation.windows import Window
-from teleop_core.geometry import Array
+from teleop_core.graph.topics import SLAVE_MEASURED_JS
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.robot import Robot
-from teleop_core.topics import SLAVE_MEASURED_JS
 
 RATE = 25.0
 """Moments that are kept of a second."""

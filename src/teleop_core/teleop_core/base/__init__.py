@@ -1,0 +1,1 @@
+"""Base: errors, texts, parameters and registries, which everything else is written with."""

@@ -1,0 +1,275 @@
+"""Parameters: declared once as dataclass fields with unit, bounds and text, checked without ROS."""
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from types import UnionType
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
+
+from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
+
+if TYPE_CHECKING:
+    from teleop_core.base.registry import Registry
+
+Group = TypeVar("Group")
+Scalar = bool | int | float | str
+Value = Scalar | tuple[Scalar, ...]
+
+LARGEST = 10**18
+"""Largest whole number of a parameter: kernels count in 64 bits."""
+MARKS = ("published", "derived", "fitted", "assumed")
+"""How a number is known: a source prints it, follows from one, is fitted to data, is plausible."""
+
+
+def parameter(
+    default: Any,
+    *,
+    unit: str = "",
+    doc: str,
+    lower: float | None = None,
+    upper: float | None = None,
+    choices: tuple[str, ...] = (),
+    length: int | None = None,
+    fixed: bool = False,
+    source: str = "",
+) -> Any:
+    """Dataclass field that describes one parameter.
+
+    Args:
+        default: Value when nothing else is said; its type is the parameter's type.
+        unit: SI unit, empty for pure numbers and names.
+        doc: One line for the README's table and the ROS descriptor.
+        lower: Smallest allowed number, itself allowed; each element of a tuple.
+        upper: Largest allowed number, itself allowed; each element of a tuple.
+        choices: Allowed names; empty for any.
+        length: Number of elements of a tuple; None for any.
+        fixed: Whether it can only be set before the stage is built.
+        source: Where the default comes from: a mark of :data:`MARKS`, a colon, and by whom, from
+            what, to what or why; empty for a matter of taste.
+
+    Returns:
+        The dataclass field.
+
+    Raises:
+        ParameterError: The source begins with no mark.
+    """
+    if source and source.partition(":")[0] not in MARKS:
+        raise ParameterError("source", source, f"one of {', '.join(MARKS)}, a colon and a text")
+    meta = {
+        "unit": unit, "doc": doc, "lower": lower, "upper": upper,
+        "choices": choices, "length": length, "fixed": fixed, "source": source,
+    }  # fmt: skip
+    return field(default=default, metadata=meta)
+
+
+@dataclass(frozen=True)
+class NoParameters:
+    """Group of a part that has nothing to set."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which part of a registry a group uses, and the parameters of every part there is.
+
+    Attributes:
+        kind: Name of the part.
+        groups: Parameters of each part by its name; those of parts that are not used wait.
+    """
+
+    kind: str
+    groups: Mapping[str, Any]
+
+    @property
+    def parameters(self) -> Any:
+        """Parameters of the part that is used."""
+        return self.groups[self.kind]
+
+
+def choice(registry: "Registry[Any]", default: str, *, doc: str, fixed: bool = False) -> Any:
+    """Dataclass field, to be called ``kind``, that chooses a part by name.
+
+    Beside ``kind`` the group then has the parameters of every part, each below the part's name:
+    ``fixture.kind`` and ``fixture.sphere.diameter``. Parts have a group in ``parameters``.
+
+    Args:
+        registry: Where the parts are.
+        default: Part when nothing else is said.
+        doc: One line for tables and the ROS descriptor.
+        fixed: Whether it can only be set before the stage is built.
+    """
+    meta = {"registry": registry, "default": default, "doc": doc, "fixed": fixed}
+    return field(default_factory=lambda: _make_choice(registry, default, {}), metadata=meta)
+
+
+def _make_choice(registry: "Registry[Any]", kind: str, values: Mapping[str, object]) -> Choice:
+    groups = {
+        name: _make(registry.find(name).parameters, _below(name, values)) for name in registry
+    }
+    return Choice(kind, groups)
+
+
+def _below(name: str, values: Mapping[str, object]) -> dict[str, object]:
+    """Values of a nested group, without its name."""
+    start = name + "."
+    return {key[len(start) :]: value for key, value in values.items() if key.startswith(start)}
+
+
+@dataclass(frozen=True)
+class Spec:
+    """Declaration of one parameter: ``name`` is dotted for nested groups."""
+
+    name: str
+    kind: type
+    element: type
+    default: Value
+    unit: str
+    doc: str
+    lower: float | None
+    upper: float | None
+    choices: tuple[str, ...]
+    length: int | None
+    fixed: bool
+    source: str = ""
+
+    def check(self, value: object) -> None:
+        """Refuse a value of another type, length, bound or choice.
+
+        Raises:
+            ParameterError: Names the parameter, the value and what is allowed.
+        """
+        if self.kind is not tuple:
+            self._check_element(value)
+            return
+        if not isinstance(value, tuple):
+            raise ParameterError(self.name, value, f"a list of {self.element.__name__}")
+        if self.length is not None and len(value) != self.length:
+            raise ParameterError(self.name, value, f"a list of {self.length} values")
+        for element in value:
+            self._check_element(element)
+
+    def _check_element(self, value: object) -> None:
+        if type(value) is not self.element:
+            hint = " (write 1.0, not 1)" if self.element is float else ""
+            raise ParameterError(self.name, value, f"of type {self.element.__name__}{hint}")
+        if self.choices and value not in self.choices:
+            raise UnknownNameError(self.name, value, self.choices)
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ParameterError(self.name, value, f"finite, {self.bounds()}")
+        if isinstance(value, int) and not -LARGEST <= value <= LARGEST:
+            raise ParameterError(self.name, value, "a number of at most 18 digits")
+        if isinstance(value, int | float) and not self._is_inside(value):
+            raise ParameterError(self.name, value, self.bounds())
+
+    def _is_inside(self, value: float) -> bool:
+        return (self.lower is None or value >= self.lower) and (
+            self.upper is None or value <= self.upper
+        )
+
+    def bounds(self) -> str:
+        """Allowed range in words, with the unit."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.lower is not None and self.upper is not None:
+            return f"between {self.lower:g} and {self.upper:g}{unit}"
+        if self.lower is not None:
+            return f"at least {self.lower:g}{unit}"
+        return f"at most {self.upper:g}{unit}" if self.upper is not None else f"any value{unit}"
+
+
+@cache
+def _hints(group: type) -> dict[str, Any]:
+    """Types of a group's fields; finding them out is most of the work of building one."""
+    return get_type_hints(group)
+
+
+def specs(group: type, prefix: str = "") -> Iterator[Spec]:
+    """Declarations of a group in order, nested groups with dotted names."""
+    hints = _hints(group)
+    for entry in dataclasses.fields(group):
+        hint = hints[entry.name]
+        if hint is Choice:
+            yield from _choice_specs(entry, prefix)
+            continue
+        if dataclasses.is_dataclass(hint):
+            yield from specs(hint, f"{prefix}{entry.name}.")  # type: ignore[arg-type]
+            continue
+        kind = get_origin(hint) or hint
+        if kind is UnionType or kind not in {bool, int, float, str, tuple}:
+            raise TypeError(f"{group.__name__}.{entry.name}: a parameter cannot be a {hint}")
+        if "doc" not in entry.metadata:
+            text = f"one whose fields are made by parameter(...); {entry.name} is not"
+            raise PartError("parameter group", group.__name__, text)
+        element = get_args(hint)[0] if kind is tuple else kind
+        default: Any = entry.default
+        spec = Spec(prefix + entry.name, kind, element, default, **entry.metadata)
+        spec.check(default)
+        yield spec
+
+
+def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
+    meta = entry.metadata
+    names, kind = meta["registry"].names(), prefix + entry.name
+    text: dict[str, Any] = {"unit": "", "doc": meta["doc"], "lower": None, "upper": None}
+    yield Spec(
+        kind, str, str, meta["default"], **text, choices=names, length=None, fixed=meta["fixed"]
+    )
+    for name in names:
+        yield from specs(meta["registry"].find(name).parameters, f"{prefix}{name}.")
+
+
+def build(group: type[Group], values: Mapping[str, object], prefix: str = "") -> Group:
+    """Group with ``values`` in place of its defaults, checked.
+
+    Args:
+        group: Dataclass whose fields come from :func:`parameter` or are such groups.
+        values: Dotted names to values; lists count as tuples.
+        prefix: Dotted path of this group, put before names in errors.
+
+    Returns:
+        The group.
+
+    Raises:
+        UnknownNameError: A name is not declared; the alternatives are listed.
+        ParameterError: A value breaks its declaration, or a relation between values.
+    """
+    declared = {spec.name: spec for spec in specs(group)}
+    for name, value in values.items():
+        if name not in declared:
+            whose = f" of {prefix.rstrip('.')}" if prefix else ""
+            raise UnknownNameError(f"parameter{whose}", name, declared)
+        checked = tuple(value) if isinstance(value, list) else value
+        dataclasses.replace(declared[name], name=prefix + name).check(checked)
+    return _make(group, values)
+
+
+def _make(group: type[Group], values: Mapping[str, object]) -> Group:
+    hints = _hints(group)  # type: ignore[arg-type]
+    made: dict[str, object] = {}
+    for entry in dataclasses.fields(group):  # type: ignore[arg-type]
+        inner = hints[entry.name]
+        if inner is Choice:
+            kind = str(values.get(entry.name, entry.metadata["default"]))
+            made[entry.name] = _make_choice(entry.metadata["registry"], kind, values)
+        elif dataclasses.is_dataclass(inner):
+            made[entry.name] = _make(inner, _below(entry.name, values))  # type: ignore[arg-type]
+        elif entry.name in values:
+            value = values[entry.name]
+            made[entry.name] = tuple(value) if isinstance(value, list) else value
+    return group(**made)
+
+
+def values_of(group: object, prefix: str = "") -> dict[str, Value]:
+    """Dotted names to values of a group: what :func:`build` would need to make it again."""
+    out: dict[str, Value] = {}
+    for entry in dataclasses.fields(group):  # type: ignore[arg-type]
+        value = getattr(group, entry.name)
+        if isinstance(value, Choice):
+            out[prefix + entry.name] = value.kind
+            for name, inner in value.groups.items():
+                out |= values_of(inner, f"{prefix}{name}.")
+        elif dataclasses.is_dataclass(value):
+            out |= values_of(value, f"{prefix}{entry.name}.")
+        else:
+            out[prefix + entry.name] = value
+    return out

@@ -1,0 +1,141 @@
+"""Registry: parts by name, from this package, from installed packages and from the running program.
+
+Each seam (stages, operators, fixtures, controllers, robots, metrics) has one registry. An installed
+package adds parts through a Python entry-point group of the registry's name::
+
+    [project.entry-points."teleop_core.fixtures"]
+    my_cone = "my_package.cone:CONE"
+
+A program adds them with :meth:`Registry.add`. Nothing is imported before it is asked for.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from typing import Generic, TypeVar
+
+from teleop_core.base.errors import PartError, UnknownNameError
+
+Part = TypeVar("Part")
+_NAME = re.compile(r"\w[\w-]*")
+
+
+class Registry(Generic[Part]):
+    """Named parts of one kind.
+
+    Args:
+        kind: What a part is, in the singular, for messages: "fixture".
+        kinds: The plural; the entry-point group is ``<package>.<kinds>``.
+        builtin: Names to places ``module:attribute`` in the package.
+        check: Raises :class:`~teleop_core.base.errors.PartError` for what is no such part, else
+            returns it.
+        trial: Tries a part that is not of the package, and raises as ``check`` does.
+        package: Whose registry it is.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        kinds: str,
+        builtin: Mapping[str, str],
+        check: Callable[[str, object], Part],
+        trial: Callable[[Part], None] | None = None,
+        *,
+        package: str = "teleop_core",
+    ) -> None:
+        self.kind, self.kinds, self.group = kind, kinds, f"{package}.{kinds}"
+        self._builtin, self._check, self._trial = dict(builtin), check, trial
+        self._parts: dict[str, Part] = {}
+        self._own: set[str] = set()
+        self._installed: dict[str, EntryPoint] | None = None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names())
+
+    def names(self) -> tuple[str, ...]:
+        """Names of all parts: built in, installed, added."""
+        return tuple(dict.fromkeys((*self._builtin, *self._entries(), *self._parts)))
+
+    def find(self, name: str) -> Part:
+        """Part of a name.
+
+        Raises:
+            UnknownNameError: No such part; the alternatives are listed.
+            PartError: An installed part cannot be loaded, or is no such part.
+        """
+        if name not in self._parts:
+            part = self._check(name, self._load(name))
+            if name not in self._builtin and self._trial is not None:
+                self._trial(part)
+            self._parts[name] = part
+        return self._parts[name]
+
+    def add(self, name: str, part: object, *, replace: bool = False) -> Part:
+        """Add a part for the rest of this program; the same object again changes nothing.
+
+        Args:
+            name: What configurations call it.
+            part: The part.
+            replace: Whether it may take the place of one that the program added before, as when
+                a notebook's cell is run again.
+
+        Raises:
+            PartError: The name is taken, or this is no such part.
+        """
+        if not (isinstance(name, str) and _NAME.fullmatch(name)):
+            text = "named by letters, digits, _ and -, for it stands in keys and files"
+            raise PartError(self.kind, name, text)
+        checked = self._check(name, part)
+        if self._parts.get(name) is checked:
+            return checked
+        is_ours = replace and name in self._own
+        if not is_ours and name in self.names():
+            raise PartError(self.kind, name, "a name that is free; this one is used already")
+        if self._trial is not None:
+            self._trial(checked)
+        self._own.add(name)
+        self._parts[name] = checked
+        return checked
+
+    def remove(self, name: str) -> None:
+        """Take away a part that the program added; its name is free again.
+
+        Raises:
+            UnknownNameError: The program added no part of this name; those that it did are listed.
+        """
+        if name not in self._own:
+            raise UnknownNameError(f"added {self.kind}", name, sorted(self._own) or ["none"])
+        self._own.remove(name)
+        del self._parts[name]
+
+    def is_added(self, name: str) -> bool:
+        """Whether a part was added by this program."""
+        return name in self._own
+
+    def _entries(self) -> dict[str, EntryPoint]:
+        if self._installed is None:
+            found: dict[str, EntryPoint] = {}
+            for entry in entry_points(group=self.group):
+                if entry.name in self._builtin or entry.name in found:
+                    package = self.group.partition(".")[0]
+                    other = found[entry.name].value if entry.name in found else package
+                    raise PartError(
+                        self.kind, entry.name, f"named once; {entry.value} and {other} both use it"
+                    )
+                found[entry.name] = entry
+            self._installed = found
+        return self._installed
+
+    def _load(self, name: str) -> object:
+        if (place := self._builtin.get(name)) is not None:
+            module, _, attribute = place.partition(":")
+            return getattr(import_module(module), attribute)
+        if (entry := self._entries().get(name)) is None:
+            raise UnknownNameError(self.kind, name, self.names())
+        try:
+            return entry.load()
+        except Exception as error:  # whatever a foreign module raises, one line names it
+            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            expected = f"loadable from {entry.value} ({reason})"
+            raise PartError(self.kind, name, expected) from error

@@ -1,0 +1,200 @@
+"""Limits: what becomes of a command that the arm cannot follow, without wind-up.
+
+The command is drawn back to where the arm can be, so that it moves at once when the hand turns
+back. How far the hand stands against the limit is measured from where it met it, up to a bound
+beyond which the limit is dragged along; that is what the hand feels and what the state tells.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from teleop_core.graph.topics import SLAVE_REACH, Limit
+from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import (
+    Array,
+    invert_quaternion,
+    multiply_quaternions,
+    rotate_by_vector,
+    turn_between,
+    turn_by,
+    turn_within,
+)
+
+SENT = 512
+"""Commands that are remembered until the answer comes how far they could be followed."""
+SENT_FIELDS = [("stamp_ns", "i8"), ("moved", "f8", (3,)), ("turned", "f8", (4,))]
+LIMIT_FIELDS = [
+    # What was cut off all commands so far, which of them was answered last, how many were sent.
+    ("moved", "f8", (3,)), ("turned", "f8", (4,)), ("answered_ns", "i8"), ("sent", "i8"),
+    ("limit", "i8"), ("joint", "i8"), ("until_ns", "i8"),
+    # Where the hand met the limit, which way is out, and how far beyond it is: place [m] in the
+    # slave's axes, turn [rad] in those of the tool. The hand stands against the limit while a
+    # depth is positive.
+    ("anchor", "f8", (3,)), ("out", "f8", (3,)), ("depth", "f8"),
+    ("turn_anchor", "f8", (4,)), ("turn_out", "f8", (3,)), ("turn_depth", "f8"),
+    # Depths when something was cut off last: who gets farther out has left the limit.
+    ("met", "f8"), ("turn_met", "f8"),
+]  # fmt: skip
+_LIMIT, _JOINT, _CUT = (SLAVE_REACH.columns.index(name) for name in ("limit", "joint", "cut_x"))
+_NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
+# A limit is told for this long after the last command that met it [ns].
+_TOLD_NS = 100_000_000
+# A turn beyond a limit counts up to this [rad].
+_MOST_TURN = 0.05
+# So much farther out than where something was cut off last, the limit is left [m, rad].
+_PAST, _TURN_PAST = 2e-4, 5e-3
+# What is cut off by less is rounding [m or rad].
+_ROUNDING = 1e-9
+
+
+@inner
+def forget_limits(s: Any) -> None:
+    """Stand against no limit, as when the hand lets go of the slave."""
+    s.limit, s.joint, s.until_ns = _NONE, -1, 0
+    s.depth = s.turn_depth = 0.0
+
+
+@inner
+def remember(s: Any, sent: Any, stamp_ns: int) -> None:
+    """Note how far a command that is sent now is drawn back already."""
+    entry = sent[s.sent % sent.shape[0]]
+    entry.stamp_ns = stamp_ns
+    for i in range(3):
+        entry.moved[i] = s.moved[i]
+    for i in range(4):
+        entry.turned[i] = s.turned[i]
+    s.sent += 1
+
+
+@inner
+def _found(s: Any, sent: Any, stamp_ns: int) -> int:
+    """Place of the command with a stamp; -1 if it is too old to be known."""
+    count = sent.shape[0]
+    for back in range(1, min(count, s.sent) + 1):
+        at = (s.sent - back) % count
+        if sent[at].stamp_ns <= stamp_ns:
+            return at if sent[at].stamp_ns == stamp_ns else -1
+    return -1
+
+
+@inner
+def draw_back(s: Any, sent: Any, gain: float, row: Any) -> None:
+    """Take the answer to an earlier command: move the present one as far as that one was cut.
+
+    What was cut off since that command was sent is not cut twice.
+
+    Args:
+        s: State record with ``command`` (7,), ``hand`` (3,) [m] in the slave's axes and ``tool``
+            (4,), the orientation that the hand asks for before alignment, of the last sample, and
+            :data:`LIMIT_FIELDS`; written.
+        sent: Records of :data:`SENT_FIELDS`.
+        gain: Slave motion per hand motion.
+        row: Signals with ``slave_reach``.
+    """
+    reach, stamp_ns = row.slave_reach, row.slave_reach_ns
+    if stamp_ns in (0, s.answered_ns):
+        return
+    s.answered_ns = stamp_ns
+    limit = int(reach[_LIMIT])
+    if limit == _NONE:
+        return
+    if s.limit == _NONE:
+        s.limit, s.joint = limit, int(reach[_JOINT])
+    s.until_ns = row.master_measured_cp_ns + _TOLD_NS
+    at = _found(s, sent, stamp_ns) if limit in (_AT_JOINT, _BEYOND) else -1
+    if at >= 0:
+        _move_back(s, sent[at], gain, reach)
+        _turn_back(s, sent[at], reach)
+
+
+@inner
+def _move_back(s: Any, entry: Any, gain: float, reach: Array) -> None:
+    cut, square = np.empty(3), 0.0
+    for i in range(3):
+        cut[i] = entry.moved[i] + reach[_CUT + i] - s.moved[i]
+        square += cut[i] * cut[i]
+    length = math.sqrt(square)
+    if length <= _ROUNDING:
+        return
+    if s.depth <= 0.0:
+        s.depth = length / gain
+    s.met = s.depth
+    for i in range(3):
+        s.command[i] += cut[i]
+        s.moved[i] += cut[i]
+        s.out[i] = -cut[i] / length
+        s.anchor[i] = s.hand[i] - s.depth * s.out[i]
+
+
+@inner
+def _turn_back(s: Any, entry: Any, reach: Array) -> None:
+    wanted, cut = np.empty(4), np.empty(3)
+    for i in range(4):
+        wanted[i] = entry.turned[i]
+    turn_by(reach[_CUT + 3 : _CUT + 6], wanted)
+    turn_between(s.turned, wanted, cut)
+    length = math.sqrt(cut[0] * cut[0] + cut[1] * cut[1] + cut[2] * cut[2])
+    if length <= _ROUNDING:
+        return
+    if s.turn_depth <= 0.0:
+        s.turn_depth = min(length, _MOST_TURN)
+    s.turn_met = s.turn_depth
+    before = np.empty(4)
+    for i in range(4):
+        before[i], s.turned[i] = s.command[3 + i], wanted[i]
+    turn_by(cut, s.command[3:7])
+    align(s)
+    turn_within(before, s.command[3:7], cut)
+    for i in range(3):
+        s.turn_out[i] = -cut[i] / length
+    _anchor_turn(s)
+
+
+@inner
+def align(s: Any) -> None:
+    """Let the hand's present orientation mean that of the command."""
+    inverse = np.empty(4)
+    invert_quaternion(s.tool, inverse)
+    multiply_quaternions(s.command[3:7], inverse, s.alignment)
+
+
+@inner
+def _anchor_turn(s: Any) -> None:
+    """Put the anchor where the hand's orientation is, less the depth."""
+    x, y, z = s.turn_out[0], s.turn_out[1], s.turn_out[2]
+    back = -s.turn_depth
+    rotate_by_vector(s.tool, back * x, back * y, back * z, s.turn_anchor)
+
+
+@inner
+def measure_depth(s: Any, most: float, now_ns: int) -> None:
+    """Measure how far the hand stands against the limit now; beyond it no limit is told.
+
+    Args:
+        s: State record.
+        most: Depth [m] beyond which the limit is dragged along.
+        now_ns: Time [ns].
+    """
+    if s.depth > 0.0:
+        s.depth = 0.0
+        for i in range(3):
+            s.depth += (s.hand[i] - s.anchor[i]) * s.out[i]
+        if s.depth > s.met + _PAST:
+            s.depth = 0.0
+        if s.depth > most:
+            s.depth = most
+            for i in range(3):
+                s.anchor[i] = s.hand[i] - most * s.out[i]
+    if s.turn_depth > 0.0:
+        turn = np.empty(3)
+        turn_within(s.turn_anchor, s.tool, turn)
+        s.turn_depth = turn[0] * s.turn_out[0] + turn[1] * s.turn_out[1] + turn[2] * s.turn_out[2]
+        if s.turn_depth > s.turn_met + _TURN_PAST:
+            s.turn_depth = 0.0
+        if s.turn_depth > _MOST_TURN:
+            s.turn_depth = _MOST_TURN
+            _anchor_turn(s)
+    if s.depth <= 0.0 and s.turn_depth <= 0.0 and now_ns > s.until_ns:
+        s.limit, s.joint = _NONE, -1

@@ -1,0 +1,416 @@
+"""Motion scaling: from the master's pose to the slave's, with modes, clutch and fixture."""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.base.parameters import values_of
+from teleop_core.chain.fixtures import FIXTURES, shape_of
+from teleop_core.chain.mapping.limits import (
+    LIMIT_FIELDS,
+    SENT,
+    SENT_FIELDS,
+    align,
+    draw_back,
+    forget_limits,
+    measure_depth,
+    remember,
+)
+from teleop_core.chain.mapping.parameters import (
+    MODES,
+    FixtureParameters,
+    MotionScalingParameters,
+    ReachForceParameters,
+    axis_map,
+    tool_maps,
+)
+from teleop_core.chain.mapping.plausibility import (
+    PLAUSIBILITY_PARAMETERS,
+    PLAUSIBILITY_STATE,
+    has_lost_buttons,
+    is_plausible,
+)
+from teleop_core.chain.mapping.walls import (
+    WALL_PARAMETERS,
+    WALL_STATE,
+    WALLS,
+    damped_wall,
+    forget_wall,
+    wall_force,
+)
+from teleop_core.graph.signals import DT, STATE, assign
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
+    MASTER_BUTTONS,
+    MASTER_MEASURED_CP,
+    MASTER_SERVO_CF,
+    NO_COMMAND_NS,
+    SLAVE_REACH,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+    TELEOP_STATE,
+)
+from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels.geometry import (
+    Array,
+    multiply_quaternions,
+    rotate_by_vector,
+    turn_within,
+)
+
+_PARAMETERS = [
+    ("gain", "f8", (2,)), ("stylus_tool", "f8", (4,)), ("slave_master", "f8", (4,)),
+    ("axis", "i8", (3,)), ("sign", "f8", (3,)),
+    ("size", "f8", (3,)), *WALL_PARAMETERS, ("timeout_ns", "i8"), ("pause_ns", "i8"),
+    ("rotation_gain", "f8"), ("reach_stiffness", "f8"), ("reach_depth", "f8"),
+    *PLAUSIBILITY_PARAMETERS,
+]  # fmt: skip
+_STATE = [
+    ("buttons", "f8", (3,)), ("is_fine", "i8"), ("is_engaged", "i8"), ("must_latch", "i8"),
+    ("is_fixture_on", "i8"), ("last_ns", "i8"),
+    ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
+    ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
+    *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"),
+]  # fmt: skip
+_FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
+_FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
+_CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
+_LIMIT, _JOINT = STATE["limit"], STATE["limited_joint"]
+# Depth [m] up to which the hand's stand against a limit is measured, where no force is felt.
+_SHALLOW = 2e-3
+# Period [s] that the first sample is taken to have.
+_LONG = 1e-3
+
+
+@kernel
+def to_slave_axes(p: Any, master: Array, slave: Array) -> None:
+    """Write a vector (3,) of the master's base in the slave's axes."""
+    x, y, z = (
+        p.sign[0] * master[p.axis[0]], p.sign[1] * master[p.axis[1]], p.sign[2] * master[p.axis[2]]
+    )  # fmt: skip
+    slave[0], slave[1], slave[2] = x, y, z
+
+
+@kernel
+def mapped_orientation(p: Any, stylus: Array, tool: Array) -> None:
+    """Write the slave tool's quaternion that matches a stylus quaternion, before alignment."""
+    multiply_quaternions(p.slave_master, stylus, tool)
+    multiply_quaternions(tool, p.stylus_tool, tool)
+
+
+@inner
+def _take_tool(p: Any, s: Any, pose: Array, turn: Array) -> None:
+    """Take the orientation that the hand asks for, and, if only a share of it counts, its turn."""
+    if p.rotation_gain == 1.0:
+        mapped_orientation(p, pose[3:7], s.tool)
+        return
+    tool = np.empty(4)
+    mapped_orientation(p, pose[3:7], tool)
+    turn_within(s.tool, tool, turn)
+    for i in range(4):
+        s.tool[i] = tool[i]
+
+
+@inner
+def _toggle_mode(s: Any, buttons: Array) -> None:
+    """Change the mode at the rising edge of its button."""
+    if buttons[2] > s.buttons[2]:
+        s.is_fine = 1 - s.is_fine
+
+
+@inner
+def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
+    """Put the fixture around the present position, or take it away, at the rising edge."""
+    if buttons[1] > s.buttons[1]:
+        s.is_fixture_on = 1 - s.is_fixture_on
+        for i in range(3):
+            s.center[i] = position[i]
+
+
+@inner
+def _latch(s: Any, position: Array) -> None:
+    """Hold the command and measure further motion from here: no step, whatever happened before.
+
+    The fixture goes with the hand, so that it stays where it is around the slave.
+    """
+    if s.is_engaged:
+        for i in range(3):
+            s.center[i] += position[i] - s.master[i]
+    align(s)
+    forget_limits(s)
+
+
+@inner
+def _move(p: Any, s: Any, gain: float, position: Array, turn: Array) -> None:
+    """Add the scaled step of the hand to the command; turn the tool as the stylus."""
+    step = np.empty(3)
+    for i in range(3):
+        step[i] = position[i] - s.master[i]
+    to_slave_axes(p, step, step)
+    for i in range(3):
+        s.command[i] += gain * step[i]
+    if p.rotation_gain == 1.0:
+        multiply_quaternions(s.alignment, s.tool, s.command[3:7])
+    else:
+        x, y, z = turn[0] * p.rotation_gain, turn[1] * p.rotation_gain, turn[2] * p.rotation_gain
+        rotate_by_vector(s.command[3:7], x, y, z, s.command[3:7])
+        align(s)
+    # One Newton step keeps the product of many unit quaternions a unit quaternion.
+    square = 0.0
+    for i in range(3, 7):
+        square += s.command[i] * s.command[i]
+    for i in range(3, 7):
+        s.command[i] *= 1.5 - 0.5 * square
+
+
+@inner
+def _follows(p: Any, s: Any, row: Any) -> bool:
+    """Whether the slave had the last command in force, and the master has not paused since."""
+    pause_ns = row.master_measured_cp_ns - s.last_ns
+    lag_ns = s.last_ns - row.slave_setpoint_cp_ns
+    is_known = row.slave_setpoint_cp_ns > NO_COMMAND_NS and s.last_ns != 0
+    return is_known and pause_ns <= p.pause_ns and lag_ns <= max(p.timeout_ns, 2 * pause_ns)
+
+
+@inner
+def _wall(p: Any, s: Any, fixture: Any, period: float, pose: Array, force: Array) -> None:
+    """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
+    length = 0.0
+    if s.is_fixture_on:
+        for i in range(3):
+            fixture.offset[i] = pose[i] - s.center[i]
+        length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
+    if p.is_damped == 0:
+        wall_force(fixture.out, length, p.stiffness, p.max_force, force)
+        return
+    if period <= 0.0 or period > 1e-9 * p.pause_ns:
+        forget_wall(s, pose)
+        period = _LONG
+    damped_wall(p, s, pose, fixture.out, length, period, force)
+
+
+@inner
+def _push_back(p: Any, s: Any, force: Array) -> None:
+    """Add the push of the slave's limit, in the master's base, to the force (3,) [N]."""
+    push = p.reach_stiffness * s.depth
+    if push > 0.0:
+        for i in range(3):
+            force[p.axis[i]] -= p.sign[i] * push * s.out[i]
+
+
+@inner
+def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
+    """Write teleop_state; the fixture in the slave's base, where it holds the slave in."""
+    state = row.teleop_state
+    state[_FOLLOWING] = 1.0 if is_following else 0.0
+    state[_CLUTCHED], state[_FINE] = s.buttons[0], s.is_fine
+    state[_GAIN], state[_FIXTURE] = gain, s.is_fixture_on
+    for i in range(6):
+        state[_CENTER + i] = 0.0
+    if s.is_fixture_on:
+        offset = np.empty(3)
+        for i in range(3):
+            offset[i] = s.center[i] - s.master[i]
+        to_slave_axes(p, offset, offset)
+        for i in range(3):
+            # Rounded to a nanometre: a fixture that stands still reports no change.
+            state[_CENTER + i] = round((s.command[i] + gain * offset[i]) * 1e9) / 1e9
+            state[_SIZE + i] = gain * p.size[p.axis[i]]
+    state[_LIMIT], state[_JOINT] = s.limit, s.joint
+
+
+@inner
+def _doubt(p: Any, s: Any, sent: Any, row: Any) -> None:
+    """Answer a sample that no hand can have made: hold, push with nothing, begin anew after it."""
+    s.must_latch = 1
+    remember(s, sent, row.master_measured_cp_ns)
+    forget_wall(s, row.master_measured_cp)
+    for i in range(6):
+        row.master_servo_cf[i] = 0.0
+    is_following = _follows(p, s, row)
+    for i in range(7):
+        if not (is_following and s.is_engaged):
+            s.command[i] = row.slave_setpoint_cp[i]
+        row.slave_servo_cp[i] = s.command[i]
+    s.last_ns = row.master_measured_cp_ns
+    _report(p, s, p.gain[s.is_fine], is_following, row)
+
+
+@kernel
+def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: float) -> None:
+    """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        sent: Records of :data:`~teleop_core.chain.mapping.limits.SENT_FIELDS`; written.
+        fixture: :class:`Shape`.
+        row: Signals.
+        dt: Tick [s].
+
+    Position is incremental (X_S += gain X_P), so a change of gain alone moves nothing;
+    orientation follows the stylus absolutely, up to an alignment that is latched whenever the
+    slave is engaged anew. While clutched the command is held; while the slave does not follow it
+    is the slave's own setpoint. What the arm cannot reach is cut off, and motion goes on from
+    there: see :mod:`teleop_core.chain.mapping.limits`.
+
+    Source:
+        Vongbunyong 2008, sections 6.2-6.3.
+    """
+    pose, buttons = row.master_measured_cp, row.master_buttons
+    period = 1e-9 * (row.master_measured_cp_ns - s.last_ns)
+    is_following = _follows(p, s, row)
+    draw_back(s, sent, p.gain[s.is_fine], row)
+    if not is_plausible(p, s, pose, row.master_measured_cp_ns):
+        _doubt(p, s, sent, row)
+        return
+    clutch = 1.0 if has_lost_buttons(p, s, row) else buttons[0]
+    _toggle_mode(s, buttons)
+    gain = p.gain[s.is_fine]
+    turn = np.empty(3)
+    _take_tool(p, s, pose, turn)
+    to_slave_axes(p, pose, s.hand)
+    if not (is_following and s.is_engaged):
+        s.must_latch = 1
+        for i in range(7):
+            s.command[i] = row.slave_setpoint_cp[i]
+    if s.must_latch and s.is_engaged and s.last_ns != 0:
+        s.aligned += 1
+    if s.must_latch or clutch > 0.0 or s.buttons[0] > 0.0:
+        _latch(s, pose)
+    else:
+        _move(p, s, gain, pose, turn)
+        measure_depth(s, p.reach_depth, row.master_measured_cp_ns)
+    _toggle_fixture(s, buttons, pose)
+    s.is_engaged, s.must_latch = 1, 0
+    for i in range(3):
+        s.master[i], s.buttons[i] = pose[i], buttons[i]
+    s.buttons[0] = clutch
+    s.last_ns = row.master_measured_cp_ns
+    remember(s, sent, s.last_ns)
+    _wall(p, s, fixture, period, pose, row.master_servo_cf)
+    _push_back(p, s, row.master_servo_cf)
+    for i in range(7):
+        row.slave_servo_cp[i] = s.command[i]
+    _report(p, s, gain, is_following, row)
+
+
+class Shape(NamedTuple):
+    """The fixture's depth, its numbers, and room to work in."""
+
+    depth: Any
+    numbers: Array
+    offset: Array
+    out: Array
+
+
+class MotionScaling(RunningStage):
+    """Stage that turns master poses into slave poses and fixture forces."""
+
+    def __init__(self, parameters: MotionScalingParameters, dt: float = DT) -> None:
+        super().__init__(MOTION_SCALING, 0, dt)
+        self.changes_itself = True  # its mode, by a button
+        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
+        self._sent = records(SENT_FIELDS, SENT)
+        self._values = parameters
+        self.kernel = motion_scaling_step
+        self._shape = Shape(None, np.empty(0), np.zeros(3), np.zeros(3))
+        self.reset()
+        self.retune(parameters)
+
+    def reset(self) -> None:
+        """Forget the latched poses: the next sample starts from the slave's setpoint."""
+        s, self._told = self.state, (0, 0)
+        assign(s, 0)
+        assign(self._sent, 0)
+        s["is_fine"], s["joint"] = MODES.index(self._values.mode), -1
+        s["command"][3] = s["alignment"][0] = s["tool"][0] = s["turned"][0] = 1.0
+
+    def retune(self, parameters: MotionScalingParameters) -> None:
+        """Take new parameters from the next sample on; nothing moves. A new mode is switched to."""
+        p, fixture = self.parameters, parameters.fixture
+        p["gain"] = parameters.coarse_gain, parameters.fine_gain
+        axes = axis_map("axes", parameters.axes)
+        p["slave_master"], p["stylus_tool"] = tool_maps(parameters)
+        p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
+        self._take_fixture(fixture)
+        wall = WALLS[fixture.wall]
+        p["stiffness"] = wall.spring(fixture.stiffness, fixture.max_force)
+        p["max_force"], p["damping"] = fixture.max_force, fixture.damping
+        p["is_damped"] = wall.is_damped
+        p["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
+        p["pause_ns"] = round(parameters.longest_pause * 1e9)
+        p["rotation_gain"] = parameters.rotation_gain
+        hand = parameters.plausible
+        p["hand_speed"], p["hand_acceleration"] = hand.speed, hand.acceleration
+        p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
+        p["silence_ns"] = round(hand.button_silence * 1e9)
+        self._take_reach_force(parameters.reach_force)
+        if parameters.mode != self._values.mode:
+            self.state["is_fine"] = MODES.index(parameters.mode)
+        turned = ("tool_roll", "axes", "tool_axes")
+        if any(getattr(parameters, name) != getattr(self._values, name) for name in turned):
+            self.state["must_latch"] = 1  # align anew: the tool does not turn
+        self._values = parameters
+
+    def present(self) -> MotionScalingParameters:
+        """Parameters as they are now: the mode button changes the mode."""
+        mode = MODES[int(self.state["is_fine"])]
+        if mode != self._values.mode:
+            self._values = replace(self._values, mode=mode)
+        return self._values
+
+    def _take_reach_force(self, force: ReachForceParameters) -> None:
+        stiffness = force.stiffness if force.is_on else 0.0
+        depth = force.max_force / stiffness if stiffness * force.max_force > 0.0 else _SHALLOW
+        self.parameters["reach_stiffness"] = stiffness if force.max_force > 0.0 else 0.0
+        self.parameters["reach_depth"] = depth
+
+    def _take_fixture(self, fixture: FixtureParameters) -> None:
+        kind, numbers = FIXTURES.find(fixture.kind.kind), shape_of(fixture.kind.parameters)
+        self.parameters["size"] = kind.size(fixture.kind.parameters)
+        depth = kind.depth_pointer
+        if depth is self._shape.depth and len(numbers) == len(self._shape.numbers):
+            self._shape.numbers[:] = numbers  # the tick that is composed already goes on
+            return
+        self._shape = self._shape._replace(depth=depth, numbers=numbers)
+        self.arguments = (self.parameters, self.state, self._sent, self._shape)
+        self._bound = None
+
+    def fall_silent(self) -> None:
+        """Tell that nothing is followed, for no sample came for long."""
+        self.signals["teleop_state"][_FOLLOWING] = 0.0
+
+    def concerns(self) -> list[str]:
+        """Samples that no hand can have made, and buttons that fell silent, in words."""
+        found, told = [], self._told
+        count, aligned = self._told = int(self.state["implausible"]), int(self.state["aligned"])
+        if count > told[0]:
+            found.append(f"held {count - told[0]} samples of the master that no hand can make")
+        elif aligned > told[1]:
+            found.append(
+                "aligned hand and slave anew, which shifts the one against the other, "
+                f"{aligned - told[1]} times: the master paused, or the slave did not follow"
+            )
+        if self.state["is_lost"]:
+            found.append("the buttons fell silent: holds as if clutched")
+        return found
+
+    def described(self) -> dict[str, str]:
+        """Kind and numbers of the fixture, as teleop/state reports them beside its columns."""
+        kind = self._values.fixture.kind
+        numbers = values_of(kind.parameters)
+        return {"fixture": kind.kind} | {f"fixture.{n}": repr(v) for n, v in numbers.items()}
+
+
+MOTION_SCALING = Stage(
+    "motion_scaling",
+    MotionScalingParameters,
+    reads=(MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SETPOINT_CP, SLAVE_REACH),
+    writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE),
+    late=(SLAVE_SETPOINT_CP, SLAVE_REACH),
+    trigger=MASTER_MEASURED_CP,
+    needs=(SLAVE_SETPOINT_CP,),
+    make=MotionScaling,
+)

@@ -1,0 +1,113 @@
+"""Plausibility: samples that no hand can have made move nothing.
+
+A sample is measured against the one before. What is too fast, too sudden or too far away holds the
+command, as a pressed clutch does; from the next plausible sample on the hand is followed again,
+from where it is then. So a teleport moves nothing, and neither do random poses.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlausibilityParameters:
+    """What a hand on the master can do."""
+
+    speed: float = parameter(
+        3.0, unit="m/s", lower=0.01, upper=1000.0, doc="largest speed of the stylus",
+        source="assumed: across the Phantom's workspace in a twentieth of a second",
+    )  # fmt: skip
+    acceleration: float = parameter(
+        1000.0, unit="m/s²", lower=1.0, upper=1e6, doc="largest acceleration of the stylus",
+        source="assumed: ten times that of a fast arm, for one reading step in 1 ms is 55 m/s²",
+    )  # fmt: skip
+    turn: float = parameter(
+        60.0, unit="rad/s", lower=0.1, upper=1e4, doc="largest speed of its turn",
+        source="assumed: three times that of a fast wrist",
+    )  # fmt: skip
+    reach: float = parameter(
+        2.0, unit="m", lower=0.01, upper=100.0, doc="farthest stylus from the master's base",
+        source="assumed: longer than an arm",
+    )  # fmt: skip
+    button_silence: float = parameter(
+        0.5, unit="s", lower=0.0, upper=60.0,
+        doc="a stream of buttons that fell silent for longer counts as a pressed clutch; 0: never",
+    )  # fmt: skip
+
+
+PLAUSIBILITY_PARAMETERS = [
+    ("hand_speed", "f8"), ("hand_acceleration", "f8"), ("hand_turn", "f8"), ("hand_reach", "f8"),
+    ("silence_ns", "i8"),
+]  # fmt: skip
+PLAUSIBILITY_STATE = [
+    ("raw", "f8", (7,)), ("raw_rate", "f8", (3,)), ("raw_ns", "i8"), ("implausible", "i8"),
+    ("is_doubted", "i8"), ("is_lost", "i8"), ("in_row", "i8"), ("buttons_ns", "i8"),
+]  # fmt: skip
+# Samples that come faster than this [s] are taken to be so far apart: stamps may be uneven.
+_SHORTEST = 1e-3
+# So many messages no farther apart than this are a stream [ns].
+_STREAM, _STREAM_NS = 20, 100_000_000
+
+
+@inner
+def is_plausible(p: Any, s: Any, pose: Array, stamp_ns: int) -> bool:
+    """Whether a hand can have come from the last sample to this one; counts those that cannot.
+
+    Args:
+        p: Record with :data:`PLAUSIBILITY_PARAMETERS`, and ``pause_ns``, after which anything is.
+        s: Record with :data:`PLAUSIBILITY_STATE`; written.
+        pose: Sample (7,).
+        stamp_ns: Its stamp [ns].
+    """
+    elapsed_ns = stamp_ns - s.raw_ns
+    period = max(1e-9 * elapsed_ns, _SHORTEST)
+    is_first = s.raw_ns == 0 or elapsed_ns > p.pause_ns
+    far, fast, sudden = 0.0, 0.0, 0.0
+    for i in range(3):
+        rate = 0.0 if is_first else (pose[i] - s.raw[i]) / period
+        change = 0.0 if is_first or s.is_doubted else (rate - s.raw_rate[i]) / period
+        far += pose[i] * pose[i]
+        fast += rate * rate
+        sudden += change * change
+        s.raw_rate[i] = rate
+    turn = 0.0 if is_first else _turn(s.raw[3:7], pose[3:7]) / period
+    is_sound = (
+        math.sqrt(far) <= p.hand_reach and math.sqrt(fast) <= p.hand_speed
+        and math.sqrt(sudden) <= p.hand_acceleration and turn <= p.hand_turn
+    )  # fmt: skip
+    for i in range(7):
+        s.raw[i] = pose[i]
+    s.raw_ns = stamp_ns
+    if not is_sound:
+        s.implausible += 1
+    s.is_doubted = 0 if is_sound else 1
+    return is_sound
+
+
+@inner
+def _turn(before: Array, after: Array) -> float:
+    """Angle between two orientations [rad]."""
+    cosine = 0.0
+    for i in range(4):
+        cosine += before[i] * after[i]
+    return 2.0 * math.acos(min(abs(cosine), 1.0))
+
+
+@inner
+def has_lost_buttons(p: Any, s: Any, row: Any) -> bool:
+    """Whether the buttons came as a stream and are silent now: nobody can tell a pressed clutch.
+
+    Masters that send them where they change only have no stream of them.
+    """
+    stamp_ns = row.master_buttons_ns
+    if stamp_ns != s.buttons_ns:
+        s.in_row = s.in_row + 1 if stamp_ns - s.buttons_ns <= _STREAM_NS else 0
+        s.buttons_ns = stamp_ns
+    silence_ns = row.master_measured_cp_ns - stamp_ns
+    s.is_lost = 1 if s.in_row >= _STREAM and 0 < p.silence_ns < silence_ns else 0
+    return bool(s.is_lost)

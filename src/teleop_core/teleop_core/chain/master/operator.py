@@ -1,0 +1,265 @@
+"""Operator: who holds the stylus, moves it and presses its buttons, and sees what a person gets."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from teleop_core.base.errors import PartError, TeleopError
+from teleop_core.chain.operators import OPERATORS, Seen, Setting
+from teleop_core.chain.operators.follower import MOST, WANTED
+from teleop_core.chain.operators.parameters import PRESS_TIME, OperatorParameters
+from teleop_core.chain.operators.remote import RemoteHand
+from teleop_core.chain.operators.rest import REST_POSITION, rest_pose
+from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.graph.signals import DT, STATE, assign
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
+    HAND_BUTTONS,
+    HAND_SERVO_CP,
+    HAND_TREMOR,
+    MASTER_MEASURED_CF,
+    MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CP,
+    TELEOP_STATE,
+)
+from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels.geometry import Array, rotate_by_vector
+
+BLOCK = 1000
+"""Ticks for which the wanted motion and the tremor are drawn at once, at most."""
+_PARAMETERS = [("tremor", "f8"), ("frequency", "f8"), ("patience_ns", "i8")]
+_STATE = [
+    ("phase", "f8", (3,)), ("wander", "f8", (3,)), ("next", "i8"), ("next_noise", "i8"),
+    ("has_begun", "i8"), ("first_ns", "i8"),
+]  # fmt: skip
+_IS_FOLLOWING = STATE["is_following"]
+
+
+@inner
+def _begins(p: Any, s: Any, row: Any) -> bool:
+    """Whether the operator moves the hand: since the slave first followed, or lost patience.
+
+    A state that is older than the first sample is about another master.
+    """
+    if s.first_ns == 0:
+        s.first_ns = row.now_ns
+    is_about_us = row.teleop_state_ns >= s.first_ns
+    if is_about_us and row.teleop_state[_IS_FOLLOWING] > 0.0:
+        s.has_begun = 1
+    if row.now_ns - s.first_ns >= p.patience_ns:
+        s.has_begun = 1
+    return s.has_begun > 0
+
+
+@inner
+def tremble(p: Any, s: Any, noise: Array, tremor: Array, dt: float) -> None:
+    """Write the wanted tremor (3,) [m]: one line per axis whose frequency wanders in its band."""
+    for i in range(3):
+        # Ornstein-Uhlenbeck process of unit variance and half a second of memory.
+        s.wander[i] += -s.wander[i] * (dt / 0.5) + noise[i] * math.sqrt(2.0 * dt / 0.5)
+        width = min(2.0, p.frequency - 8.0, 12.0 - p.frequency)
+        s.phase[i] += 2.0 * math.pi * dt * (p.frequency + width * math.tanh(s.wander[i]))
+        tremor[i] = p.tremor * math.sin(s.phase[i])
+
+
+@kernel
+def operator_step(p: Any, s: Any, wanted: Any, noises: Any, row: Any, dt: float) -> None:
+    """One tick: write where the hand is wanted, its tremor and the buttons.
+
+    Until the slave follows the hand rests, as a person's would: none of its motion is lost.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        wanted: What is wanted, now and in the coming ticks, record by record: ``wanted`` (3,) [m]
+            in the master's base, ``attitude`` of the stylus, quaternion (4,), ``buttons`` (3,):
+            clutch, fixture, mode, and ``tremor`` (3,) [m], which the tip makes whatever friction
+            and force are.
+        noises: Standard normal numbers of the coming ticks (N, 6), of which x, y, z shake the hand.
+        row: Signals.
+        dt: Tick [s].
+    """
+    if _begins(p, s, row):
+        s.next += 1
+    now, tremor = wanted[s.next], np.empty(3)
+    tremble(p, s, noises[s.next_noise], tremor, dt)
+    s.next_noise += 1
+    for i in range(3):
+        row.hand_servo_cp[i] = now.wanted[i] + tremor[i]
+        row.hand_tremor[i] = now.tremor[i]
+        row.hand_buttons[i] = now.buttons[i]
+    for i in range(4):
+        row.hand_servo_cp[3 + i] = now.attitude[i]
+
+
+class RunningOperator(RunningStage):
+    """Stage of the operator.
+
+    The same parameters give the same motion, bit for bit, of whoever does not answer to what is
+    seen.
+
+    Args:
+        parameters: Who it is.
+        dt: Length of a tick [s].
+
+    Raises:
+        TeleopError: The operator cannot be made, as one whose recording is missing.
+    """
+
+    def __init__(self, parameters: OperatorParameters, dt: float = DT) -> None:
+        super().__init__(OPERATOR, 0, dt)
+        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
+        # The first record of what is wanted is that of the present tick.
+        self._wanted, self._noises = records(WANTED, BLOCK + 1), np.zeros((BLOCK, 6))
+        self._fixed = parameters
+        self.kernel = operator_step
+        self.arguments = (self.parameters, self.state, self._wanted, self._noises)
+        self.retune(parameters)
+        self.reset()
+
+    def reset(self) -> None:
+        """Stylus in the inkwell, at time zero, with the random numbers of the seed."""
+        fixed, row = self._fixed, self.signals
+        self._rng = np.random.default_rng(fixed.seed)
+        phases = self._rng.uniform(0.0, 2.0 * math.pi, PHASES)
+        self._operator = OPERATORS.find(fixed.kind.kind)
+        self.ahead = min(self._operator.ahead, BLOCK)
+        seen = Seen(*(row[topic.field] for topic in OPERATOR.reads))
+        setting = Setting(fixed, phases, fixed.seed, seen)
+        self._motion = self._asked(self._operator.make, fixed.kind.parameters, setting)
+        buttons = fixed.buttons
+        has_presses = bool(buttons.clutch or buttons.fixture or buttons.mode)
+        self._person = None if has_presses else self.hand
+        self._tick, self._end, self._end_of_noise = 0, 1, 0
+        assign(self.state, 0)
+        now, rest = self._wanted[0], rest_pose()
+        self._rest = rest[3:]
+        now["wanted"], now["attitude"], now["buttons"] = rest[:3], rest[3:], 0.0
+        now["tremor"] = 0.0
+        row[HAND_SERVO_CP.field], row[MASTER_MEASURED_CP.field] = rest, rest
+        row[HAND_BUTTONS.field] = row[HAND_TREMOR.field] = 0.0
+
+    def retune(self, parameters: OperatorParameters) -> None:
+        """Take new tremor and patience from the next tick on; the motion goes on."""
+        p, operator = self.parameters, OPERATORS.find(self._fixed.kind.kind)
+        p["tremor"] = 0.0 if operator.trembles else parameters.tremor_amplitude
+        p["frequency"] = parameters.tremor_frequency
+        p["patience_ns"] = round(parameters.patience * 1e9)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the hand is moved yet."""
+        return bool(self.state["has_begun"])
+
+    @property
+    def hand(self) -> RemoteHand | None:
+        """Hand of a person, to be told where the stylus shall be; None if the operator has none.
+
+        After :meth:`reset` it is another one.
+        """
+        return self._motion if isinstance(self._motion, RemoteHand) else None
+
+    def prepare(self, ticks: int) -> None:
+        """Draw what is wanted in the next ticks, as far ahead as the operator can be asked."""
+        self._prepare_noise(ticks)
+        now = int(self.state["next"])
+        left = self._end - now  # with the record of the present tick
+        if left > ticks:
+            return
+        self._wanted[:left] = self._wanted[now : self._end]
+        self._end = max(ticks, min(left - 1 + self._operator.ahead, BLOCK)) + 1
+        self.state["next"] = 0
+        self._draw(self._wanted[left : self._end])
+
+    def _prepare_noise(self, ticks: int) -> None:
+        first = int(self.state["next_noise"])
+        left = self._end_of_noise - first
+        if left >= ticks:
+            return
+        self._noises[:left] = self._noises[first : self._end_of_noise]
+        self._end_of_noise = BLOCK
+        self.state["next_noise"] = 0
+        self._noises[left:] = self._rng.standard_normal((BLOCK - left, 6))
+
+    def _draw(self, drawn: Any) -> None:
+        """Fill records with what the operator wants in the ticks that follow."""
+        count = len(drawn)
+        if self._person is not None and count <= MOST:  # faster than by way of turns
+            drawn[:] = self._person.draw((self._tick + 1) * self.dt, self.dt, count)
+            self._tick += count
+            return
+        times = np.arange(self._tick + 1, self._tick + count + 1, dtype=np.float64) * self.dt
+        self._tick += count
+        moves = self._moves(times)
+        drawn["wanted"] = moves[:, :3] + REST_POSITION
+        attitudes = np.empty((count, 4))
+        _turn_all(self._rest, np.ascontiguousarray(moves[:, 3:6]), attitudes)
+        drawn["attitude"] = attitudes
+        drawn["buttons"] = np.maximum(self._pressed(times), moves[:, 6:9])
+        drawn["tremor"] = moves[:, 9:]
+
+    def _moves(self, times: Array) -> Array:
+        """Motion, buttons and tremor (N, 12) of the operator.
+
+        Raises:
+            PartError: What he answers has another shape, or is not finite.
+        """
+        name = self._fixed.kind.kind
+        moves = np.asarray(self._asked(self._motion, times))
+        if moves.dtype.kind not in "fiub":
+            raise PartError("operator", name, f"one who answers numbers, not {moves.dtype}")
+        moves = moves.astype(np.float64)
+        if moves.shape not in {(len(times), columns) for columns in (3, 6, 9, 12)}:
+            text = f"one who answers (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
+            raise PartError("operator", name, text)
+        if not np.isfinite(moves).all():
+            bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]
+            raise PartError("operator", name, f"one who answers finite numbers; at {bad:g} s not")
+        if moves.shape[1] == 12:
+            return moves
+        return np.pad(moves, ((0, 0), (0, 12 - moves.shape[1])))
+
+    def _asked(self, question: Callable[..., Any], *arguments: Any) -> Any:
+        """What the operator answers.
+
+        Raises:
+            PartError: He raises; an error of ours is passed on as it is.
+        """
+        try:
+            return question(*arguments)
+        except TeleopError:
+            raise
+        except Exception as error:  # whatever a foreign operator raises, one line names him
+            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            text = "one with make(parameters, setting) -> motion and motion(times) -> rows"
+            name = self._fixed.kind.kind
+            raise PartError("operator", name, f"{text}; it raises {reason}") from error
+
+    def _pressed(self, times: Array) -> Array:
+        buttons = self._fixed.buttons
+        pressed = np.zeros((len(times), 3))
+        pressed[:, 0] = np.searchsorted(buttons.clutch, times, side="right") % 2
+        for column, presses in ((1, buttons.fixture), (2, buttons.mode)):
+            for start in presses:
+                pressed[(times >= start) & (times < start + PRESS_TIME), column] = 1.0
+        return pressed
+
+
+@kernel
+def _turn_all(rest: Array, turns: Array, attitudes: Array) -> None:
+    """Write the rest attitude turned by each rotation vector (N, 3) into ``attitudes`` (N, 4)."""
+    for i in range(turns.shape[0]):
+        rotate_by_vector(rest, turns[i, 0], turns[i, 1], turns[i, 2], attitudes[i])
+
+
+OPERATOR = Stage(
+    "operator",
+    OperatorParameters,
+    reads=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE),
+    writes=(HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR),
+    late=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE),
+    make=RunningOperator,
+    node="teleop_core.nodes.operator:OperatorNode",
+)

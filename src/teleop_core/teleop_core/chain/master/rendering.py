@@ -1,0 +1,62 @@
+"""Rendering: what the device makes of a commanded force, by its peak and its warmth."""
+
+import math
+from typing import Any
+
+from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
+
+# The peak force falls to the continuous one while the motors take up the last quarter of the heat
+# that they bear.
+_LAST = 0.25
+
+RENDERING_PARAMETERS = [("peak_force", "f8"), ("continuous", "f8"), ("warming", "f8")]
+RENDERING_STATE = [("heat", "f8")]
+
+
+@inner
+def largest_force(p: Any, s: Any) -> float:
+    """Force that the device can apply in this tick [N].
+
+    The heat of the motors is the mean square of the force, taken by a first-order lag: a balance of
+    Joule heat and cooling. It never exceeds the square of the continuous force. Up to three
+    quarters of that the peak force is there; then the square of what is there falls in proportion
+    to what is left, so that a command that stays ends at the continuous force.
+
+    Args:
+        p: Record with :data:`RENDERING_PARAMETERS`.
+        s: Record with :data:`RENDERING_STATE`.
+    """
+    bearable = p.continuous * p.continuous
+    if p.continuous >= p.peak_force:
+        return p.peak_force
+    left = max(bearable - s.heat, 0.0)
+    square = bearable + (p.peak_force * p.peak_force - bearable) * min(
+        left / (_LAST * bearable), 1.0
+    )
+    # Long ticks beside a short time constant: no more than fills what is left.
+    return math.sqrt(min(square, s.heat + left / p.warming))
+
+
+@inner
+def render(p: Any, s: Any, command: Array, force: Array) -> float:
+    """Write the force (3,) [N] that the device applies for a command (3,) [N], and warm it.
+
+    Args:
+        p: Record with :data:`RENDERING_PARAMETERS`.
+        s: Record with :data:`RENDERING_STATE`; written.
+        command: What is asked for.
+        force: What is applied: in the direction of the command.
+
+    Returns:
+        The largest force that was possible [N].
+    """
+    most = largest_force(p, s)
+    size = math.sqrt(command[0] ** 2 + command[1] ** 2 + command[2] ** 2)
+    share = 1.0 if size <= most else most / size
+    square = 0.0
+    for i in range(3):
+        force[i] = share * command[i]
+        square += force[i] * force[i]
+    s.heat += (square - s.heat) * p.warming
+    return most

@@ -1,0 +1,165 @@
+"""Follower: a stylus that follows wanted poses smoothly, with a stated delay and bounded motion.
+
+Place and attitude each follow as a critically damped system of second order. What it wants to do
+is bounded: its speed, its acceleration, and the room that it stays in. So no jump of what is wanted
+ever comes out as one.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from teleop_core.kernels import bound, inner, kernel, records
+from teleop_core.kernels.geometry import Array, turn_between, turn_by
+
+MOST = 4
+"""Ticks for which it can be asked at once: what is wanted is so much later at most."""
+WANTED = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("buttons", "f8", (3,)),
+          ("tremor", "f8", (3,))]  # fmt: skip
+"""Fields of what a hand wants in a tick: place [m] and attitude of the stylus, quaternion, in the
+master's base; clutch, fixture, mode, 1 pressed; and tremor [m]."""
+_BOUNDS = [
+    ("rate", "f8"), ("speed", "f8"), ("acceleration", "f8"), ("turn_speed", "f8"),
+    ("turn_acceleration", "f8"), ("low", "f8", (3,)), ("high", "f8", (3,)),
+]  # fmt: skip
+_STATE = [
+    ("time", "f8"), ("next", "f8"), ("tick", "f8"), ("pose", "f8", (7,)),
+    ("velocity", "f8", (3,)), ("turning", "f8", (3,)), ("target", "f8", (7,)),
+    ("buttons", "f8", (3,)),
+]  # fmt: skip
+
+
+@kernel
+def follow(b: Any, s: Any, rows: Any) -> None:
+    """Follow the target for some ticks, and write where the stylus is in each.
+
+    Args:
+        b: Bounds: ``rate`` [1/s], twice the inverse of the delay; largest speeds and accelerations
+            [m/s, m/s², rad/s, rad/s²]; and the room's corners ``low`` and ``high`` (3,) [m] in the
+            master's base.
+        s: State: ``time`` [s], ``pose`` (7,), its velocities, the ``target`` (7,), the ``buttons``
+            (3,), the time of the ``next`` tick and the length of each, ``tick`` [s]; written.
+        rows: Records (N,) of :data:`WANTED`; written, but for the tremor.
+    """
+    gap, turn = np.empty(3), np.empty(3)
+    for k in range(rows.shape[0]):
+        row, h = rows[k], max(s.next - s.time, 0.0)
+        s.time += h
+        s.next += s.tick
+        for i in range(3):
+            gap[i] = min(max(s.target[i], b.low[i]), b.high[i]) - s.pose[i]
+        turn_between(s.pose[3:7], s.target[3:7], turn)
+        _approach(gap, s.velocity, b.rate, b.speed, b.acceleration, h)
+        _approach(turn, s.turning, b.rate, b.turn_speed, b.turn_acceleration, h)
+        for i in range(3):
+            place = s.pose[i] + h * s.velocity[i]
+            s.pose[i] = min(max(place, b.low[i]), b.high[i])
+            turn[i] = h * s.turning[i]
+        turn_by(turn, s.pose[3:7])
+        _normalise(s.pose[3:7])
+        for i in range(3):
+            row.wanted[i] = s.pose[i]
+            row.buttons[i] = s.buttons[i]
+        for i in range(4):
+            row.attitude[i] = s.pose[3 + i]
+
+
+@inner
+def _approach(
+    gap: Array, velocity: Array, rate: float, fastest: float, hardest: float, h: float
+) -> None:
+    """Change a velocity (3,) over ``h`` [s] so that it closes a gap (3,) at critical damping.
+
+    The velocity that it goes for is such that half of the acceleration allowed can end it in time.
+    """
+    far = math.sqrt(gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2])
+    fast = min(0.5 * rate * far, fastest, math.sqrt(0.5 * hardest * far))
+    share = fast / far if far > 0.0 else 0.0
+    change, square = np.empty(3), 0.0
+    for i in range(3):
+        change[i] = min(2.0 * rate * h, 1.0) * (share * gap[i] - velocity[i])
+        square += change[i] * change[i]
+    most, size = hardest * h, math.sqrt(square)
+    cut = most / size if size > most else 1.0
+    for i in range(3):
+        velocity[i] += cut * change[i]
+
+
+@inner
+def _normalise(quaternion: Array) -> None:
+    square = 0.0
+    for i in range(4):
+        square += quaternion[i] * quaternion[i]
+    for i in range(4):
+        quaternion[i] /= math.sqrt(square)
+
+
+class Follower:
+    """Stylus that goes where it is wanted.
+
+    Args:
+        delay: How far it is behind a steady motion [s], > 0.
+        speed: Largest speeds of place and turn [m/s, rad/s].
+        acceleration: Their largest accelerations [m/s², rad/s²].
+        start: Pose (7,) that it starts at rest in: place [m], quaternion w, x, y, z.
+        room: Corners low and high (3,) [m] of the box that it stays in.
+    """
+
+    def __init__(
+        self,
+        delay: float,
+        speed: tuple[float, float],
+        acceleration: tuple[float, float],
+        start: Array,
+        room: tuple[Array, Array],
+    ) -> None:
+        self._bounds, self._state = records(_BOUNDS)[0], records(_STATE)[0]
+        b, s = self._bounds, self._state
+        b["rate"] = 2.0 / delay
+        b["speed"], b["turn_speed"] = speed
+        b["acceleration"], b["turn_acceleration"] = acceleration
+        b["low"], b["high"] = room
+        s["pose"] = s["target"] = start
+        self._rows = [records(WANTED, count) for count in range(MOST + 1)]
+        self._follow = [bound(follow, b, s, rows) for rows in self._rows]
+
+    @property
+    def time(self) -> float:
+        """Time that it has come to [s]."""
+        return float(self._state["time"])
+
+    @property
+    def pose(self) -> Array:
+        """Where it is now (7,); a copy."""
+        return np.array(self._state["pose"])
+
+    def aim(self, pose: Array) -> None:
+        """Go for a pose (7,) from now on."""
+        self._state["target"] = pose
+
+    def brake(self) -> None:
+        """Come to rest from now on, as soon as it can without coming back."""
+        s, b = self._state, self._bounds
+        s["target"] = s["pose"]
+        s["target"][:3] += s["velocity"] / b["rate"]
+        turn_by(s["turning"] / b["rate"], s["target"][3:])
+
+    def press(self, buttons: tuple[bool, ...]) -> None:
+        """Show buttons clutch, fixture and mode from now on."""
+        self._state["buttons"] = buttons
+
+    def go_on(self, first: float, tick: float, count: int) -> Any:
+        """Go on for some ticks.
+
+        Args:
+            first: Time of the first one [s], not before :attr:`time`.
+            tick: Time from one to the next [s].
+            count: How many, 1 to :data:`MOST`.
+
+        Returns:
+            Records (count,) of :data:`WANTED`, which the next call writes again.
+        """
+        self._state["next"], self._state["tick"] = first, tick
+        self._follow[count]()
+        return self._rows[count]

@@ -1,0 +1,3 @@
+"""Graph: stages, topics and links: the one description of what runs."""
+
+from teleop_core.graph import topics as topics  # for tc.topics

@@ -1,0 +1,344 @@
+"""Graph: stages, the links between them and the arms: the one description of what runs.
+
+Virtual time, replay, nodes, recorder, evaluation and diagrams derive everything from it: the order
+of a tick, which topic feeds which port, what is delayed, what is summed.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
+from teleop_core.graph.stage import STAGES, Stage
+from teleop_core.graph.topics import Kind, Topic
+
+__all__ = [
+    "BUILT_IN",
+    "DEVICE",
+    "HAND",
+    "RECORDER_NAME",
+    "Delay",
+    "Graph",
+    "Link",
+    "Member",
+    "build_graph",
+]
+
+BUILT_IN = (
+    "operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim"
+)  # fmt: skip
+"""Names of the stages that every arm has."""
+HAND, DEVICE = BUILT_IN[:2]
+"""Stages with whose recorded output a replay may begin."""
+RECORDER_NAME = "recorder"
+
+
+@dataclass(frozen=True)
+class Member:
+    """A stage of one arm; ``arm`` is its namespace, empty for the default arm."""
+
+    stage: Stage
+    arm: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name of the node, with its namespace: ``left/slave``."""
+        return f"{self.arm}/{self.stage.name}" if self.arm else self.stage.name
+
+    @property
+    def writes(self) -> tuple[Topic, ...]:
+        """Topics it writes, in its namespace."""
+        return tuple(topic.of_arm(self.arm) for topic in self.stage.writes)
+
+
+@dataclass(frozen=True)
+class Link:
+    """One topic on its way from writer to reader.
+
+    Attributes:
+        topic: The topic, in its namespace.
+        writer: Who writes it.
+        reader: Who reads it.
+        port: Where it arrives: the topic that the reading stage declares.
+        delay: Time on the way [s], beside that of a tick for late links.
+        is_late: Whether the reader gets it as it was at the end of the last tick.
+        adds: Whether it is added to what else arrives at the port.
+    """
+
+    topic: Topic
+    writer: Member
+    reader: Member
+    port: Topic
+    delay: float = 0.0
+    is_late: bool = False
+    adds: bool = False
+
+
+@dataclass(frozen=True)
+class Delay:
+    """A delay on a link: of a topic, on its way to one reader or to all."""
+
+    topic: str
+    seconds: float
+    reader: str = ""
+
+    @staticmethod
+    def parse(text: str) -> "Delay":
+        """Delay from ``topic=seconds`` or ``topic@reader=seconds``.
+
+        Raises:
+            ParameterError: It has another form, or the time is negative or no number.
+        """
+        link, equals, time = text.partition("=")
+        topic, _, reader = link.strip().partition("@")
+        try:
+            seconds = float(time)
+        except ValueError:
+            seconds = -1.0
+        if not equals or not topic or not 0.0 <= seconds <= 60.0:
+            form = "topic=seconds or topic@reader=seconds, from 0 to 60 s: slave/servo_jp=0.02"
+            raise ParameterError("teleop.delays", text, form)
+        return Delay(topic.removeprefix("/"), seconds, reader)
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Stages, arms and delays, checked.
+
+    Attributes:
+        stages: Stages of every arm; the order decides where the data does not.
+        arms: Names of the arms; the first is the default one, whose topics have plain names.
+        delays: Delays on links.
+
+    Raises:
+        PartError: It cannot run; the text names the stage and what was expected.
+    """
+
+    stages: tuple[Stage, ...]
+    arms: tuple[str, ...] = ("",)
+    delays: tuple[Delay, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot run, before anything does."""
+        for kind, names in (("arm", self.arms), ("stage", [s.name for s in self.stages])):
+            for name in names:
+                if list(names).count(name) > 1:
+                    raise PartError(kind, name, "named once; two have this name")
+        for arm in self.arms[1:]:
+            if not (arm.isidentifier() and arm.isascii()):
+                text = "a name of letters, digits and _ that does not begin with a digit"
+                raise PartError("arm", arm, text)
+        self._check_writers()
+        self._check_fields()
+        self._check_delays()
+        _ = self.members
+
+    @property
+    def namespaces(self) -> tuple[str, ...]:
+        """Namespace of each arm: empty for the default one."""
+        return ("", *self.arms[1:])
+
+    def _all(self) -> Iterator[Member]:
+        for arm in self.namespaces:
+            for stage in self.stages:
+                yield Member(stage, arm)
+
+    # -- checks ----------------------------------------------------------------------------------
+
+    def _check_writers(self) -> None:
+        writers: dict[str, Stage] = {}
+        for stage in self.stages:
+            for topic in stage.writes:
+                if topic.name in writers:
+                    text = f"the only one that writes {topic.name}; {writers[topic.name].name} does"
+                    raise PartError("stage", stage.name, text)
+                writers[topic.name] = stage
+        for stage in self.stages:
+            for topic in stage.reads:
+                if topic.name not in writers and not self._adding(topic):
+                    have = ", ".join(sorted(writers)) or "nothing"
+                    text = f"given {topic.name}, which no stage writes; there is {have}"
+                    raise PartError("stage", stage.name, text)
+
+    def _check_fields(self) -> None:
+        """Refuse two topics or notes that would share a column of the rows of a session."""
+        owners: dict[str, str] = {}
+        for stage in self.stages:
+            fields = [name for t in stage.writes for name in (t.field, f"{t.field}_ns")]
+            for name in [*fields, *(note[0] for note in stage.notes)]:
+                if name in owners:
+                    text = f"one without the topic or note {name}, a name that {owners[name]} uses"
+                    raise PartError("stage", stage.name, text)
+                owners[name] = stage.name
+
+    def _adding(self, topic: Topic) -> list[tuple[Stage, Topic]]:
+        """Other topics that are added to this one, with who writes them."""
+        return [(s, t) for s in self.stages for t in s.writes if t.adds_to == topic.name]
+
+    def _check_delays(self) -> None:
+        known = {topic.name for topic in self.topics}
+        readers = {stage.name for stage in self.stages}
+        for delay in self.delays:
+            if delay.topic not in known:
+                raise UnknownNameError("delayed topic", delay.topic, sorted(known))
+            if delay.reader and delay.reader not in readers:
+                raise UnknownNameError("reader of a delayed topic", delay.reader, sorted(readers))
+            if not any(link.delay for link in self.links if link.topic.name == delay.topic) and (
+                delay.seconds > 0.0
+            ):
+                text = f"one that reads {delay.topic}"
+                raise PartError("delayed stage", delay.reader or "?", text)
+
+    # -- what follows from it --------------------------------------------------------------------
+
+    @cached_property
+    def topics(self) -> tuple[Topic, ...]:
+        """All topics that stages write, arm by arm."""
+        return tuple(topic for member in self._all() for topic in member.writes)
+
+    @property
+    def streams(self) -> tuple[Topic, ...]:
+        """Those with one message per step."""
+        return tuple(topic for topic in self.topics if topic.kind is not Kind.REPORT)
+
+    @cached_property
+    def links(self) -> tuple[Link, ...]:
+        """All links, reader by reader; at one port the link that others add to comes first."""
+        return tuple(
+            link
+            for member in self._all()
+            for port in member.stage.reads
+            for link in self._links_to(member, port)
+        )
+
+    def _links_to(self, reader: Member, port: Topic) -> Iterator[Link]:
+        source = self._source(reader.stage, port)
+        feeds = [(*source, False)] if source is not None else []
+        feeds += [(*found, bool(feeds) or i > 0) for i, found in enumerate(self._adding(port))]
+        is_late = any(topic.name == port.name for topic in reader.stage.late)
+        for stage, topic, adds in feeds:
+            own = topic.of_arm(reader.arm)
+            delay = self._delay(own, reader.stage)
+            yield Link(own, Member(stage, reader.arm), reader, port, delay, is_late, adds)
+
+    def _source(self, reader: Stage, port: Topic) -> tuple[Stage, Topic] | None:
+        """Who writes what a stage reads at a port: the topic itself, or what replaces it."""
+        found = None
+        for stage in self.stages:
+            for topic in stage.writes:
+                if topic.name == port.name:
+                    found = (stage, topic)
+        for stage in self.stages:
+            if stage.replaces is not None and stage.replaces.name == port.name:
+                if stage is reader:
+                    break
+                found = (stage, stage.writes[0])
+        return found
+
+    def _delay(self, topic: Topic, reader: Stage) -> float:
+        fitting = [d for d in self.delays if d.topic == topic.name]
+        return sum(d.seconds for d in fitting if d.reader in {"", reader.name})
+
+    @cached_property
+    def members(self) -> tuple[Member, ...]:
+        """Stages of all arms in the order of a tick: every stage after those it waits for.
+
+        Raises:
+            PartError: They wait for each other in a circle.
+        """
+        waiting = list(self._all())
+        needs = {member.name: set[str]() for member in waiting}
+        for link in self.links:
+            if not link.is_late and link.delay == 0.0:
+                needs[link.reader.name].add(link.writer.name)
+        ordered: list[Member] = []
+        while waiting:
+            done = {member.name for member in ordered}
+            ready = next((m for m in waiting if needs[m.name] <= done), None)
+            if ready is None:
+                circle = ", ".join(member.name for member in waiting)
+                text = f"given one of its inputs late or delayed: {circle} wait for each other"
+                raise PartError("stage", waiting[0].stage.name, text)
+            waiting.remove(ready)
+            ordered.append(ready)
+        return tuple(ordered)
+
+    def played(self, begin: str) -> tuple[Member, ...]:
+        """Stages whose topics a replay takes from a recording, arm by arm.
+
+        Args:
+            begin: The last of them: :data:`HAND`, :data:`DEVICE`, or empty for none.
+        """
+        names = BUILT_IN[: BUILT_IN.index(begin) + 1] if begin else ()
+        return tuple(m for m in self.members if m.stage.name in names)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What runs but may not be meant: outputs that look like an input and reach nobody."""
+        read = {link.topic.name for link in self.links}
+        found = []
+        for stage in self.stages:
+            for topic in stage.writes:
+                alike = [t.name for t in stage.reads if t.kind is topic.kind]
+                is_lost = topic.name not in read and not topic.adds_to and stage.replaces is None
+                if is_lost and alike and stage.name not in BUILT_IN:
+                    found.append(
+                        f"stage {stage.name!r} writes {topic.name}, which no stage reads; "
+                        f"replaces= would lead it to the readers of {alike[0]}"
+                    )
+        return tuple(found)
+
+    def links_of(self, member: Member) -> tuple[Link, ...]:
+        """Links that end at a stage."""
+        return tuple(link for link in self.links if link.reader == member)
+
+    def chain(self, arm: str = "") -> tuple[tuple[str, Topic], ...]:
+        """Way of a master's sample to the slave: stages, each with the topic it answers with.
+
+        It begins at the first stage of the order and follows the stamps: each next stage answers
+        the topic before it under its stamp.
+        """
+        first = Member(next(stage for stage in self.stages if stage.name == DEVICE), arm)
+        found = [(first.stage.name, first.writes[0])]
+        while (nxt := self._answer(found[-1][1], {name for name, _ in found})) is not None:
+            found.append(nxt)
+        return tuple(found)
+
+    def _answer(self, topic: Topic, seen: set[str]) -> tuple[str, Topic] | None:
+        for link in self.links:
+            if link.topic != topic or link.reader.stage.name in seen:
+                continue
+            for written, plain in zip(link.reader.writes, link.reader.stage.writes, strict=True):
+                if plain.stamp.of == link.port.name and self._goes_on(written):
+                    return link.reader.stage.name, written
+        return None
+
+    def _goes_on(self, topic: Topic) -> bool:
+        """Whether a topic leads to the slave, not back to the master."""
+        return topic.kind is not Kind.REPORT and (
+            topic.stamp.is_in_force
+            or any(link.topic == topic and not link.is_late for link in self.links)
+        )
+
+
+def build_graph(
+    arms: Iterable[str] = (), stages: Iterable[str] = (), delays: Iterable[str] = ()
+) -> Graph:
+    """Graph of the built-in stages and some more.
+
+    Args:
+        arms: Names of the arms, the first of which is the default one; one without a name if empty.
+        stages: Names of further stages.
+        delays: Delays as :meth:`Delay.parse` takes them.
+
+    Raises:
+        TeleopError: A name is unknown or used twice, or the graph cannot run.
+    """
+    names = (*BUILT_IN, *stages)
+    if RECORDER_NAME in names:
+        raise PartError("stage", RECORDER_NAME, "left out of the stages; it is always there")
+    return Graph(
+        tuple(STAGES.find(name) for name in names),
+        tuple(arms) or ("",),
+        tuple(Delay.parse(text) for text in delays),
+    )

@@ -1,0 +1,285 @@
+"""Layers: what files, scenarios and settings say, as values by stage and name, not yet checked."""
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from teleop_core.base import plain_yaml
+from teleop_core.base.errors import TeleopError, UnknownNameError
+from teleop_core.base.parameters import Spec, parameter, specs
+from teleop_core.base.texts import LONGEST_VALUE, shown
+from teleop_core.graph.stage import STAGES
+
+
+@dataclass(frozen=True, kw_only=True)
+class RealTimeParameters:
+    """What a live node asks of the system; a refusal is reported and the node works on."""
+
+    priority: int = parameter(
+        0, lower=0, upper=98, fixed=True,
+        doc="SCHED_FIFO priority of the loop, and 1 for the threads beside it; 0: fair shares",
+    )  # fmt: skip
+    cpus: tuple[int, ...] = parameter(
+        (), lower=0, fixed=True, doc="processors that the loop may use; empty: all"
+    )
+    patience: float = parameter(
+        0.8, unit="s", lower=0.0, upper=60.0, fixed=True, source="assumed",
+        doc="a loop of which nothing came for longer hangs, and ends its process; time for which "
+        "it waited for a processor does not count; 0: never",
+    )  # fmt: skip
+    lock_memory: bool = parameter(False, fixed=True, doc="keep all memory out of swap")
+    freeze_gc: bool = parameter(
+        True, fixed=True, doc="keep what exists at the start out of garbage collections"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionParameters:
+    """Parameters of a session as a whole."""
+
+    description: str = parameter("", doc="what happens in it, in one sentence")
+    duration: float = parameter(
+        10.0, unit="s", lower=0.001, upper=86400.0, doc="simulated or live time"
+    )
+    arms: tuple[str, ...] = parameter(
+        (), fixed=True,
+        doc="names of the arms, the first of which keeps the plain topics; empty: one without name",
+    )  # fmt: skip
+    stages: tuple[str, ...] = parameter(
+        (), fixed=True, doc="further stages of every arm, beside the built-in ones"
+    )
+    delays: tuple[str, ...] = parameter(
+        (), fixed=True, doc="delays on links, topic=seconds or topic@reader=seconds"
+    )
+    real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
+
+
+SESSION = "teleop"
+"""Name of the group of the session as a whole."""
+RENAMED = {
+    "haptic_master.path.": "operator.",
+    "haptic_master.operator.": "operator.",
+    "haptic_master.buttons.": "operator.buttons.",
+    "haptic_master.patience": "operator.patience",
+    "haptic_master.hand.tremor_amplitude": "operator.tremor_amplitude",
+    "haptic_master.hand.tremor_frequency": "operator.tremor_frequency",
+    "motion_scaling.fixture.size": "motion_scaling.fixture.box.size",
+    "slave_sim.pid.": "slave_sim.controller.pid.",
+    **{
+        f"slave_sim.{name}": f"slave.{name}"
+        for name in (
+            "operation.", "reference_filter.", "command_timeout", "interpolation", "start",
+            "starts_at_home", "start_speed",
+        )
+    },
+}  # fmt: skip
+"""Former names, which recordings and files may still have, or their beginnings."""
+_READER = ("slave/servo_jp@slave_sim=", "slave/servo_jp@slave=")  # of commands, before and now
+_OF_ROBOT = ("robot", "geometry")
+
+Layer = dict[str, dict[str, object]]
+
+
+def declared_groups() -> dict[str, type]:
+    """Name of each group of a parameter file to its type: the session, then all known stages."""
+    return {SESSION: SessionParameters, **{name: STAGES.find(name).parameters for name in STAGES}}
+
+
+def config_folder() -> Path:
+    """Folder with the parameter files: of the source tree, or where the package is installed."""
+    package = Path(__file__).resolve().parents[1]
+    prefix = package.parents[3] / "share" / "teleop_core" / "config"
+    return prefix if prefix.is_dir() else package.parent / "config"
+
+
+def list_scenarios() -> dict[str, str]:
+    """Names of the scenarios to their descriptions."""
+    found = {}
+    for path in sorted(config_folder().glob("*.yaml")):
+        if path.stem != "teleop":
+            found[path.stem] = str(load_file(path).get("teleop", {}).get("description", ""))
+    return found
+
+
+def scenario_file(name: str) -> Path:
+    """File of a scenario.
+
+    Raises:
+        UnknownNameError: No such scenario; the alternatives are listed.
+    """
+    scenarios = list_scenarios()
+    if name not in scenarios:
+        raise UnknownNameError("scenario", name, scenarios)
+    return config_folder() / f"{name}.yaml"
+
+
+def load_file(path: Path) -> Layer:
+    """Values of a ROS 2 parameter file: stage to dotted names to values.
+
+    Raises:
+        TeleopError: The file is missing, is not YAML, or has another shape.
+    """
+    try:
+        content = plain_yaml.read(path)
+    except OSError as error:
+        raise TeleopError(f"{path}: cannot be read: {error.strerror}") from error
+    except plain_yaml.UnreadableError as error:
+        raise TeleopError(f"{path}: {error}") from error
+    return parse_layer(content, str(path))
+
+
+def parse_text(text: str, where: str) -> Layer:
+    """Values of the text of a ROS 2 parameter file; an empty one says nothing.
+
+    Raises:
+        TeleopError: It is not YAML, or has another shape.
+    """
+    try:
+        content = plain_yaml.parse(text)
+    except plain_yaml.UnreadableError as error:
+        raise TeleopError(f"{where}: {error}") from error
+    return parse_layer({} if content is None else content, where)
+
+
+def parse_layer(content: object, where: str) -> Layer:
+    """Values of a parsed ROS 2 parameter file.
+
+    Raises:
+        TeleopError: It has another shape than stage / ros__parameters / name / value.
+    """
+    layer: Layer = {}
+    if not isinstance(content, Mapping):
+        raise TeleopError(f"{where}: must hold stages, each with ros__parameters")
+    for key, inner in content.items():
+        name = str(key).removeprefix("/").removeprefix("**/")
+        stage = name.rpartition("/")[2]
+        if stage != SESSION and stage not in STAGES.names():
+            raise UnknownNameError(f"{where}: stage", key, (SESSION, *STAGES))
+        if not isinstance(inner, Mapping) or not isinstance(inner.get("ros__parameters"), Mapping):
+            raise TeleopError(f"{where}: {key} must hold ros__parameters with names and values")
+        arm = name.removesuffix(stage)
+        layer.setdefault(name, {})
+        for own, value in _flat(inner["ros__parameters"]):
+            owner, _, present = _current(f"{stage}.{own}").partition(".")
+            layer.setdefault(arm + owner, {})[present] = value
+    _share_robot(layer)
+    if isinstance(delays := layer.get(SESSION, {}).get("delays"), list | tuple):
+        layer[SESSION]["delays"] = [str(one).replace(*_READER) for one in delays]
+    return layer
+
+
+def _current(full: str) -> str:
+    """Present name of a parameter that may be called by a former one."""
+    for old, new in RENAMED.items():
+        if full == old or (old.endswith(".") and full.startswith(old)):
+            return new + full[len(old) :]
+    return full
+
+
+def _share_robot(layer: Layer) -> None:
+    """Let a slave have the robot of its simulator, where a file knows no slave beside that."""
+    for name in [name for name in layer if name.rpartition("/")[2] == "slave_sim"]:
+        slave = layer.setdefault(name.removesuffix("_sim"), {})
+        if not slave.keys() & set(_OF_ROBOT):
+            slave |= {key: layer[name][key] for key in _OF_ROBOT if key in layer[name]}
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, object]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def parse_setting(text: str) -> Layer:
+    """Values of one ``--set key=value``.
+
+    The key is ``stage.name``, or a bare name, which sets every stage that has it; ``arm/`` before
+    it means that arm alone. The name of a group with a ``kind`` chooses the kind:
+    ``fixture=sphere``. A list is written [1, 2]. Whole numbers serve for real ones.
+
+    Raises:
+        TeleopError: No "=", or a value that is not YAML.
+        UnknownNameError: No stage has the key; the nearest keys are listed.
+    """
+    key, equals, value_text = text.partition("=")
+    if not equals:
+        raise TeleopError(f"--set {shown(text)} must be key=value")
+    try:
+        value = plain_yaml.parse(value_text)
+    except plain_yaml.UnreadableError as error:
+        raise TeleopError(f"--set {shown(text)}: the value {error}") from error
+    return setting(key, value)
+
+
+def setting(key: str, value: object) -> Layer:
+    """Values of one key as :func:`parse_setting` describes it.
+
+    Args:
+        key: ``stage.name``, a bare name, or the name of a group with a kind.
+        value: Number, text, truth value, or a sequence of them.
+
+    Raises:
+        UnknownNameError: No stage has the key; the nearest keys are listed.
+    """
+    arm, slash, name = key.strip().rpartition("/")
+    layer: Layer = {}
+    for stage, spec in _hits(name):
+        layer.setdefault(arm + slash + stage, {})[spec.name] = _as_declared(spec, value)
+    return layer
+
+
+def _hits(key: str) -> list[tuple[str, Spec]]:
+    """Stages and parameters that a key means.
+
+    Raises:
+        UnknownNameError: None, or several of different names.
+    """
+    declared = {
+        f"{stage}.{spec.name}": (stage, spec)
+        for stage, group in declared_groups().items()
+        for spec in specs(group)
+    }
+    for wanted in (key, f"{key}.kind"):
+        if hits := [e for full, e in declared.items() if wanted in {full, e[1].name}]:
+            return hits
+    known = dict(declared)  # by former names too
+    for full, entry in declared.items():
+        for old, new in RENAMED.items():
+            if full == new or (new.endswith(".") and full.startswith(new)):
+                known.setdefault(old + full[len(new) :], entry)
+    ends = {full: entry for full, entry in known.items() if f".{full}".endswith("." + key)}
+    if len({spec.name for _, spec in ends.values()}) > 1:
+        raise UnknownNameError("key", key, ends)  # several parameters end so
+    if not ends:
+        near = difflib.get_close_matches(
+            key[:LONGEST_VALUE], [*known, *(s.name for _, s in declared.values())]
+        )
+        raise UnknownNameError("key", key, near or declared)
+    return list({stage: (stage, spec) for stage, spec in ends.values()}.values())
+
+
+def _as_declared(spec: Spec, value: object) -> object:
+    """Whole numbers as real ones where a real one is declared; text for a name that YAML read.
+
+    A single value stands for a list of one.
+    """
+    if isinstance(value, list | tuple):
+        return tuple(_as_element(spec, element) for element in value)
+    one = _as_element(spec, value)
+    return (one,) if spec.kind is tuple and value is not None else one
+
+
+def _as_element(spec: Spec, value: object) -> object:
+    if spec.element is float and isinstance(value, int | str) and not isinstance(value, bool):
+        try:
+            return float(value)  # YAML 1.1 reads 1e-3 as text
+        except OverflowError:
+            return math.inf
+        except ValueError:
+            return value
+    return str(value) if spec.element is str and isinstance(value, int | float) else value

@@ -1,0 +1,76 @@
+"""Signals: one record per stage with the newest value and stamp of every topic at its ports.
+
+A stage knows nothing of the others: it reads and writes the fields of its own record. In virtual
+time the composed tick copies values from record to record; as a node, subscriptions fill the
+record and publishers empty it. The arithmetic is the same.
+
+Every topic has two fields, as :attr:`Topic.field <teleop_core.graph.topics.Topic.field>` names
+them: the columns of its kind, and ``<field>_ns``, its stamp [ns].
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+from teleop_core.graph.topics import TELEOP_STATE, Kind, Topic
+from teleop_core.kernels import kernel, records
+from teleop_core.kernels.geometry import Array
+
+TICK_NS = 1_000_000
+"""Control period of every stage unless a session says otherwise [ns]."""
+DT = TICK_NS / 1e9
+"""The same in seconds."""
+
+STATE_FIELDS = TELEOP_STATE.columns
+STATE = {name: index for index, name in enumerate(STATE_FIELDS)}
+Field = tuple[str, str] | tuple[str, str, tuple[int, ...]]
+
+
+def topic_fields(topics: Iterable[Topic], joints: int) -> list[Field]:
+    """Fields of values and stamps of some topics, for a robot with this many joints."""
+    fields: list[Field] = []
+    for topic in topics:
+        fields.append((topic.field, "f8", (topic.width(joints),)))
+        fields.append((f"{topic.field}_ns", "i8"))
+    return fields
+
+
+def make_signals(
+    topics: Iterable[Topic], joints: int, notes: Iterable[Field] = (), count: int = 1
+) -> Any:
+    """Zeroed signals (count,) with unit quaternions, so that every pose is valid from the start.
+
+    Args:
+        topics: What the record has ports for.
+        joints: Number of joints of the arm; 0 if no topic has joints.
+        notes: Further fields, which are recorded by nobody.
+        count: Number of records.
+
+    Returns:
+        Records with ``now_ns``, the time of the tick [ns], the topics' fields, and the notes.
+    """
+    ports = list(topics)
+    signals = records([("now_ns", "i8"), *topic_fields(ports, joints), *notes], count)
+    for topic in ports:
+        if topic.kind is Kind.POSE:
+            signals[topic.field][:, 3] = 1.0
+    return signals
+
+
+def assign(target: Any, source: Any) -> None:
+    """Give a record the values of another of its type, or 0 for all of its fields."""
+    for name in target.dtype.names:
+        target[name] = source if isinstance(source, int) else source[name]
+
+
+@kernel
+def copy(source: Array, target: Array) -> None:
+    """Copy a row, element by element: numba cannot pass fields of records to typed pointers."""
+    for i in range(target.shape[0]):
+        target[i] = source[i]
+
+
+@kernel
+def add(source: Array, target: Array) -> None:
+    """Add a row to another, element by element."""
+    for i in range(target.shape[0]):
+        target[i] += source[i]

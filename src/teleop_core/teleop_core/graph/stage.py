@@ -1,0 +1,366 @@
+"""Stage: one step of the chain as a value, and what it is while a session runs.
+
+A stage names its parameters, the topics at its ports and the kernel that makes one step. From a
+tuple of stages everything else follows: the order of a tick, the nodes, the links, the recording.
+"""
+
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, is_dataclass
+from inspect import signature
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from teleop_core.base.errors import PartError
+from teleop_core.base.parameters import Value, specs, values_of
+from teleop_core.base.registry import Registry
+from teleop_core.graph.signals import DT, Field, assign, make_signals
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels import bound, raise_pending, records
+
+__all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
+
+
+class Runner(Protocol):
+    """A stage at work: what virtual time and nodes need of it.
+
+    ``kernel(*arguments, signals, dt)`` makes one step from the inputs in ``signals`` to the outputs
+    there; a kernel that is compiled becomes part of the compiled tick, any other callable is
+    called from Python.
+    """
+
+    signals: Any
+    kernel: Callable[..., None]
+    arguments: tuple[Any, ...]
+    ahead: int
+    """Ticks for which it can be prepared at once, 1000 at most."""
+    changes_itself: bool
+    """Whether it changes parameters by itself, as a mode button does; see :meth:`present`."""
+
+    @property
+    def lead(self) -> int:
+        """Ticks before it can follow, as for a move to where it starts."""
+
+    def prepare(self, ticks: int) -> None:
+        """Get ready for the next ``ticks`` steps, ``ahead`` at most."""
+
+    def reset(self) -> None:
+        """Back to the state before the first step."""
+
+    def retune(self, parameters: Any) -> None:
+        """Take new parameters from the next step on; nothing jumps."""
+
+    def step(self) -> None:
+        """Make one step."""
+
+    def load(self) -> object:
+        """Compile or load the kernel, so that the first step takes no longer than others."""
+
+    def examine(self, parameters: Any) -> None:
+        """Try parameters beside the running steps, where that takes long, before :meth:`retune`."""
+
+    def present(self) -> Any:
+        """Parameters as they are now; asked for only where it changes them by itself."""
+
+    def fall_silent(self) -> None:
+        """Make outputs safe when the topic that it answers has fallen silent."""
+
+    def concerns(self) -> list[str]:
+        """What is wrong now, in words, for people; asked once a second."""
+
+    def described(self) -> dict[str, str]:
+        """Names and texts that its report tells beside its numbers."""
+
+
+@dataclass(frozen=True, repr=False)
+class Stage:
+    """One stage of the graph.
+
+    Attributes:
+        name: Name of its node and of its group in parameter files.
+        parameters: Parameter group, a dataclass of :func:`~teleop_core.base.parameters.parameter`.
+        reads: Topics it reads; its record has a field for each.
+        writes: Topics it writes, streams and at most one report.
+        step: ``step(parameters, state, signals, dt)``, a kernel or a plain function: ``parameters``
+            and ``state`` are records with a field for each parameter and each entry of ``state``.
+        state: Fields of what it remembers from step to step, as :class:`numpy.dtype` takes them;
+            zero at the start.
+        make: In place of ``step`` and ``state``: makes the :class:`Runner` from parameters and the
+            length of a tick [s].
+        late: Those of ``reads`` that are taken as they were at the end of the last tick. A cycle
+            of stages needs one.
+        trigger: The topic whose messages it answers, one step each; None for a stage with a clock
+            of its own, which makes one step per tick.
+        replaces: Topic whose other readers read ``writes[0]`` in its place, as for a limit or a
+            filter between two stages.
+        notes: Further fields of its record, which nobody reads.
+        node: ``module:class`` of its node, if a general one does not do.
+        needs: Topics without which the node answers nothing.
+
+    Raises:
+        PartError: It contradicts itself; the text says how.
+    """
+
+    name: str
+    parameters: type
+    reads: tuple[Topic, ...]
+    writes: tuple[Topic, ...]
+    step: Callable[..., None] | None = None
+    state: tuple[Field, ...] = ()
+    make: Callable[[Any, float], Runner] | None = None
+    late: tuple[Topic, ...] = ()
+    trigger: Topic | None = None
+    replaces: Topic | None = None
+    notes: tuple[Field, ...] = ()
+    node: str = ""
+    needs: tuple[Topic, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse what could never run."""
+        self._insist(self.name.isidentifier(), "a name of letters, digits and _")
+        for word in ("reads", "writes", "late", "needs"):
+            found = getattr(self, word)
+            is_right = isinstance(found, tuple) and all(isinstance(t, Topic) for t in found)
+            text = (
+                f"with {word} as a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
+            )
+            self._insist(is_right, text)
+        known = {topic.name for topic in self.reads}
+        for word, topics in (("late", self.late), ("needs", self.needs)):
+            for topic in topics:
+                self._insist(topic.name in known, f"with {topic.name} ({word}) among its reads")
+        if self.trigger is not None:
+            text = f"with its trigger {self.trigger.name} among its reads"
+            self._insist(self.trigger.name in known, text)
+        for topic in self.writes:
+            is_known = topic.stamp.is_in_force or topic.stamp.of in {"", *known}
+            text = f"with {topic.stamp.of}, whose stamp {topic.name} passes on, among its reads"
+            self._insist(is_known, text)
+        if self.replaces is not None:
+            is_like = bool(self.writes) and self.writes[0].kind is self.replaces.kind
+            text = f"one that reads {self.replaces.name} and writes its like first"
+            self._insist(self.replaces.name in known and is_like, text)
+        if self.reads or self.writes:
+            text = "with a step, step(parameters, state, signals, dt), or a make"
+            self._insist(callable(self.step) is not callable(self.make), text)
+        self._check_parts()
+        names = {spec.name for spec in specs(self.parameters)}
+        has_joints = any(topic.kind.has_joints for topic in (*self.reads, *self.writes))
+        text = "one whose parameters inherit RobotParameters, for it has topics with joints"
+        self._insist("robot" in names or not has_joints, text)
+
+    def _check_parts(self) -> None:
+        """Refuse what has not the form that is asked for."""
+        is_group = isinstance(self.parameters, type) and is_dataclass(self.parameters)
+        self._insist(is_group, "one whose parameters are a dataclass, not an instance of one")
+        if self.step is not None:
+            takes = "one whose step takes four arguments, step(parameters, state, signals, dt)"
+            try:
+                signature(getattr(self.step, "py_func", self.step)).bind(*range(4))
+            except TypeError as error:
+                raise PartError("stage", self.name, f"{takes} ({error})") from error
+        for word, fields in (("state", self.state), ("notes", self.notes)):
+            try:
+                np.dtype(list(fields))
+            except (TypeError, ValueError) as error:
+                text = f"one whose {word} is a list of fields as numpy.dtype takes it ({error})"
+                raise PartError("stage", self.name, text) from error
+
+    def _insist(self, is_so: bool, expected: str) -> None:
+        if not is_so:
+            raise PartError("stage", self.name, expected)
+
+    def __repr__(self) -> str:
+        return f"Stage({self.name!r})"
+
+    @property
+    def ports(self) -> tuple[Topic, ...]:
+        """All topics of its record."""
+        return tuple(dict.fromkeys((*self.reads, *self.writes)))
+
+    def run(self, parameters: Any, dt: float = DT) -> Runner:
+        """The stage at work.
+
+        Args:
+            parameters: An instance of its group.
+            dt: Length of a tick [s].
+        """
+        if self.make is not None:
+            return self.make(parameters, dt)
+        return _Plain(self, parameters, dt)
+
+
+def joints_of(parameters: Any) -> tuple[str, ...]:
+    """Joint names of the robot that a stage's parameters name; empty without one."""
+    return tuple(getattr(parameters, "joint_names", ()))
+
+
+class RunningStage:
+    """Base of :class:`Runner` classes: a record of signals and a kernel bound to its arguments.
+
+    Args:
+        stage: What it runs.
+        joints: Number of joints of its arm; 0 without.
+        dt: Length of a tick [s].
+    """
+
+    def __init__(self, stage: Stage, joints: int, dt: float) -> None:
+        self.stage, self.dt = stage, dt
+        self.signals: Any = make_signals(
+            stage.ports, joints, (*stage.notes, ("answered_ns", "i8"))
+        )[0]
+        self.kernel: Callable[..., None] = _nothing
+        self.arguments: tuple[Any, ...] = ()
+        self.ahead, self.changes_itself = 1000, False
+        self._bound: Callable[[], object] | None = None
+
+    @property
+    def lead(self) -> int:
+        """Ticks before it can follow: none."""
+        return 0
+
+    def prepare(self, ticks: int) -> None:
+        """Get ready for the next ``ticks`` steps; nothing to do here."""
+
+    def reset(self) -> None:
+        """Back to the state before the first step."""
+
+    def retune(self, parameters: Any) -> None:
+        """Take new parameters from the next step on."""
+
+    def examine(self, parameters: Any) -> None:
+        """Try parameters before they are taken; nothing to do here."""
+
+    def present(self) -> Any:
+        """Parameters as they are now, of a stage that changes them by itself."""
+        raise NotImplementedError
+
+    def fall_silent(self) -> None:
+        """Make outputs safe when the topic that it answers has fallen silent; nothing here."""
+
+    def concerns(self) -> list[str]:
+        """What is wrong now, in words: nothing."""
+        return []
+
+    def described(self) -> dict[str, str]:
+        """Names and texts that its report tells beside its numbers: none."""
+        return {}
+
+    def step(self) -> None:
+        """Make one step."""
+        self.prepare(1)
+        self.load()()
+        raise_pending()
+
+    def load(self) -> Callable[[], object]:
+        """Compile the kernel or load it from disk, which takes longer than many ticks."""
+        if self._bound is None:
+            self._bound = bound(self.kernel, *self.arguments, self.signals, self.dt)
+        return self._bound
+
+
+def _nothing() -> None:
+    """Stand in for the kernel of a stage that is being made."""
+
+
+class _Plain(RunningStage):
+    """A stage of records alone: parameters become fields, the state starts at zero."""
+
+    def __init__(self, stage: Stage, parameters: Any, dt: float) -> None:
+        super().__init__(stage, len(joints_of(parameters)), dt)
+        assert stage.step is not None
+        self.kernel = stage.step
+        declared = [(spec, value) for spec, value in _numbers(parameters)]
+        self._parameters = records(
+            [_field(name, value) for name, value in declared] or [("none", "i8")]
+        )[0]
+        self._state = records(list(stage.state) or [("none", "i8")])[0]
+        self.arguments = (self._parameters, self._state)
+        self._begin = self.signals.copy()
+        self.retune(parameters)
+        self._try()
+
+    def _try(self) -> None:
+        """Make one step of a compiled kernel in plain Python, on copies: that one checks indices.
+
+        Raises:
+            PartError: It reaches beyond the end of an array.
+        """
+        plain = getattr(self.kernel, "py_func", None)
+        if plain is None:
+            return
+        copies = [records(record.dtype) for record in (*self.arguments, self.signals)]
+        for copy, record in zip(copies, (*self.arguments, self.signals), strict=True):
+            copy[0] = record
+        try:
+            with np.errstate(all="ignore"):  # as compiled code goes on with infinity
+                plain(*(copy[0] for copy in copies), self.dt)
+        except IndexError as error:
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            where = f"{Path(place.filename).name}:{place.lineno}"
+            text = f"one that stays inside its arrays; {error} ({where})"
+            raise PartError("stage", self.stage.name, text) from error
+        except Exception:  # what calls inner kernels runs compiled only
+            return
+
+    def reset(self) -> None:
+        """State and signals as before the first step."""
+        assign(self._state, 0)
+        assign(self.signals, self._begin)
+
+    def retune(self, parameters: Any) -> None:
+        """Take new parameters; those that are texts become the place of theirs in the choices."""
+        for name, value in _numbers(parameters):
+            self._parameters[name] = value
+
+
+def _numbers(parameters: Any) -> list[tuple[str, Any]]:
+    """Fields of a parameter record: dots as underscores, texts as places among their choices."""
+    found: list[tuple[str, Any]] = []
+    values = values_of(parameters)
+    for spec in specs(type(parameters)):
+        value: Value = values[spec.name]
+        if spec.element is str:
+            if spec.choices and isinstance(value, str):
+                found.append((spec.name.replace(".", "_"), spec.choices.index(value)))
+            continue
+        found.append((spec.name.replace(".", "_"), value))
+    return found
+
+
+def _field(name: str, value: Any) -> Field:
+    if isinstance(value, tuple):
+        return (name, "f8", (len(value),))
+    return (name, "f8" if isinstance(value, float) else "i8")
+
+
+def _checked(name: str, part: object) -> Stage:
+    if not isinstance(part, Stage):
+        raise PartError("stage", name, f"a Stage, not a {type(part).__name__}")
+    if part.name != name:
+        raise PartError("stage", name, f"registered under its own name, {part.name!r}")
+    return part
+
+
+STAGES: Registry[Stage] = Registry(
+    "stage",
+    "stages",
+    {
+        "operator": "teleop_core.chain.master.operator:OPERATOR",
+        "haptic_master": "teleop_core.chain.master.haptic_master:HAPTIC_MASTER",
+        "motion_scaling": "teleop_core.chain.mapping.motion_scaling:MOTION_SCALING",
+        "inverse_kinematics": "teleop_core.chain.mapping.inverse_kinematics:INVERSE_KINEMATICS",
+        "slave": "teleop_core.slave.slave:SLAVE",
+        "slave_sim": "teleop_core.slave.slave_sim:SLAVE_SIM",
+        "recorder": "teleop_core.bags.recording:RECORDER",
+    },
+    _checked,
+)
+"""All stages by name, in the order in which data goes through the built-in ones."""
+
+
+def register_stage(stage: Stage, *, replace: bool = False) -> Stage:
+    """Add a stage under its own name for the rest of the program; see :meth:`Registry.add`."""
+    return STAGES.add(stage.name, stage, replace=replace)

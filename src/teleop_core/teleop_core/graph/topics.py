@@ -1,0 +1,304 @@
+"""Topics: the single list of what travels between the stages, with its message and its meaning.
+
+A topic is described once, below the namespace of its arm: the default arm has the plain names, an
+arm called ``left`` has ``left/slave/servo_cp`` and so on.
+"""
+
+from dataclasses import dataclass, replace
+from enum import Enum, IntEnum
+
+STATE_COMMANDS = (
+    "enable", "disable", "pause", "resume", "home", "unhome", "reset", "stop"
+)  # fmt: skip
+"""What an arm in operation is told, by name; see :mod:`teleop_core.slave.operation`."""
+OPERATION = (
+    "state", "is_homed", "is_busy", "is_stopped", "fault", "fault_joint", "fault_value",
+    "fault_bound", "rest_time", "travel", "is_braked",
+)  # fmt: skip
+"""Numbers of ``slave/operation``: :class:`~teleop_core.slave.operation.State`, flags,
+:class:`~teleop_core.slave.operation.Fault`, the joint that it is about (-1: none), what was found
+and what it must not exceed; since it last had to stop: the time until it was at rest [s] and how
+far the tip got meanwhile [m], both 0 until then; whether its drives are to be off and brakes to
+hold it."""
+
+
+class Quality(Enum):
+    """How a topic is transported."""
+
+    STREAM = "offered reliable, read best effort, keep last 1: only the newest sample matters"
+    LATCHED = "reliable, transient local, keep last 1: late joiners get the last value"
+    REPORT = "reliable, keep last 10: each message counts"
+
+
+class Limit(IntEnum):
+    """What keeps the slave from doing all that the hand asks for."""
+
+    NONE = 0  # it follows
+    JOINT = 1  # a joint is at the end of its range
+    WORKSPACE = 2  # no joint vector brings the tip there
+    SINGULARITY = 3  # joints would have to turn faster than they can, for the arm is near one
+    SPEED = 4  # joints would have to move faster than they can
+
+
+def limit_text(limit: int, joint: int, joint_names: tuple[str, ...] = ()) -> str:
+    """What holds the slave back, in words.
+
+    Args:
+        limit: Value of :class:`Limit`.
+        joint: Index of the joint at its limit; negative if none is.
+        joint_names: Names of the joints; without them they are counted from 1.
+    """
+    if limit == Limit.JOINT and joint >= 0:
+        name = joint_names[joint] if joint < len(joint_names) else str(joint + 1)
+        return f"joint {name} is at its limit"
+    return {
+        Limit.NONE: "nothing", Limit.JOINT: "a joint is at its limit",
+        Limit.WORKSPACE: "out of reach", Limit.SINGULARITY: "a singularity",
+        Limit.SPEED: "faster than its joints",
+    }[Limit(limit)]  # fmt: skip
+
+
+class Kind(Enum):
+    """What the values of a topic are; the value is the message's ROS type.
+
+    Columns of a value row, in the order used inside the package:
+
+    ======== ==================================================================
+    POSE     x, y, z [m], quaternion w, x, y, z
+    TWIST    linear x, y, z [m/s], angular x, y, z [rad/s]
+    WRENCH   force x, y, z [N], torque x, y, z [N·m]
+    BUTTONS  clutch, fixture, mode: 1 pressed, 0 released
+    JOINTS   position of each joint [rad or m]
+    STATE    position, velocity, effort of all joints: 3 n columns
+    NUMBERS  the numbers that the topic names in ``columns``
+    REPORT   no fixed columns: key-value pairs
+    ======== ==================================================================
+    """
+
+    POSE = "geometry_msgs/msg/PoseStamped"
+    TWIST = "geometry_msgs/msg/TwistStamped"
+    WRENCH = "geometry_msgs/msg/WrenchStamped"
+    BUTTONS = "sensor_msgs/msg/Joy"
+    # Blanks keep those of one message type apart; see ros_type.
+    NUMBERS = "sensor_msgs/msg/JointState  "
+    JOINTS = "sensor_msgs/msg/JointState"
+    STATE = "sensor_msgs/msg/JointState "
+    REPORT = "diagnostic_msgs/msg/DiagnosticArray"
+
+    @property
+    def ros_type(self) -> str:
+        """Name of the ROS message type."""
+        return self.value.strip()
+
+    @property
+    def has_joints(self) -> bool:
+        """Whether its columns are those of a robot's joints."""
+        return self in {Kind.JOINTS, Kind.STATE}
+
+    @property
+    def has_names(self) -> bool:
+        """Whether its messages carry the names of their numbers."""
+        return self.has_joints or self is Kind.NUMBERS
+
+    def columns(self, joint_names: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of the columns, for a robot with these joints; none for reports."""
+        if self in {Kind.JOINTS, Kind.NUMBERS}:
+            return joint_names
+        if self is Kind.STATE:
+            parts = ("position", "velocity", "effort")
+            return tuple(f"{joint}.{part}" for part in parts for joint in joint_names)
+        return _COLUMNS[self]
+
+    def width(self, joints: int) -> int:
+        """Number of columns for a robot with this many joints, or a topic with so many names."""
+        fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0}
+        return {
+            Kind.NUMBERS: joints, Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed
+        }[self]  # fmt: skip
+
+
+_COLUMNS = {
+    Kind.POSE: ("x", "y", "z", "qw", "qx", "qy", "qz"),
+    Kind.TWIST: ("vx", "vy", "vz", "wx", "wy", "wz"),
+    Kind.WRENCH: ("fx", "fy", "fz", "tx", "ty", "tz"),
+    Kind.BUTTONS: ("clutch", "fixture", "mode"),
+    Kind.REPORT: (),
+}
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """Rule for the header's stamp of a topic: which time it means.
+
+    Attributes:
+        text: The rule in words.
+        of: Name of the topic whose stamp is passed on; empty where it is the time of sampling.
+        is_in_force: Whether the writer itself says which command's stamp it is, because it may
+            hold an older one. Such a stamp may come again, and is :data:`NO_COMMAND_NS` before the
+            first command.
+    """
+
+    text: str
+    of: str = ""
+    is_in_force: bool = False
+
+
+NO_COMMAND_NS = 1
+"""Stamp of what is in force before the first command [ns]: older than any, but not 0, which CRTK
+reads as invalid."""
+SAMPLED = Stamp("sampling time")
+
+
+def passed_on(topic: str) -> Stamp:
+    """Stamp of the message of ``topic`` that is answered."""
+    return Stamp(f"of the {topic} it answers", topic)
+
+
+def in_force(topic: str) -> Stamp:
+    """Stamp of the message of ``topic`` that is in force."""
+    return Stamp(f"of the {topic} in force", topic, is_in_force=True)
+
+
+@dataclass(frozen=True, repr=False)
+class Topic:
+    """One topic of an arm.
+
+    Attributes:
+        name: Name below the arm's namespace, such as ``slave/servo_cp``.
+        kind: What its values are.
+        stamp: Which time its header carries.
+        frame_id: Frame of the header, below the arm's namespace.
+        quality: How it is transported.
+        columns: Names of the numbers, of reports and of :attr:`Kind.NUMBERS`; else empty.
+        adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
+            another source of force; empty for a topic of its own.
+        arm: Namespace; empty for the default arm.
+        is_seldom: Whether it is sent only where it is not zero, and once where it becomes zero.
+        message: Name of the ROS message type where it carries no values, such as a robot's model;
+            empty for that of its kind.
+    """
+
+    name: str
+    kind: Kind
+    stamp: Stamp = SAMPLED
+    frame_id: str = ""
+    quality: Quality = Quality.STREAM
+    columns: tuple[str, ...] = ()
+    adds_to: str = ""
+    arm: str = ""
+    is_seldom: bool = False
+    message: str = ""
+
+    @property
+    def ros_type(self) -> str:
+        """Name of its ROS message type."""
+        return self.message or self.kind.ros_type
+
+    def of_arm(self, arm: str) -> "Topic":
+        """The same topic of a named arm: in its namespace, with its frames."""
+        if not arm or self.arm == arm:
+            return self
+        frame = f"{arm}/{self.frame_id}" if self.frame_id else ""
+        return replace(self, name=f"{arm}/{self.name}", frame_id=frame, arm=arm)
+
+    def __repr__(self) -> str:
+        return f"Topic({self.name!r}, {self.kind.name})"
+
+    @property
+    def field(self) -> str:
+        """Name of the topic's column in records; its stamp is in ``<field>_ns``."""
+        return self.name.replace("/", "_")
+
+    def width(self, joints: int) -> int:
+        """Number of its numbers for a robot with this many joints."""
+        return len(self.columns) if self.columns else self.kind.width(joints)
+
+    def names(self, joint_names: tuple[str, ...]) -> tuple[str, ...]:
+        """Names in its messages, for a robot with these joints; empty without any."""
+        if self.kind is Kind.NUMBERS:
+            return self.columns
+        return joint_names if self.kind.has_joints else ()
+
+
+MASTER_MEASURED_CP = Topic("master/measured_cp", Kind.POSE, SAMPLED, "master_base")
+MASTER_MEASURED_CV = Topic("master/measured_cv", Kind.TWIST, SAMPLED, "master_base")
+MASTER_MEASURED_CF = Topic("master/measured_cf", Kind.WRENCH, SAMPLED, "master_base")
+MASTER_BUTTONS = Topic("master/buttons", Kind.BUTTONS, SAMPLED, "master_base")
+MASTER_CONTACT = Topic(
+    "master/contact",
+    Kind.NUMBERS,
+    SAMPLED,
+    "master_base",
+    columns=("number", "taken", "returned", "friction", "largest_force"),
+)
+"""Energy of the present contact, or the last one: how many there were, what the motors' force took
+from the hand and gave back, what dry friction took meanwhile [J], all of the true motion, which a
+simulator knows; and the largest force that the warmth of the motors allows [N]."""
+MASTER_SERVO_CF = Topic(
+    "master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base"
+)
+SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, passed_on("master/measured_cp"), "slave_base")
+SLAVE_SERVO_JP = Topic("slave/servo_jp", Kind.JOINTS, passed_on("slave/servo_cp"), "slave_base")
+SLAVE_REACH = Topic(
+    "slave/reach", Kind.NUMBERS, passed_on("slave/servo_cp"), "slave_base",
+    columns=(
+        "status", "limit", "joint", "position_residual", "rotation_residual",
+        "cut_x", "cut_y", "cut_z", "cut_rx", "cut_ry", "cut_rz",
+    ),
+)  # fmt: skip
+"""How far inverse kinematics can follow: status as of
+:class:`~teleop_core.robots.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none),
+what the answer leaves [m, rad], and by what the command would have to be moved, in slave_base
+[m, rad], to be one that the arm can reach given time."""
+SLAVE_SETPOINT_JS = Topic(
+    "slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base"
+)
+SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, in_force("slave/servo_jp"), "slave_base")
+SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, SAMPLED, "slave_base")
+SLAVE_MEASURED_CP = Topic(
+    "slave/measured_cp", Kind.POSE, passed_on("slave/measured_js"), "slave_base"
+)
+SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
+"""Where the tip really is, which no encoder sees: only a simulator knows, or a tracker."""
+SLAVE_OPERATION = Topic("slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED,
+                        columns=OPERATION)  # fmt: skip
+"""Whether the slave may move, what stopped it, and what it takes to go on; sent where it changes.
+See :mod:`teleop_core.slave.operation`."""
+TELEOP_STATE = Topic(
+    "teleop/state", Kind.REPORT, passed_on("master/measured_cp"), quality=Quality.LATCHED,
+    columns=(
+        "is_following", "is_clutched", "is_fine", "gain", "is_fixture_on",
+        "fixture_center_x", "fixture_center_y", "fixture_center_z",
+        "fixture_size_x", "fixture_size_y", "fixture_size_z", "limit", "limited_joint",
+    ),
+)  # fmt: skip
+HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
+"""Where the operator wants the stylus; silence lets go of it."""
+HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base")
+"""Which buttons of the stylus the operator presses."""
+HAND_TREMOR = Topic(
+    "hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z"), is_seldom=True
+)  # fmt: skip
+"""By how much the tip is off [m], whatever the device's friction swallows of the hand's motion."""
+OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
+"""Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand
+there. Silence lets go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is
+not recorded."""
+OPERATOR_BUTTONS = Topic(
+    "operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT
+)  # fmt: skip
+"""Buttons that this person presses and releases: each message counts, so it is sent reliably."""
+DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
+
+STREAMS = (
+    HAND_SERVO_CP, HAND_BUTTONS,
+    MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT,
+    MASTER_SERVO_CF,
+    SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_REACH, SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP,
+    SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_TRUE_CP,
+)  # fmt: skip
+"""Topics of the built-in stages that carry one message per tick."""
+REPORTS = (SLAVE_OPERATION, TELEOP_STATE)
+"""Topics of the built-in stages that are sent where they change."""
+ALL = (*STREAMS, HAND_TREMOR, *REPORTS, DIAGNOSTICS)
+BY_NAME = {topic.name: topic for topic in ALL}

@@ -1,0 +1,13 @@
+"""Bodies: the solids of every robot, made from its kinematics, and where they are.
+
+``bodies_of(robot)`` gives the links of any robot as capsules, cylinders and spheres, each in the
+frame of a body; ``bodies_of(robot).poses(q)`` says where they are. The first body is the base,
+the last the tip. ``urdf_of(robot)`` is the same as a URDF.
+"""
+
+from teleop_core.robots.bodies.body import Bodies, Body, Joint
+from teleop_core.robots.bodies.describe import bodies_of
+from teleop_core.robots.bodies.solids import Kind, Role, Solid
+from teleop_core.robots.bodies.urdf import urdf_of
+
+__all__ = ["Bodies", "Body", "Joint", "Kind", "Role", "Solid", "bodies_of", "urdf_of"]

@@ -1,0 +1,118 @@
+"""Describing robots: which description of its bodies a robot has, and that of serial robots.
+
+Serial robots are described from kinematics alone, by the product of exponentials: the Jacobian at
+home gives every joint's screw axis; the placement of link i is the product of the motions of joints
+1 to i, exact for every robot whose joints are a chain. What is neither serial nor described is a
+base, a dotted line to the tip, and the tip.
+
+Source:
+    Lynch and Park 2017, chapter 4.
+"""
+
+from collections.abc import Callable
+from importlib import import_module
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from teleop_core.kernels.geometry import Array, rotations_from_quaternions
+from teleop_core.kernels.portable import length
+from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
+from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
+from teleop_core.robots.bodies.frames import pose_of, tips
+from teleop_core.robots.bodies.solids import ball, cylinder
+from teleop_core.robots.robot import Robot
+
+# Robots whose joints are no chain, by the module of their kernels, with what describes them.
+_LOOPS = {
+    "teleop_core.robots.stewart": "parallel:stewart_bodies",
+    "teleop_core.robots.rps3": "parallel:rps3_bodies",
+    "teleop_core.robots.scara_stewart": "hybrid_bodies:scara_stewart_bodies",
+    "teleop_core.robots.four_bar": "planar:four_bar_bodies",
+    "teleop_core.robots.parallelogram": "planar:parallelogram_bodies",
+    "teleop_core.robots.mma": "mma_bodies:mma_bodies",
+    "teleop_core.robots.mma_forward": "mma_bodies:mma_bodies",
+    "teleop_core.robots.three_finger_hand": "hand_bodies:hand_bodies",
+}
+_KNOWN: "WeakKeyDictionary[Robot, Bodies]" = WeakKeyDictionary()
+
+
+def bodies_of(robot: Robot) -> Bodies:
+    """Bodies of a robot: the same object each time it is asked for the same robot.
+
+    Robots with loops of the registry have descriptions of their own; of every other robot whose
+    joints are a chain the axes follow from its kinematics. What is neither, such as a parallel
+    robot of somebody else, is drawn as its base, a dotted line, and its tip.
+    """
+    if robot not in _KNOWN:
+        _KNOWN[robot] = _described(robot)
+    return _KNOWN[robot]
+
+
+def _described(robot: Robot) -> Bodies:
+    place = _LOOPS.get(robot.kernels.fk.__module__)
+    if place is not None:
+        module, _, name = place.partition(":")
+        describe: Callable[[Robot], Bodies] = getattr(
+            import_module(f"teleop_core.robots.bodies.{module}"), name
+        )
+        return describe(robot)
+    return serial_bodies(robot) or unknown_bodies(robot)
+
+
+_TRIALS = 5
+# How far, over the size of the robot, the tip may be off for joints to count as a chain.
+_EXACT = 1e-6
+
+
+def serial_bodies(robot: Robot) -> Bodies | None:
+    """Bodies of a robot whose joints are a chain; None if they are not."""
+    if robot.kernels.assemble is not None:
+        return None
+    home = robot.fk(robot.home)
+    axes = axes_of(robot.jacobian(robot.home), home[:3, 3])
+    if axes is None:
+        return None
+    tip, strokes = pose_of(home), robot.upper - robot.lower
+    chained = places(axes, robot.home - robot.lower, tip[:3])
+    joints = range(robot.n)
+    bodies, reach = chain(
+        chained, [f"link{i + 1}" for i in joints], joints, robot.home, strokes, tip
+    )
+    frames = Bodies(tuple(bodies), robot.n, None, (), reach).poses(robot.home)
+    bodies.append(tip_of(bodies, frames[-1], tip, reach))
+    found = Bodies(tuple(bodies), robot.n, None, tuple(i + 1 for i in joints), reach)
+    return found if has_tip_of(found, robot) else None
+
+
+def has_tip_of(bodies: Bodies, robot: Robot) -> bool:
+    """Whether the last body is where the robot's tip is, for joints drawn within the limits."""
+    draws = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_TRIALS, robot.n))
+    tips, expected = bodies.poses(draws)[:, -1], robot.fk(draws)
+    off = np.abs(tips[:, :3] - expected[:, :3, 3]).max() / bodies.size
+    turned = np.abs(rotations_from_quaternions(tips[:, 3:]) - expected[:, :3, :3]).max()
+    return bool(off < _EXACT and turned < _EXACT)
+
+
+_DOTS = 12
+
+
+def unknown_bodies(robot: Robot) -> Bodies:
+    """Bodies of a robot of which only its tip is known; no joint has a body of its own."""
+    home = robot.solve_fk(robot.home).T[:3, 3]
+    size = max(float(length(home)), 1e-3)
+    up = np.array([0.0, 0.0, 1.0])
+    base = Body("base", (cylinder(-0.015 * size * up, up, 0.09 * size, 0.03 * size, "base"),), -1)
+    dot, end = ball(np.zeros(3), 0.012 * size, "link"), ball(np.zeros(3), 0.03 * size, "tool")
+    dots = [Body(f"dot{i + 1}", (dot,), 0, Joint.FREE, HERE, i) for i in range(_DOTS)]
+    tip = Body("tip", (end,), 0, Joint.FREE, HERE, _DOTS)
+    shares = np.append(np.arange(1, _DOTS + 1) / (_DOTS + 1.0), 1.0)
+
+    def coordinates(q: Array) -> tuple[Array, Array]:
+        _, poses = tips(robot, q)
+        free = np.repeat(poses[:, None], _DOTS + 1, axis=1)
+        free[..., :3] *= shares[:, None]
+        return q, free
+
+    last = _DOTS + 1
+    return Bodies((base, *dots, tip), robot.n, coordinates, (last,) * robot.n, size)

@@ -1,0 +1,82 @@
+"""Meshes: the triangles of solids, with sharp edges where a solid has them."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.kernels.geometry import Array, rotations_from_quaternions
+from teleop_core.robots.bodies.solids import Solid
+
+Faces = NDArray[np.int64]
+Mesh = tuple[Array, Faces]
+"""Vertices (V, 3) [m] and the three of each triangle (F, 3), seen from outside anticlockwise."""
+AROUND = 20
+"""Sides of what is round, unless fewer are asked for; a multiple of four."""
+
+
+def mesh_of(solid: Solid, around: int = AROUND) -> Mesh:
+    """Triangles of a solid in its body's frame; what is round has so many sides."""
+    if solid.kind == "box":
+        vertices, faces = _box(*solid.size)
+    else:
+        vertices, faces = _revolved(_profiles(solid, around // 4), around)
+    turn = rotations_from_quaternions(solid.pose[None, 3:])[0]
+    return vertices @ turn.T + solid.pose[:3], faces
+
+
+def merged(meshes: list[Mesh]) -> Mesh:
+    """Several meshes, at least one, as one."""
+    begins = np.cumsum([0, *(len(vertices) for vertices, _ in meshes[:-1])])
+    faces = [faces + begin for (_, faces), begin in zip(meshes, begins, strict=True)]
+    return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)
+
+
+def _box(x: float, y: float, z: float) -> Mesh:
+    """Box around the origin; every face has corners of its own, so that edges are sharp."""
+    quads = []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)][:: int(side)], np.float64)
+            quads.append(np.roll(np.insert(square, 0, side, axis=1), axis, axis=1))
+    vertices = np.concatenate(quads) * (0.5 * x, 0.5 * y, 0.5 * z)
+    corners = np.array([(0, 1, 2), (0, 2, 3)])
+    return vertices, np.concatenate([corners + 4 * quad for quad in range(6)])
+
+
+def _profiles(solid: Solid, arc: int) -> list[Array]:
+    """Radii and heights (N, 2) [m] from below upwards; a sharp edge is where a profile ends.
+
+    Args:
+        solid: Capsule, cylinder or sphere.
+        arc: Steps of a quarter of a circle.
+    """
+    radius, top = solid.size[0], 0.5 * sum(solid.size[1:])
+    if solid.kind == "cylinder":
+        corners = np.array([(0.0, -top), (radius, -top), (radius, top), (0.0, top)])
+        return [corners[i : i + 2] for i in range(3)]
+    angle = np.linspace(0.0, 0.5 * math.pi, arc + 1)
+    low = np.stack((radius * np.sin(angle), -top - radius * np.cos(angle)), axis=1)
+    return [np.concatenate((low, low[::-1] * (1.0, -1.0)))]
+
+
+def _revolved(profiles: list[Array], around: int) -> Mesh:
+    """What profiles of radius and height (N, 2), from below upwards, sweep about z."""
+    angle = 2.0 * math.pi * np.arange(around) / around
+    meshes = []
+    for profile in profiles:
+        rings = np.empty((len(profile), around, 3))
+        rings[..., 0] = profile[:, :1] * np.cos(angle)
+        rings[..., 1] = profile[:, :1] * np.sin(angle)
+        rings[..., 2] = profile[:, 1:]
+        here = np.arange(around)
+        beside = np.roll(here, -1)
+        strips = [
+            around * ring + np.concatenate((
+                np.stack((here, beside, beside + around), axis=1),
+                np.stack((here, beside + around, here + around), axis=1),
+            ))
+            for ring in range(len(profile) - 1)
+        ]  # fmt: skip
+        meshes.append((rings.reshape(-1, 3), np.concatenate(strips)))
+    return merged(meshes)

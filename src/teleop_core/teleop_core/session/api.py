@@ -1,0 +1,392 @@
+"""Python API: run a session, replay one, open what was recorded, register parts.
+
+>>> import teleop_core as tc
+>>> recording = tc.run("coarse_box", duration=10.0, fixture="sphere", fine_gain=0.2)
+>>> recording["slave/measured_cp"]["x"]
+>>> recording.score().position_error_mm.rms
+
+The command line is a thin layer on this module.
+"""
+
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Union
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.bags.memory import MemoryBag, Message
+from teleop_core.bags.series import Series
+from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.chain.fixtures import FIXTURES, Fixture
+from teleop_core.chain.operators import OPERATORS, Motion, Operator, following
+from teleop_core.graph.graph import DEVICE, HAND
+from teleop_core.graph.layers import (
+    SESSION,
+    Layer,
+    config_folder,
+    load_file,
+    parse_setting,
+    scenario_file,
+    setting,
+)
+from teleop_core.graph.stage import STAGES, Stage
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots import ROBOTS, Robot
+from teleop_core.robots.dh import DhTable
+from teleop_core.session.configuration import Configuration
+from teleop_core.session.length import as_long_as_followed
+from teleop_core.session.notes import notes_of
+from teleop_core.session.recording import Recording, open_recording
+from teleop_core.session.runner import (
+    NewSamples,
+    StateReports,
+    describe,
+    record_blocks,
+    recorded_configuration,
+    replayed_blocks,
+    run_blocks,
+    session_ticks,
+)
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.slave.controllers import CONTROLLERS, Controller
+from teleop_core.slave.plants import PLANTS, Plant
+
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["OperatorLike", "Progress", "configuration", "replay", "run"]
+
+Progress = Callable[[int, int], None]
+"""Called with ticks done and ticks in all, after every simulated second."""
+OperatorLike: TypeAlias = Union[
+    str, Path, Operator, Motion, NDArray[np.float64], tuple[Array, Array], "pandas.DataFrame"
+]
+"""An operator: its name; a CSV table or recording; a part; ``motion(times)``; an array whose
+columns are time [s] and what :data:`~teleop_core.chain.operators.Motion` says; times and rows; or a
+data frame with columns called as those of such a table."""
+Setting = float | str | bool | Sequence[float] | Sequence[str]
+"""Value of a parameter."""
+
+
+def _silent(done: int, total: int) -> None:
+    """Show no progress."""
+
+
+def configuration(
+    scenario: str | None = None,
+    *,
+    files: Iterable[Path | str] = (),
+    settings: Mapping[str, Setting] | None = None,
+    texts: Iterable[str] = (),
+    operator: OperatorLike | None = None,
+    fixture: str | Fixture | None = None,
+    controller: str | Controller | None = None,
+    plant: str | Plant | None = None,
+    robot: str | Robot | DhTable | None = None,
+    stages: str | Stage | Sequence[str | Stage] = (),
+    arms: Sequence[str] = (),
+    delays: Mapping[str, float] | None = None,
+    **parameters: Setting,
+) -> Configuration:
+    """What a session runs, from a scenario, files, parameters and own parts.
+
+    Args:
+        scenario: One of ``teleop scenarios``; the defaults alone if None.
+        files: ROS 2 parameter files over the scenario.
+        settings: Parameters by name over all files: ``{"motion_scaling.fine_gain": 0.2}``; a bare
+            name sets every stage that has it, ``left/...`` that arm alone.
+        texts: The same as ``key=value``, as the command line takes them, over the settings.
+        operator: Who moves the hand; see :data:`OperatorLike`.
+        fixture: Shape around the hand: a name, or a part of your own.
+        controller: Control law of the slave's joints: a name, or a part of your own.
+        plant: What the slave simulator moves: a name, or a part of your own.
+        robot: The slave: a name, a table's file, or a robot of your own.
+        stages: Further stages of every arm, one or several: names, or stages of your own.
+        arms: Names of the arms, the first of which is the default one.
+        delays: Delays on links [s]: ``{"slave/servo_jp": 0.02}``.
+        **parameters: Parameters by name, with ``__`` for each dot: ``fixture__box__size=...``.
+
+    Returns:
+        The checked configuration.
+
+    Raises:
+        TeleopError: Something is wrong; the text names it.
+    """
+    named: dict[str, object] = {}
+    for name, registry, part in (
+        ("fixture", FIXTURES, fixture), ("controller", CONTROLLERS, controller),
+        ("plant", PLANTS, plant),
+    ):  # fmt: skip
+        if part is not None:
+            named[f"{name}.kind"] = part if isinstance(part, str) else _known(registry, part)
+    if robot is not None:
+        named["robot"] = robot if isinstance(robot, str) else _known(ROBOTS, robot)
+    if operator is not None:
+        named |= _operator_settings(operator)
+    if stages:
+        several = [stages] if isinstance(stages, str | Stage) else stages
+        known = [stage if isinstance(stage, str) else _known(STAGES, stage) for stage in several]
+        named[f"{SESSION}.stages"] = known
+    if arms:
+        named[f"{SESSION}.arms"] = [arms] if isinstance(arms, str) else list(arms)
+    if delays:
+        named[f"{SESSION}.delays"] = [f"{link}={time!r}" for link, time in delays.items()]
+    named |= {name.replace("__", "."): value for name, value in parameters.items()}
+    layers: list[Layer] = [load_file(config_folder() / "teleop.yaml")]
+    if scenario is not None:
+        layers.append(load_file(scenario_file(scenario)))
+    given = [load_file(Path(file)) for file in files]
+    given += [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
+    given += [parse_setting(text) for text in texts]
+    made = Configuration.from_layers([*layers, *given], scenario or "")
+    return as_long_as_followed(made, given)
+
+
+def run(
+    scenario: str | Configuration | None = None,
+    *,
+    duration: float | None = None,
+    seed: int | None = None,
+    out: Path | str | None = None,
+    progress: Progress = _silent,
+    files: Iterable[Path | str] = (),
+    settings: Mapping[str, Setting] | None = None,
+    operator: OperatorLike | None = None,
+    fixture: str | Fixture | None = None,
+    controller: str | Controller | None = None,
+    plant: str | Plant | None = None,
+    robot: str | Robot | DhTable | None = None,
+    stages: str | Stage | Sequence[str | Stage] = (),
+    arms: Sequence[str] = (),
+    delays: Mapping[str, float] | None = None,
+    **parameters: Setting,
+) -> Recording:
+    """Run a session in virtual time.
+
+    Args:
+        scenario: One of ``teleop scenarios``; or a whole configuration, which then is all.
+        duration: Simulated time [s], in place of the scenario's.
+        seed: Seed of everything random.
+        out: Directory of the recording, made here; None keeps it in memory (2 MB a second).
+        progress: Told how far it is.
+        files: As in :func:`configuration`, and so all that follow.
+        settings: As there.
+        operator: As there.
+        fixture: As there.
+        controller: As there.
+        plant: As there.
+        robot: As there.
+        stages: As there.
+        arms: As there.
+        delays: As there.
+        **parameters: As there.
+
+    Returns:
+        What happened.
+
+    Raises:
+        TeleopError: Something is wrong; the text names it, before anything runs if possible.
+    """
+    given = dict(settings or {})
+    if duration is not None:
+        given[f"{SESSION}.duration"] = float(duration)
+    if seed is not None:
+        given["seed"] = seed
+    if isinstance(scenario, Configuration):
+        made = scenario
+        if given:
+            raise ParameterError("settings", sorted(given), "part of the configuration given")
+    else:
+        made = configuration(
+            scenario, files=files, settings=given, texts=(), operator=operator, fixture=fixture,
+            controller=controller, plant=plant, robot=robot, stages=stages, arms=arms,
+            delays=delays, **parameters,
+        )  # fmt: skip
+    for note in notes_of(made):
+        warnings.warn(note, stacklevel=2)
+    session = VirtualTime(made)
+    ticks = session_ticks(made, session)
+    return _kept(session, made, run_blocks(session, ticks), ticks, out, progress)
+
+
+_BEGINS = {"device": DEVICE, "hand": HAND}
+"""Where a replay may begin, with the stage whose output is taken from the recording."""
+
+
+def replay(
+    recording: Recording | Path | str,
+    *,
+    out: Path | str | None = None,
+    progress: Progress = _silent,
+    files: Iterable[Path | str] = (),
+    settings: Mapping[str, Setting] | None = None,
+    texts: Iterable[str] = (),
+    begin: Literal["device", "hand"] = "device",
+    **parameters: Setting,
+) -> Recording:
+    """Run the recorded masters of a session through the graph again, in virtual time.
+
+    Without changes a recording of virtual time gives the same slave motion, bit for bit, wherever
+    it begins.
+
+    Args:
+        recording: What was recorded; its own configuration is the start.
+        out: As in :func:`run`.
+        progress: As in :func:`run`.
+        files: Parameter files over its configuration.
+        settings: Parameters over the files, as in :func:`configuration`.
+        texts: As there.
+        begin: What is taken from the recording: what the device measured, or where the hand wanted
+            it, which forces of the new session then act on.
+        **parameters: As in :func:`configuration`.
+
+    Raises:
+        TeleopError: A topic or file is missing, or a value is wrong.
+    """
+    from teleop_core.session.exchange import as_master_bag
+
+    bag = as_master_bag(recording.bag if isinstance(recording, Recording) else recording)
+    layer, scenario = recorded_configuration(bag)
+    named = {name.replace("__", "."): value for name, value in parameters.items()}
+    changes = [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
+    layers = [layer, *(load_file(Path(file)) for file in files), *changes]
+    layers += [parse_setting(text) for text in texts]
+    made = Configuration.from_layers(layers, scenario)
+    if begin not in _BEGINS:
+        raise ParameterError("begin", begin, " or ".join(_BEGINS))
+    session = VirtualTime(made, played=_BEGINS[begin])
+    blocks, ticks = replayed_blocks(session, bag)
+    return _kept(session, made, blocks, ticks, out, progress)
+
+
+def _kept(
+    session: VirtualTime,
+    made: Configuration,
+    blocks: Iterable[NDArray[np.void]],
+    ticks: int,
+    out: Path | str | None,
+    progress: Progress,
+) -> Recording:
+    """Recording of blocks, on disk or in memory."""
+    if out is not None:
+        record_blocks(session, made, Path(out), blocks, ticks, progress)
+        return open_recording(out)
+    memory = _Memory(session)
+    for block in blocks:
+        memory.take(block)
+        progress(memory.ticks, ticks)
+    return Recording(memory.bag(made))
+
+
+class _Memory:
+    """Takes blocks as a writer does."""
+
+    def __init__(self, session: VirtualTime) -> None:
+        self._session, self._reports = session, StateReports(session)
+        self._is_new = NewSamples()
+        self._parts: dict[Topic, list[Sequence[NDArray[Any]]]] = {
+            topic: [] for topic in session.graph.streams
+        }
+        self._messages: dict[Topic, list[Message]] = {
+            topic: [] for topic in session.graph.topics if topic not in self._parts
+        }
+        self.ticks = 0
+
+    def take(self, block: NDArray[np.void]) -> None:
+        self.ticks += len(block)
+        log_ns = block["now_ns"]
+        for topic, parts in self._parts.items():
+            parts.append([np.array(part) for part in self._is_new.of(topic, block, log_ns)])
+        self._reports.write(self, block)
+
+    def write(self, topic: Topic, log_ns: int, data: bytes) -> None:
+        """Take one message of a report."""
+        self._messages[topic].append((log_ns, data))
+
+    def bag(self, made: Configuration) -> MemoryBag:
+        series = {}
+        for topic, parts in self._parts.items():
+            stamps, values, logs = (np.concatenate(column) for column in zip(*parts, strict=True))
+            names = topic.names(self._session.joint_names[topic.arm])
+            series[topic] = Series(stamps, logs, values, names, topic.frame_id)
+        about = describe(made)
+        return MemoryBag(about["scenario"] or "session", series, self._messages, about)
+
+
+def _known(registry: object, part: object) -> str:
+    """Name of an own part, which is registered under it from now on."""
+    from teleop_core.base.registry import Registry
+
+    assert isinstance(registry, Registry)
+    name = getattr(part, "name", None)
+    if not isinstance(name, str):
+        raise TeleopError(f"{registry.kind} must have a name, is {part!r}")
+    registry.add(name, part, replace=True)
+    return name
+
+
+def _operator_settings(operator: OperatorLike) -> dict[str, object]:
+    """Settings that choose an operator; own ones are registered under a name of theirs."""
+    if isinstance(operator, Path):
+        return _file_settings(operator)
+    if isinstance(operator, str):
+        is_file = operator not in OPERATORS.names() and Path(operator).exists()
+        return _file_settings(Path(operator)) if is_file else {"operator.kind": operator}
+    if isinstance(operator, Operator):
+        part: Operator | Motion = operator
+        name = operator.name
+    elif isinstance(operator, np.ndarray):
+        name = "array"
+        if operator.ndim != 2 or operator.shape[1] not in {4, 7, 10}:
+            needed = "(N, 4), (N, 7) or (N, 10): time [s], then the columns of a motion"
+            raise ParameterError("operator", f"an array {operator.shape}", needed)
+        part = following(name, operator[:, 0], operator[:, 1:])
+    elif hasattr(operator, "columns"):
+        name = "frame"
+        part = following(name, *_of_frame(operator))
+    elif isinstance(operator, tuple):
+        name = "array"
+        part = following(name, *operator)
+    else:
+        part, name = operator, getattr(operator, "__name__", "function").strip("<>")
+    if name in OPERATORS.names() and not OPERATORS.is_added(name):
+        name = f"own_{name}"
+    OPERATORS.add(name, part, replace=True)
+    return {"operator.kind": name}
+
+
+def _of_frame(frame: "pandas.DataFrame") -> tuple[Array, Array]:
+    """Times (N,) [s] and motion (N, 3, 6 or 9) of a frame that is called as an operator's file.
+
+    Raises:
+        ParameterError: It has no time, no place, or columns of another name.
+    """
+    from teleop_core.session.exchange.recorded_hand import COLUMNS
+
+    named = frame if "t" in frame else frame.reset_index(names="t")
+    needed = f"columns of {', '.join(COLUMNS)}; t may be the index, and x, y, z are needed"
+    names = [str(name) for name in named.columns]
+    if not set(COLUMNS[:4]) <= set(names) <= set(COLUMNS):
+        raise ParameterError("operator", f"a frame of {', '.join(names)}", needed)
+    width = 4 if set(names) <= set(COLUMNS[:4]) else 7 if set(names) <= set(COLUMNS[:7]) else 10
+    whole = named.reindex(columns=COLUMNS[:width], fill_value=0.0)
+    values = np.asarray(whole.to_numpy(dtype=np.float64))
+    return values[:, 0], values[:, 1:]
+
+
+def _file_settings(path: Path) -> dict[str, object]:
+    if path.suffix.lower() == ".csv":
+        return {"operator.kind": "file", "operator.file.path": str(path)}
+    return {"operator.kind": "bag", "operator.bag": str(path)}
+
+
+def _plain(value: object) -> object:
+    """Value of a setting without the types of NumPy."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(element) for element in value]
+    return value

@@ -1,0 +1,216 @@
+"""Bag source: recordings of ROS 1 and 2 whose topics are the motion and the buttons of a hand."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from teleop_core.bags.reader import Bag
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Kind
+from teleop_core.kernels.geometry import Array
+from teleop_core.session.exchange.bag_messages import (
+    JOY,
+    POSES,
+    TRANSFORMS,
+    JoyReader,
+    PoseReader,
+    frames,
+    plain,
+)
+from teleop_core.session.exchange.options import BUTTONS, ImportOptions, button_map
+from teleop_core.session.exchange.orientation import Attitudes
+from teleop_core.session.exchange.ros_bags import OurBag, RosBag, is_plain_mcap, opened_by_rosbags
+from teleop_core.session.exchange.source import Block, Presses
+
+_LOOKED_AT = 1000
+"""Messages of transforms whose frames are listed."""
+_TABLE_OPTIONS = ("time", "rate", "position", "quaternion", "matrix", "euler", "rotation_vector",
+                  "forward", *BUTTONS)  # fmt: skip
+
+
+class BagSource:
+    """A recording of ROS as a source; see :class:`~teleop_core.session.exchange.source.Source`.
+
+    Args:
+        path: Directory of a rosbag2 recording, ``.mcap`` or ``.db3`` file, or ROS 1 ``.bag``.
+        options: What is taken of it.
+
+    Raises:
+        RecordingError: It cannot be read, or holds no poses.
+        ParameterError: Several topics hold poses, or an option does not fit.
+        UnknownNameError: The topic or frame is not there.
+    """
+
+    has_time, time_unit, bad_rows, is_unit_said = True, "ns", 0, True
+
+    def __init__(self, path: Path, options: ImportOptions) -> None:
+        self.path, self._options = path, options
+        self.unit = "m" if options.unit == "auto" else options.unit
+        self.attitudes = Attitudes("quaternion", "wxyz")
+        self.told: list[str] = []
+        if given := [name for name in _TABLE_OPTIONS if getattr(options, name)]:
+            text = "left out: a recording of ROS has topics, not columns (--topic, --buttons)"
+            raise ParameterError(f"--{given[0].replace('_', '-')}", "given", text)
+        self._bag = Bag(path) if is_plain_mcap(path) else None
+        with self._opened() as bag:
+            self._types = bag.types
+            self._topic = self._pose_topic()
+            self._frame = self._child_frame(bag)
+            self._joy = self._joy_topic()
+            self._numbers = self._button_numbers(bag)
+
+    @contextmanager
+    def _opened(self) -> Iterator[RosBag]:
+        """The recording, to be read message by message.
+
+        Raises:
+            RecordingError: It cannot be read.
+        """
+        with damage_told(self.path):
+            if self._bag is not None:
+                yield OurBag(self._bag)
+                return
+            if self.path.is_dir() and not _holds(self.path, ".db3", ".mcap", ".zstd"):
+                reason = "is no recording: it holds no .mcap and no .db3; of ROS 1 give the .bag"
+                raise RecordingError(self.path, f"{reason} file")
+            with opened_by_rosbags(self.path) as bag:
+                yield bag
+
+    # -- which topics ----------------------------------------------------------------------------
+
+    def _pose_topic(self) -> str:
+        found = [n for n, kind in self._types.items() if kind in POSES or kind in TRANSFORMS]
+        if self._options.topic:
+            wanted = _named(self._options.topic, self._types)
+            if wanted is None:
+                named = plain(self._options.topic)
+                raise UnknownNameError("--topic", named, sorted(found or self._types))
+            if wanted not in found:
+                listed = ", ".join(sorted(found)) or "none"
+                reason = f"{wanted} is a {self._types[wanted]}, no pose; topics of poses: {listed}"
+                raise RecordingError(self.path, reason)
+            return wanted
+        if not found:
+            listed = ", ".join(f"{n} ({kind})" for n, kind in sorted(self._types.items()))
+            raise RecordingError(
+                self.path, f"holds no topic of poses; it has {listed or 'nothing'}"
+            )
+        stamped = [name for name in found if self._types[name] not in TRANSFORMS]
+        for few in ([n for n in found if n == MASTER_MEASURED_CP.name], found, stamped):
+            if len(few) == 1:
+                self.told.append(f"poses of {few[0]} ({self._types[few[0]]})")
+                return few[0]
+        raise UnknownNameError("--topic", "", sorted(found))
+
+    def _child_frame(self, bag: RosBag) -> str:
+        if self._types[self._topic] not in TRANSFORMS:
+            return ""
+        poses = self._pose_reader(bag)
+        known: dict[str, None] = {}
+        for number, (_, data) in enumerate(bag.raw(self._topic)):
+            known |= dict.fromkeys(frames(poses.message(data)))
+            if number >= _LOOKED_AT:
+                break
+        wanted = plain(self._options.frame)
+        if not wanted and len(known) == 1:
+            wanted = next(iter(known))
+            self.told.append(f"transforms of the frame {wanted}")
+        if wanted not in known:
+            raise UnknownNameError("--frame", wanted, sorted(known))
+        return wanted
+
+    def _joy_topic(self) -> str:
+        found = [name for name, kind in self._types.items() if kind == JOY]
+        if self._options.buttons == "none":
+            return ""
+        if given := self._options.buttons_topic:
+            wanted = _named(given, found)
+            if wanted is None:
+                raise UnknownNameError("--buttons-topic", plain(given), sorted(found) or ["none"])
+            return wanted
+        if MASTER_BUTTONS.name in found or len(found) == 1:
+            return MASTER_BUTTONS.name if MASTER_BUTTONS.name in found else found[0]
+        if found and self._options.buttons:
+            raise UnknownNameError("--buttons-topic", "", sorted(found))
+        if found:
+            self.told.append(f"no buttons; --buttons-topic takes one of {', '.join(sorted(found))}")
+        elif self._options.buttons:
+            raise ParameterError("--buttons", self._options.buttons, "left out: there is no Joy")
+        return ""
+
+    def _button_numbers(self, bag: RosBag) -> tuple[int, ...]:
+        """Numbers of clutch, fixture and mode among the buttons; -1 for those that are not."""
+        if not self._joy:
+            return ()
+        joy = JoyReader(bag.typestore, is_ros2=bag.is_ros2, numbers=())
+        _, first = next(bag.raw(self._joy))
+        count = len(joy.message(first).buttons)
+        named = button_map(self._options.buttons) if self._options.buttons else {}
+        named = named or {name: i for i, name in enumerate(BUTTONS) if i < count}
+        if beyond := [number for number in named.values() if number >= count]:
+            needed = f"below {count}, the number of buttons of {self._joy}"
+            raise ParameterError("--buttons", beyond[0], needed)
+        listed = ", ".join(f"{name} = {number}" for name, number in named.items())
+        self.told.append(f"buttons of {self._joy}: {listed or 'none'}")
+        return tuple(named.get(name, -1) for name in BUTTONS)
+
+    # -- messages --------------------------------------------------------------------------------
+
+    def _pose_reader(self, bag: RosBag) -> PoseReader:
+        frame = getattr(self, "_frame", "")
+        kind = self._types[self._topic]
+        return PoseReader(bag.typestore, kind, is_ros2=bag.is_ros2, frame=frame)
+
+    def blocks(self) -> Iterator[Block]:
+        """As of any source.
+
+        Raises:
+            RecordingError: The file is damaged.
+        """
+        if self._bag is not None and self._types[self._topic] == Kind.POSE.ros_type:
+            for found in self._bag.blocks([self._topic]):
+                if self._topic in found:
+                    series = found[self._topic]
+                    yield self._block(series.stamp_ns, series.log_ns, series.values)
+            return
+        with self._opened() as bag:
+            poses = self._pose_reader(bag)
+            for rows in poses.blocks(bag.raw(self._topic)):
+                yield self._block(*rows)
+
+    def _block(self, stamps: Any, logs: Any, poses: Array) -> Block:
+        quaternions = self.attitudes.quaternions(poses[:, 3:])
+        return Block(stamps, poses[:, :3], quaternions, log_ns=logs)
+
+    def presses(self) -> Presses | None:
+        """As of any source."""
+        if not self._joy:
+            return None
+        with self._opened() as bag:
+            joy = JoyReader(bag.typestore, is_ros2=bag.is_ros2, numbers=self._numbers)
+            return Presses(*joy.read(bag.raw(self._joy)))
+
+    def check(self, finite: Array) -> None:
+        """As of any source."""
+        if not finite.all():
+            names = np.array(["x", "y", "z", "orientation"])[finite == 0]
+            raise RecordingError(self.path, f"{self._topic}: {', '.join(names)} holds no numbers")
+
+
+def _named(wanted: str, names: Iterable[str]) -> str | None:
+    """The topic that is called so, or alone ends so; of ``a|b`` the first; None without one."""
+    known = list(names)
+    for name in map(plain, wanted.split("|")):
+        ends = [one for one in known if name and f"/{one}".endswith(f"/{name}")]
+        if name in known or len(ends) == 1 or ("|" in wanted and not name):
+            return name if name in known or not name else ends[0]
+    return None
+
+
+def _holds(path: Path, *ends: str) -> bool:
+    """Whether a directory has a file with one of these ends."""
+    return any(file.suffix in ends for file in path.iterdir())

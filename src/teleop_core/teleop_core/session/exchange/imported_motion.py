@@ -1,0 +1,234 @@
+"""Motion: an imported hand, cleaned and in the master's axes, to be read block by block."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import RecordingError
+from teleop_core.kernels.geometry import Array, quaternion_from_rotation, quaternion_products
+from teleop_core.kernels.portable import product
+from teleop_core.session.exchange.gathering import bridge, gather
+from teleop_core.session.exchange.options import ImportOptions
+from teleop_core.session.exchange.orientation import continuous
+from teleop_core.session.exchange.source import Source
+from teleop_core.session.exchange.spool import Spool
+from teleop_core.session.exchange.times import SECOND_NS, Stamps, gaps, ordered
+
+if TYPE_CHECKING:
+    from teleop_core.session.exchange.tables import Table
+
+ROWS = 20_000
+"""Rows of a block."""
+MOST_BACKWARDS = 0.01
+"""Share of rows whose time may go back before the file is refused."""
+MOST_DOUBLED = 0.5
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What became of the rows of a file.
+
+    Attributes:
+        rows: Rows in the file.
+        samples: Rows that are left.
+        missing: Rows left out because a number is missing or NaN, or the orientation is none.
+        filled: Missing rows that were interpolated.
+        doubled: Rows left out because their time was there already.
+        backwards: Rows whose time went back; left out or sorted in.
+        damaged: Rows left out because they have too few or too many cells.
+    """
+
+    rows: int
+    samples: int
+    missing: int
+    filled: int
+    doubled: int
+    backwards: int
+    damaged: int
+
+
+class Motion:
+    """Poses of a hand in the master's axes.
+
+    Args:
+        path: The file.
+        options: What is taken of it, and what becomes of that.
+        spool: Where its rows are kept; it must stay open as long as they are read.
+
+    Attributes:
+        stamp_ns: Times (N,) [ns], rising.
+        counts: What became of the rows.
+        told: What was taken, guessed and changed, in words.
+        strange: How many rows were left out because their orientation is none.
+        gaps: Begin and length [s] of each gap, the longest first.
+
+    Raises:
+        RecordingError: The file is missing, damaged or holds no motion; times go back too often
+            or stand still, or fewer than two rows are left.
+        ParameterError: An option does not fit the file.
+    """
+
+    def __init__(self, path: Path, options: ImportOptions, spool: Spool) -> None:
+        gathered = gather(open_source(path, options), options, spool)
+        self._path, self._gathered, self._options = path, gathered, options
+        self.told, self.strange = list(gathered.told), gathered.strange
+        filled = 0
+        if options.missing == "interpolate":
+            filled = bridge(gathered, round(options.missing_time * SECOND_NS))
+        # Every copy of the times of an hour at 1 kHz takes 29 MB.
+        usable = np.flatnonzero(gathered.is_usable).astype(np.int32)
+        is_whole = len(usable) == len(gathered.is_usable)
+        stamps = gathered.stamp_ns if is_whole else gathered.stamp_ns[usable]
+        gathered.stamp_ns = stamps[:0]
+        order = ordered(stamps, is_sorted=options.backwards == "sort")
+        is_kept = not order.doubled and not order.backwards
+        self._rows = usable if is_kept else usable[order.rows]
+        self.stamp_ns: Stamps = stamps if is_kept else stamps[order.rows]
+        self.counts = Counts(
+            rows=gathered.spool.count + gathered.bad_rows, samples=len(self._rows),
+            missing=gathered.spool.count - len(usable), filled=filled, doubled=order.doubled,
+            backwards=order.backwards, damaged=gathered.bad_rows,
+        )  # fmt: skip
+        self._check()
+        self.gaps = gaps(self.stamp_ns, options.gap)
+        self._turn = options.axis_map()
+        self._shift_ns = 0
+        self._origin = np.zeros(3)
+        self._origin = self._center()
+
+    def _check(self) -> None:
+        """Refuse what is no motion.
+
+        Raises:
+            RecordingError: Says what it is.
+        """
+        c, policy = self.counts, self._options.backwards
+        most = {"refuse": 0.0, "auto": MOST_BACKWARDS}.get(policy, 1.0)
+        timed = max(1, c.rows - c.missing - c.damaged)
+        if c.backwards > most * timed:
+            share = 100.0 * c.backwards / timed
+            hint = "is --time the right column? Else give --backwards sort or drop"
+            raise RecordingError(self._path, f"the time goes back in {c.backwards} rows "
+                                 f"({share:.3g} %): {hint}")  # fmt: skip
+        if c.doubled > MOST_DOUBLED * timed:
+            share = 100.0 * c.doubled / timed
+            hint = "it is too coarse; give --rate HZ, or --stamps log for a bag"
+            raise RecordingError(self._path, f"the time stands still in {share:.3g} % of the rows: "
+                                 f"{hint}")  # fmt: skip
+        if c.samples < 2:
+            what = f"{c.samples} usable rows of {c.rows}; a motion needs two"
+            raise RecordingError(self._path, f"holds {what}")
+
+    def begin(self, first_ns: int) -> None:
+        """Move the stamps, once, so that a time [ns] near 0 becomes 1 s; later ones stay."""
+        if first_ns >= SECOND_NS:
+            return
+        self.told.append(f"stamps begin at 1 s (in the file at {first_ns / SECOND_NS:g} s)")
+        self._shift_ns = SECOND_NS - first_ns
+        self.stamp_ns += self._shift_ns
+
+    def losses(self) -> list[str]:
+        """Rows that were left out or changed, in words."""
+        c = self.counts
+        parts = [
+            (c.missing, "with missing numbers left out"), (c.filled, "filled by straight lines"),
+            (c.doubled, "doubled left out"), (c.backwards, "going back in time"),
+            (c.damaged, "with a wrong number of cells left out"),
+        ]  # fmt: skip
+        return [f"{count} {text}" for count, text in parts if count]
+
+    def _center(self) -> Array:
+        """Place in the master's axes [m] that comes to zero."""
+        if self._options.center == "keep":
+            return np.zeros(3)
+        total, low, high = np.zeros(3), np.full(3, np.inf), np.full(3, -np.inf)
+        start = None
+        for _, poses in self.blocks():
+            start = poses[0, :3].copy() if start is None else start
+            total += poses[:, :3].sum(axis=0)
+            low = np.minimum(low, poses[:, :3].min(axis=0))
+            high = np.maximum(high, poses[:, :3].max(axis=0))
+        assert start is not None
+        mean = total / len(self.stamp_ns)
+        center = {"mean": mean, "middle": 0.5 * (low + high), "start": start}[self._options.center]
+        listed = ", ".join(f"{1e3 * value:.1f}" for value in center)
+        self.told.append(f"{self._options.center} of the motion at ({listed}) mm brought to zero")
+        return center
+
+    def blocks(self) -> Iterator[tuple[Stamps, Array]]:
+        """Stamps (n,) [ns] and poses (n, 7), one block after the other."""
+        last = None
+        for begin in range(0, len(self._rows), ROWS):
+            part = slice(begin, begin + ROWS)
+            rows = self._gathered.spool.chosen(self._rows[part])
+            place = self._options.scale * product(rows[:, :3], self._turn.T) - self._origin
+            turns = continuous(self._turned(rows[:, 3:]), last)
+            last = turns[-1]
+            yield self.stamp_ns[part], np.column_stack((place, turns))
+
+    def _turned(self, quaternions: Array) -> Array:
+        """Attitudes (n, 4) in the master's axes; a mirror turns those of the body as well."""
+        if self._options.handedness == "right":
+            turn = np.empty(4)
+            quaternion_from_rotation(self._turn, turn)
+            return quaternion_products(turn, quaternions)
+        # A turn of the file about an axis is the opposite turn about the mirrored axis.
+        return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], self._turn.T)))
+
+    def presses(self) -> tuple[Stamps, NDArray[np.uint8]] | None:
+        """Stamps (n,) [ns] and buttons (n, 3) where they change, the first time; None without."""
+        g = self._gathered
+        if g.presses is not None:
+            stamps, pressed = g.presses.stamp_ns + self._shift_ns, g.presses.pressed
+            order = ordered(stamps)
+            stamps, pressed = stamps[order.rows], pressed[order.rows]
+        elif g.buttons is not None:
+            stamps, pressed = self.stamp_ns, g.buttons[self._rows]
+        else:
+            return None
+        if not len(stamps):
+            return None
+        changes = np.ones(len(stamps), np.bool_)
+        changes[1:] = (pressed[1:] != pressed[:-1]).any(axis=1)
+        changes &= stamps >= 0
+        return (stamps[changes], pressed[changes]) if changes.any() else None
+
+
+_BAGS = {".bag", ".mcap", ".db3"}
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is a recording of ROS: a directory of one, or a file of one."""
+    return path.is_dir() or path.suffix.lower() in _BAGS
+
+
+def open_source(path: Path, options: ImportOptions) -> Source:
+    """Source that reads a file.
+
+    Raises:
+        RecordingError: It is missing, empty, or nothing that can be read.
+        ParameterError: An option does not fit it.
+    """
+    if not path.exists():
+        raise RecordingError(path, "does not exist")
+    if is_bag(path):
+        from teleop_core.session.exchange.bag_source import BagSource
+
+        return BagSource(path, options)
+    from teleop_core.session.exchange.table_source import TableSource
+
+    return TableSource(_table(path, options), options)
+
+
+def _table(path: Path, options: ImportOptions) -> "Table":
+    from teleop_core.session.exchange.tables import ParquetTable
+    from teleop_core.session.exchange.text_table import TextTable
+
+    with damage_told(path), path.open("rb") as file:
+        magic = file.read(4)
+    return ParquetTable(path) if magic == b"PAR1" else TextTable(path, options.skip)

@@ -1,0 +1,163 @@
+"""Orientation: attitudes in any notation as unit quaternions w, x, y, z, block by block.
+
+What cannot be a rotation becomes NaN and is counted as strange, what is missing stays NaN.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array, multiply_quaternions
+from teleop_core.kernels.portable import dot, length, product
+
+if TYPE_CHECKING:  # half a second to import, and most files hold quaternions
+    from scipy.spatial.transform import Rotation
+
+TOLERANCE = 0.1
+"""How far a quaternion's length, or a matrix from being a rotation, may be off."""
+_MISSING = 1e-6  # shorter quaternions and directions mean that nothing was measured
+
+
+@dataclass
+class Attitudes:
+    """Rows of one notation, one block after the other.
+
+    Attributes:
+        kind: ``quaternion``, ``matrix``, ``euler``, ``rotation_vector``, ``forward`` or ``none``.
+        order: ``wxyz`` or ``xyzw``; ``row`` or ``column``; or the order of Euler angles.
+        degrees: Whether angles are in degrees.
+        strange: How many rows cannot be rotations.
+        mirrored: How many of these are mirrors.
+        longest: By how much the length of a quaternion taken differed from 1, at most.
+    """
+
+    kind: str
+    order: str = ""
+    degrees: bool = False
+    strange: int = 0
+    mirrored: int = 0
+    longest: float = 0.0
+    _last: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+
+    @property
+    def width(self) -> int:
+        """Numbers in a row."""
+        return {"quaternion": 4, "matrix": 9, "none": 0}.get(self.kind, 3)
+
+    def quaternions(self, rows: Array) -> Array:
+        """Unit quaternions (N, 4) of the next rows (N, width); NaN where there is none."""
+        if self.kind == "none":
+            return np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))
+        if self.kind == "quaternion":
+            turned = rows[:, [3, 0, 1, 2]] if self.order == "xyzw" else rows
+            return self._unit(turned)
+        if self.kind == "matrix":
+            matrices = rows.reshape(-1, 3, 3)
+            return self._of_matrices(
+                matrices.transpose(0, 2, 1) if self.order == "column" else matrices
+            )
+        if self.kind == "forward":
+            return self._of_directions(rows)
+        return self._of_angles(rows)
+
+    def _unit(self, quaternions: Array) -> Array:
+        lengths = length(quaternions)
+        missing = lengths < _MISSING
+        strange = np.abs(lengths - 1.0) > TOLERANCE
+        self.strange += int((strange & ~missing).sum())
+        lengths[strange | missing] = math.nan
+        off = np.abs(lengths[np.isfinite(lengths)] - 1.0)
+        self.longest = max(self.longest, float(off.max(initial=0.0)))
+        unit: Array = quaternions / lengths[:, None]
+        return unit
+
+    def _of_matrices(self, matrices: Array) -> Array:
+        from scipy.spatial.transform import Rotation
+
+        squares = product(matrices, matrices.transpose(0, 2, 1))
+        missing = np.abs(matrices).max(axis=(1, 2), initial=0.0) < _MISSING
+        off = np.abs(squares - np.eye(3)).max(axis=(1, 2), initial=0.0) > TOLERANCE
+        mirror = dot(np.cross(matrices[:, 0], matrices[:, 1]), matrices[:, 2]) < 0.0
+        self.strange += int(((off | mirror) & ~missing).sum())
+        self.mirrored += int((mirror & ~off).sum())
+        is_rotation = ~(off | mirror | missing) & np.isfinite(matrices).all(axis=(1, 2))
+        return _where(is_rotation, Rotation.from_matrix(matrices[is_rotation]))
+
+    def _of_angles(self, rows: Array) -> Array:
+        """Of Euler angles (small letters about fixed axes), or of rotation vectors."""
+        from scipy.spatial.transform import Rotation
+
+        known = np.asarray(np.isfinite(rows).all(axis=1))
+        if self.kind == "euler":
+            return _where(known, Rotation.from_euler(self.order, rows[known], self.degrees))
+        return _where(known, Rotation.from_rotvec(rows[known], self.degrees))
+
+    def _of_directions(self, directions: Array) -> Array:
+        """By parallel transport: from each direction to the next by the shortest turn."""
+        lengths = length(directions)
+        lengths[lengths < _MISSING] = math.nan
+        quaternions = np.empty((len(directions), 4))
+        transport(directions / lengths[:, None], self._last, quaternions)
+        return quaternions
+
+
+@kernel
+def transport(directions: Array, last: Array, quaternions: Array) -> None:
+    """Write the quaternions (N, 4) of directions (N, 3) that turn along by the shortest way.
+
+    Args:
+        directions: Unit vectors; rows with NaN give NaN.
+        last: The last direction and quaternion (7,); written.
+        quaternions: Written.
+
+    Source:
+        Hanson and Ma 1995, Parallel transport approach to curve framing, section 3.
+    """
+    turn = np.empty(4)
+    for i in range(directions.shape[0]):
+        ax, ay, az = last[0], last[1], last[2]
+        bx, by, bz = directions[i, 0], directions[i, 1], directions[i, 2]
+        if not math.isfinite(bx + by + bz):
+            for j in range(4):
+                quaternions[i, j] = math.nan
+            continue
+        w = 1.0 + ax * bx + ay * by + az * bz
+        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        if w < 1e-12:  # straight back: about any axis at right angles
+            w = 0.0
+            if abs(ax) < 0.9:
+                x, y, z = 0.0, az, -ay
+            else:
+                x, y, z = -az, 0.0, ax
+        scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+        turn[0], turn[1], turn[2], turn[3] = w * scale, x * scale, y * scale, z * scale
+        multiply_quaternions(turn, last[3:7], last[3:7])
+        last[0], last[1], last[2] = bx, by, bz
+        size = 0.0
+        for j in range(4):
+            size += last[3 + j] * last[3 + j]
+        for j in range(4):
+            last[3 + j] /= math.sqrt(size)
+            quaternions[i, j] = last[3 + j]
+
+
+def _where(is_known: NDArray[np.bool_], turns: "Rotation") -> Array:
+    """Quaternions (N, 4), w first, of the rows that are known; NaN in all others."""
+    quaternions = np.full((len(is_known), 4), math.nan)
+    quaternions[is_known] = turns.as_quat(scalar_first=True)
+    return quaternions
+
+
+def continuous(quaternions: Array, last: Array | None) -> Array:
+    """The same rotations (N, 4) with signs that never jump, from ``last`` on."""
+    if not len(quaternions):
+        return quaternions
+    first = quaternions[:1] if last is None else last[None]
+    before = np.concatenate((first, quaternions[:-1]))
+    flips: NDArray[np.float64] = np.where((quaternions * before).sum(axis=1) < 0.0, -1.0, 1.0)
+    signed: Array = quaternions * np.cumprod(flips)[:, None]
+    return signed

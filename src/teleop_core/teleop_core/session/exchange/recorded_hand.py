@@ -1,0 +1,247 @@
+"""Recorded operators: a hand that follows a recording or a table of numbers.
+
+The motion is taken as it is, relative to its first sample, which the hand reaches by a smooth
+approach to ``operator.center``; where that is zero, it is there from the start. Between samples the
+hand moves and turns along straight lines; over gaps it waits.
+"""
+
+import csv
+import warnings
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import ParameterError, RecordingError
+from teleop_core.base.parameters import parameter
+from teleop_core.chain.operators import Motion, Operator, Setting
+from teleop_core.chain.operators.rest import REST_TILT
+from teleop_core.chain.operators.shapes import minimum_jerk
+from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.kernels.geometry import Array, quaternion_products
+from teleop_core.kernels.portable import arctangent, length
+from teleop_core.session.exchange.master_bag import as_master_bag
+from teleop_core.session.exchange.options import ImportOptions
+from teleop_core.session.exchange.orientation import continuous
+
+COLUMNS = ("t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode")
+"""Columns of a table: time [s], position [m], rotation vector [rad], buttons (1 pressed)."""
+_PERIODS = 5.0
+"""A gap is longer than so many periods of the recording, whatever ``longest_gap`` says."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileParameters:
+    """A table of what the hand wants."""
+
+    path: str = parameter(
+        "", fixed=True,
+        doc="CSV or Parquet file, best with a head of t, x, y, z and, if wanted, rx, ry, rz, "
+        "clutch, fixture, mode [s, m, rad]",
+    )  # fmt: skip
+
+
+class Samples(NamedTuple):
+    """A recorded hand, relative to its first sample.
+
+    Attributes:
+        at: Times (N,) [s] since the first sample.
+        moves: Places (N, 3) [m], in the master's axes.
+        turns: Turns since the first sample, quaternions (N, 4) in the master's axes; their signs
+            do not jump.
+        pressed_at: Times (K,) [s] at which buttons change.
+        pressed: Clutch, fixture, mode from then on (K, 3).
+    """
+
+    at: Array
+    moves: Array
+    turns: Array
+    pressed_at: Array
+    pressed: Array
+
+
+def _bag(parameters: object, setting: Setting) -> Motion:
+    """Motion of a recording.
+
+    Raises:
+        RecordingError: It is missing or holds no motion.
+        ParameterError: It has several topics of poses.
+    """
+    return _motion(Path(setting.common.bag), None, setting)
+
+
+def _file(parameters: FileParameters, setting: Setting) -> Motion:
+    """Motion of a table.
+
+    Raises:
+        RecordingError: The file cannot be read, or its numbers are no motion.
+        ParameterError: No file is named, or its columns cannot be guessed.
+    """
+    path = _named(parameters)
+    return _motion(path, columns_of(path), setting)
+
+
+def _named(parameters: FileParameters) -> Path:
+    if not parameters.path:
+        raise ParameterError("operator.file.path", "", "a CSV file, for operator.kind file")
+    return Path(parameters.path)
+
+
+def _bag_length(parameters: object, setting: Setting) -> float:
+    """Time of the approach and of the recording [s]."""
+    return _length(samples_of(Path(setting.common.bag), None), setting)
+
+
+def _file_length(parameters: FileParameters, setting: Setting) -> float:
+    """Time of the approach and of the table [s]."""
+    path = _named(parameters)
+    return _length(samples_of(path, columns_of(path)), setting)
+
+
+def _length(samples: Samples, setting: Setting) -> float:
+    return _approach(setting) + float(samples.at[-1])
+
+
+def _approach(setting: Setting) -> float:
+    """Time of the approach [s]: none where there is nothing to approach."""
+    return float(setting.common.approach_time) if any(setting.common.center) else 0.0
+
+
+def columns_of(path: Path) -> ImportOptions | None:
+    """Columns of a table that are called as :data:`COLUMNS`; None for other tables."""
+    try:
+        with damage_told(path), path.open(newline="", encoding="utf-8") as file:
+            head = [name.strip() for name in next(csv.reader(file), [])]
+    except RecordingError:  # whoever reads all of it says what is wrong
+        return None
+    if not set(COLUMNS[:4]) <= set(head):
+        return None
+    turn = COLUMNS[4:7] if set(COLUMNS[4:7]) <= set(head) else ()
+    return ImportOptions(
+        time=COLUMNS[:1], time_unit="s", position=COLUMNS[1:4], unit="m", rotation_vector=turn,
+        angles="rad", orientation="none",
+    ).changed(**{name: name for name in COLUMNS[7:] if name in head})  # fmt: skip
+
+
+def samples_of(path: Path, options: ImportOptions | None) -> Samples:
+    """Samples of a recording or table; what was left out or guessed is told as a warning.
+
+    Raises:
+        RecordingError: It cannot be read, or holds no motion.
+        ParameterError: What the hand is cannot be guessed.
+    """
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError as error:
+        raise RecordingError(path, f"cannot be read: {error.strerror}") from error
+    return _read(path, options, changed)
+
+
+@lru_cache(maxsize=2)
+def _read(path: Path, options: ImportOptions | None, changed_ns: int) -> Samples:
+    bag = as_master_bag(path, options)
+    bag.require((MASTER_MEASURED_CP,))
+    series = bag.read(MASTER_MEASURED_CP)
+    new = np.concatenate(([True], np.diff(series.stamp_ns) > 0))
+    stamps, values = series.stamp_ns[new], series.values[new]
+    start_ns, first = int(stamps[0]), values[0, 3:] * (1.0, -1.0, -1.0, -1.0)
+    turns = continuous(quaternion_products(values[:, 3:], first), np.array([1.0, 0.0, 0.0, 0.0]))
+    pressed_at: Array = np.zeros(0)
+    pressed: Array = np.zeros((0, 3))
+    if MASTER_BUTTONS.name in bag.topics and bag.topics[MASTER_BUTTONS.name].count:
+        buttons = bag.read(MASTER_BUTTONS)
+        pressed_at, pressed = (buttons.stamp_ns - start_ns) * np.float64(1e-9), buttons.values
+    at: Array = (stamps - start_ns) * np.float64(1e-9)
+    return Samples(at, values[:, :3] - values[0, :3], turns, pressed_at, pressed)
+
+
+def _motion(path: Path, options: ImportOptions | None, setting: Setting) -> Motion:
+    """Motion that approaches the centre and follows the samples there."""
+    samples = samples_of(path, options)
+    _tell_stops(path, samples, setting)
+    approach, center = _approach(setting), np.array(setting.common.center)
+    period = float(np.median(np.diff(samples.at))) if len(samples.at) > 1 else 0.0
+    longest = max(float(setting.common.longest_gap), _PERIODS * period)
+    rest = np.array([np.cos(0.5 * REST_TILT), np.sin(0.5 * REST_TILT), 0.0, 0.0])
+
+    def motion(times: Array) -> Array:
+        moved = times - approach
+        moves, turns = between(samples, moved, longest)
+        if approach:
+            share = minimum_jerk(times / approach)[:, None]
+            moves += share * center
+        return np.column_stack((moves, _in_axes_of(rest, turns), held(samples, moved)))
+
+    return motion
+
+
+def between(samples: Samples, times: Array, longest: float) -> tuple[Array, Array]:
+    """Places (N, 3) [m] and turns (N, 4), on straight lines between samples.
+
+    Before the first sample and after the last one they rest, and so they do over longer gaps until
+    the next sample is there.
+
+    Args:
+        samples: The recording.
+        times: Times (N,) [s] since the first sample.
+        longest: Longest time between two samples that is interpolated [s].
+    """
+    last = len(samples.at) - 1
+    left = np.clip(np.searchsorted(samples.at, times, side="right") - 1, 0, last)
+    right = np.minimum(left + 1, last)
+    step = samples.at[right] - samples.at[left]
+    inside = (times > samples.at[left]) & (step > 0.0) & (step <= longest)
+    share = np.where(inside, (times - samples.at[left]) / np.where(step > 0.0, step, 1.0), 0.0)
+    share = share[:, None]
+    moves = (1.0 - share) * samples.moves[left] + share * samples.moves[right]
+    turns = (1.0 - share) * samples.turns[left] + share * samples.turns[right]
+    return moves, turns / length(turns)[:, None]
+
+
+def held(samples: Samples, times: Array) -> Array:
+    """Buttons (N, 3): each as it was pressed last; released before the first sample."""
+    pressed = np.vstack((np.zeros(3), samples.pressed))
+    return np.asarray(pressed[np.searchsorted(samples.pressed_at, times, side="right")])
+
+
+def _in_axes_of(rest: Array, turns: Array) -> Array:
+    """Rotation vectors (N, 3) in the axes of an attitude, of turns (N, 4) in the base's."""
+    own = quaternion_products(quaternion_products(rest * (1.0, -1.0, -1.0, -1.0), turns), rest)
+    sine = length(own[:, 1:])
+    angle = 2.0 * arctangent(sine, own[:, 0])
+    return np.asarray(own[:, 1:] * (angle / np.where(sine > 0.0, sine, 1.0))[:, None])
+
+
+def _tell_stops(path: Path, samples: Samples, setting: Setting) -> None:
+    """Tell a motion that leaves the device's workspace, and how it would not."""
+    device = setting.common.device
+    size, start = np.array(device.workspace), np.array(device.start)
+    places = samples.moves + np.array(setting.common.center) + start  # from the middle
+    beyond = np.abs(places) - 0.5 * size
+    is_beyond = (beyond > 0.0).any(axis=1)
+    if not is_beyond.any():
+        return
+    low, high = samples.moves.min(axis=0), samples.moves.max(axis=0)
+    hint = f"operator.center={_metres(-start - 0.5 * (low + high))} keeps it within"
+    if (high - low > size).any():
+        fits = 0.99 * float((size / np.maximum(high - low, 1e-9)).min())
+        hint = f"it is {_millimetres(high - low)}: `teleop import --scale {fits:.2g}`"
+    share = 100.0 * is_beyond.mean()
+    room = f"the device's workspace of {_millimetres(size)}"
+    text = f"{share:.3g} % of the motion leaves {room}, by up to {1e3 * beyond.max():.3g} mm"
+    warnings.warn(f"{path.name}: {text}; {hint}", stacklevel=2)
+
+
+def _metres(place: Array) -> str:
+    return "[" + ",".join(f"{round(value, 4) + 0.0:g}" for value in place.tolist()) + "]"
+
+
+def _millimetres(size: Array) -> str:
+    return " × ".join(f"{1e3 * value:.0f}" for value in size) + " mm"
+
+
+BAG = Operator("bag", _bag, trembles=True, length=_bag_length)
+FILE = Operator("file", _file, FileParameters, length=_file_length)

@@ -1,0 +1,164 @@
+"""Tables: files of rows and columns, CSV and Parquet, read a block of rows at a time."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import RecordingError, UnknownNameError
+
+Numbers = NDArray[np.float64] | NDArray[np.int64]
+"""A column; whole numbers where the file has them, such as times in nanoseconds."""
+ROWS = 65_536
+"""Rows of a block, about."""
+SAMPLE = 1000
+"""Rows that are looked at before reading."""
+
+
+class Table(Protocol):
+    """A file of rows and columns.
+
+    Attributes:
+        path: Where it is.
+        names: Names of the columns; those without one are ``column 4``, counted from 1.
+        is_named: Whether the names stand in the file.
+        bad_rows: How many rows were left out so far, because they have too few or too many cells.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    is_named: bool
+    bad_rows: int
+
+    def sample(self, column: int) -> Numbers:
+        """The first numbers of a column, up to :data:`SAMPLE`; NaN for what is none."""
+
+    def is_clock(self, column: int) -> bool:
+        """Whether a column holds dates, which are read as nanoseconds since 1970."""
+
+    def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
+        """Some columns, block by block.
+
+        Raises:
+            RecordingError: A cell is no number, or the file is damaged.
+        """
+
+
+def column_of(table: Table, name: str, option: str) -> int:
+    """Column by its name or, counted from 1, by its number.
+
+    Raises:
+        UnknownNameError: There is none; those that there are are listed.
+    """
+    if name in table.names:
+        return table.names.index(name)
+    small = [known.strip().lower() for known in table.names]
+    if small.count(name.strip().lower()) == 1:
+        return small.index(name.strip().lower())
+    if name.isdigit() and 1 <= int(name) <= len(table.names):
+        return int(name) - 1
+    listed = table.names if table.is_named else (f"1 to {len(table.names)}",)
+    raise UnknownNameError(f"column of {option}", name, listed)
+
+
+def unique(names: Sequence[str]) -> tuple[str, ...]:
+    """Names without blanks around them; those that come again get a number, empty ones too."""
+    seen: dict[str, int] = {}
+    out = []
+    for number, name in enumerate(names, start=1):
+        text = name.strip().strip('"').strip() or f"column {number}"
+        count = seen[text] = seen.get(text, 0) + 1
+        out.append(text if count == 1 else f"{text}.{count}")
+    return tuple(out)
+
+
+def numbers(column: "pa.ChunkedArray | pa.Array") -> Numbers:
+    """Column of Arrow as numbers; what is missing is NaN."""
+    kind = column.type
+    if pa.types.is_timestamp(kind):
+        column = column.cast(pa.timestamp("ns")).cast(pa.int64())
+    elif pa.types.is_boolean(kind):
+        column = column.cast(pa.int8())
+    elif pa.types.is_decimal(kind) or pa.types.is_string(kind) or pa.types.is_large_string(kind):
+        column = column.cast(pa.float64())
+    is_whole = pa.types.is_integer(column.type) and not column.null_count
+    found = column.to_numpy(zero_copy_only=False) if isinstance(column, pa.Array) else None
+    values = column.to_numpy() if found is None else found
+    if is_whole:
+        return np.asarray(values, np.int64)
+    return np.asarray(values, np.float64)
+
+
+class ParquetTable:
+    """A Parquet file; columns of lists of one length are ``name.0``, ``name.1`` and so on."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.is_named, self.bad_rows = path, True, 0
+        with damage_told(path, "is no sound Parquet file: {}"):
+            # Read as it is asked for: a file may be one single group of rows.
+            self._file = pq.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20)
+            self._first = self._head()
+            self.names = unique(self._first.schema.names)
+
+    def _head(self) -> pa.RecordBatch:
+        for batch in self._file.iter_batches(batch_size=SAMPLE):
+            return flat(batch)
+        raise RecordingError(self.path, "holds no rows")
+
+    def sample(self, column: int) -> Numbers:
+        """As of any table."""
+        try:
+            return numbers(self._first.column(column))
+        except (pa.ArrowInvalid, pa.ArrowNotImplementedError, ValueError, TypeError):
+            return np.full(self._first.num_rows, np.nan)
+
+    def is_clock(self, column: int) -> bool:
+        """As of any table."""
+        return bool(pa.types.is_timestamp(self._first.schema.types[column]))
+
+    def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
+        """As of any table."""
+        wanted = {self._first.schema.names[column].partition(".")[0] for column in columns}
+        kept = [name for name in self._file.schema_arrow.names if name.partition(".")[0] in wanted]
+        names = [self._first.schema.names[column] for column in columns]
+        with damage_told(self.path):
+            for batch in self._file.iter_batches(batch_size=ROWS, columns=kept):
+                whole = flat(batch)
+                yield [numbers(whole.column(whole.schema.names.index(name))) for name in names]
+
+
+def flat(batch: pa.RecordBatch) -> pa.RecordBatch:
+    """Batch without nested columns: parts of structures and lists of one length stand alone."""
+    names: list[str] = []
+    columns: list[pa.Array] = []
+    for name, column in zip(batch.schema.names, batch.columns, strict=True):
+        for part, values in _parts(name, column):
+            names.append(part)
+            columns.append(values)
+    return pa.RecordBatch.from_arrays(columns, names=names)
+
+
+def _parts(name: str, column: pa.Array) -> Iterator[tuple[str, pa.Array]]:
+    kind = column.type
+    if pa.types.is_struct(kind):
+        for field, values in zip(kind, column.flatten(), strict=True):
+            yield from _parts(f"{name}.{field.name}", values)
+    elif pa.types.is_fixed_size_list(kind) or pa.types.is_list(kind):
+        width = len(column[0]) if len(column) and column[0].is_valid else 0
+        values = column.flatten()
+        if width and len(values) == width * len(column):
+            for i in range(width):
+                yield f"{name}.{i}", values.take(_every(i, width, len(values)))
+        else:
+            yield name, pa.nulls(len(column), pa.float64())
+    else:
+        yield name, column
+
+
+def _every(first: int, step: int, length: int) -> pa.Array:
+    return pa.array(np.arange(first, length, step))

@@ -1,0 +1,193 @@
+"""Controllers: from setpoint and measurement to drive effort, one file per law.
+
+A controller works on all joints of an arm at once, tick by tick. Its gains are a table with a row
+per joint, which the parameters and the robot's drives give; its memory is another. Gravity that the
+source compensates, limits of the drives and encoders belong to the slave, not to the law.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, is_dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from teleop_core.base.errors import ParameterError, PartError
+from teleop_core.base.registry import Registry
+from teleop_core.graph.signals import DT
+from teleop_core.kernels import pointer
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.drives import Drives
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.trials import fenced, is_whole
+
+__all__ = ["CONTROLLERS", "Controller", "drives_and_poles", "per_joint", "register_controller"]
+
+_PLACE = "teleop_core.slave.controllers"
+_ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
+CONTROL = types.void(_TABLE, _TABLE, _ROW, _ROW, _ROW, _ROW, types.float64, _ROW)
+"""Signature of a control kernel, so that one compiled slave serves every law."""
+Begin = Callable[[Array, Array, Array], None]
+Shift = Callable[[Array, Array], None]
+
+
+def _nothing(*_: Array) -> None:
+    """Keep the memory as it is."""
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A control law.
+
+    Attributes:
+        name: What ``--set controller=`` calls it.
+        parameters: Its parameter group.
+        gains: ``gains(parameters, robot, viscous)`` gives the table (n, k) that ``control`` takes;
+            ``viscous`` (n,) is the friction in force [N·m·s/rad or N·s/m].
+        memory: Numbers that it remembers of each joint, zero at the start.
+        control: ``control(gains, memory, setpoint, measured, feedforward, limit, dt, effort)``, a
+            kernel or a plain function over all joints. Setpoint and measured position [rad or m],
+            feedforward and limit [N·m or N] are (n,), ``memory`` (n, m) is its own to write, and
+            ``effort`` (n,) gets the drive efforts; they are cut at ±limit afterwards. The
+            feedforward is the gravity that is compensated.
+        begin: ``begin(memory, measured, effort)`` prepares the memory for an arm at rest at
+            ``measured`` that needs ``effort`` to stay there.
+        shift: ``shift(memory, effort)`` lets it give so much more from now on, because the
+            feedforward, or a law with new gains, gives so much less.
+        uses_model: Whether the feedforward is (2 n + n²,): behind the gravity that is compensated
+            the model's bias, Coriolis, centrifugal and all gravity effort (n,) at measured
+            positions and speeds, and its inertia matrix (n, n), row by row. It is the model that is
+            known, not the plant; friction is in neither.
+    """
+
+    name: str
+    parameters: type
+    gains: Callable[[Any, Robot, Array], Array]
+    control: Callable[[Array, Array, Array, Array, Array, Array, float, Array], None]
+    memory: int = 0
+    begin: Begin = _nothing
+    shift: Shift = _nothing
+    uses_model: bool = False
+
+    def feedforward(self, n: int) -> int:
+        """Length of the feedforward that it takes, for ``n`` joints."""
+        return 2 * n + n * n if self.uses_model else n
+
+    @cached_property
+    def control_pointer(self) -> Any:
+        """The law as an argument for kernels."""
+        return pointer(self.control, CONTROL)
+
+
+def per_joint(robot: Robot, name: str, values: tuple[float, ...], default: Array) -> Array:
+    """One number per joint (n,): the given ones, or the robot's if none are given.
+
+    Raises:
+        ParameterError: There are more or fewer than joints.
+    """
+    if not values:
+        return default
+    if len(values) != robot.n:
+        raise ParameterError(f"slave_sim.{name}", values, f"empty or {robot.n} values")
+    return np.array(values)
+
+
+def drives_and_poles(robot: Robot, law: str, bandwidth: tuple[float, ...]) -> tuple[Drives, Array]:
+    """Drive table of a robot, and the closed-loop poles (n,) [rad/s] of a law: given, or its own.
+
+    Raises:
+        ParameterError: The poles are more or fewer than joints.
+    """
+    drives = robot.drives
+    assert drives is not None
+    return drives, per_joint(robot, f"controller.{law}.bandwidth", bandwidth, drives.bandwidth)
+
+
+def _checked(name: str, part: object) -> Controller:
+    if not isinstance(part, Controller):
+        raise PartError("controller", name, f"a Controller, not a {type(part).__name__}")
+    if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
+        text = "one whose parameters are a dataclass, not an instance of one"
+        raise PartError("controller", name, text)
+    for field in ("gains", "control", "begin", "shift"):
+        if not callable(getattr(part, field)):
+            raise PartError("controller", name, f"one whose {field} can be called")
+    if not isinstance(part.uses_model, bool):
+        raise PartError(
+            "controller", name, f"one whose uses_model is a bool, not {part.uses_model!r}"
+        )
+    return part
+
+
+def _try(part: Controller) -> None:
+    """Try it once on four joints, so that what cannot work is told before anything runs."""
+    from teleop_core.robots import load_robot
+
+    robot = load_robot("scara")
+    try:
+        gains = np.asarray(part.gains(part.parameters(), robot, np.zeros(robot.n)), np.float64)
+        _insist_on_table(part, gains, robot.n)
+        effort, is_inside = _tried_effort(part, gains, robot.home)
+    except PartError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise PartError(
+            "controller", part.name,
+            "one with gains(parameters, robot, viscous) -> (n, k) and control(gains, memory, "
+            "setpoint, measured, feedforward, limit, dt, effort), and parameters that all have "
+            f"defaults; it raises {type(error).__name__}: {reason}",
+        ) from error  # fmt: skip
+    if not is_inside:
+        text = f"one that writes n efforts and no more memory than it declares, {part.memory}"
+        raise PartError("controller", part.name, text)
+    if not np.isfinite(effort).all():
+        text = f"one whose efforts are finite; at rest at home they are {effort.tolist()}"
+        raise PartError("controller", part.name, text)
+
+
+def _insist_on_table(part: Controller, gains: Array, n: int) -> None:
+    """Refuse gains that are no finite table (n, k)."""
+    if gains.ndim != 2 or len(gains) != n or not np.isfinite(gains).all():
+        text = f"one whose gains have a row of finite numbers per joint ({n}, k), not {gains.shape}"
+        raise PartError("controller", part.name, text)
+
+
+def _tried_effort(part: Controller, gains: Array, home: Array) -> tuple[Array, bool]:
+    """Efforts (n,) at rest at home, and whether it wrote to what is its own alone."""
+    n = len(home)
+    memory, fence = fenced(np.zeros((n, max(part.memory, 1))))
+    effort, after = fenced(np.zeros(n))
+    table, _ = fenced(gains)
+    zero, one = np.zeros(n), np.ones(n)
+    feedforward, _ = fenced(np.zeros(part.feedforward(n)))
+    if part.uses_model:
+        feedforward[2 * n :] = np.eye(n).ravel()
+    part.begin(memory, home.copy(), zero)
+    part.shift(memory, zero)
+    part.control(table, memory, home.copy(), home.copy(), feedforward, one, DT, effort)
+    return effort, is_whole(fence) and is_whole(after)
+
+
+CONTROLLERS: Registry[Controller] = Registry(
+    "controller",
+    "controllers",
+    {
+        "pid": f"{_PLACE}.pid:PID",
+        "pd": f"{_PLACE}.pd:PD",
+        "source_pid": f"{_PLACE}.source_pid:SOURCE_PID",
+        "friction_compensation": f"{_PLACE}.friction_compensation:FRICTION_COMPENSATION",
+        "computed_torque": f"{_PLACE}.computed_torque:COMPUTED_TORQUE",
+        "adaptive": f"{_PLACE}.adaptive:ADAPTIVE",
+        "disturbance_observer": f"{_PLACE}.disturbance_observer:DISTURBANCE_OBSERVER",
+    },
+    _checked,
+    _try,
+)
+"""All control laws by name."""
+
+
+def register_controller(controller: Controller, *, replace: bool = False) -> Controller:
+    """Add a law under its own name for the rest of the program; see :meth:`Registry.add`."""
+    return CONTROLLERS.add(controller.name, controller, replace=replace)

@@ -1,0 +1,99 @@
+"""Computed torque: the robot's model turns wanted accelerations into efforts, all joints together.
+
+What is wanted is the setpoint's acceleration and, of its error, what makes three equal poles. The
+model takes inertia and coupling from where the arm is, Coriolis and centrifugal effort, and all of
+its gravity, whatever ``gravity_compensation`` says; it knows no dry friction and no weight that
+the drawing lacks, which the integral must hold.
+
+Source:
+    Luh, Walker and Paul 1980; Craig 2005, eqs. 10.15-10.19, with integral action.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields
+from teleop_core.slave.controllers.motion_estimates import (
+    MEMORY,
+    approach,
+    begin_motion,
+    beyond,
+    closeness,
+    fading_of,
+    follow_motion,
+    linear_range,
+)
+
+_INTEGRAL, _WANTED = MEMORY, MEMORY + 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComputedTorqueParameters:
+    """Poles; an empty list means: from the robot's drive table."""
+
+    bandwidth: tuple[float, ...] = fields.bandwidth("triple")
+    filter_ratio: float = fields.ratio("filters of motion")
+    dead_band: float = fields.dead_band("that the integral does not sum")
+
+
+@kernel
+def computed_torque_control(
+    gains: Array,
+    memory: Array,
+    setpoint: Array,
+    measured: Array,
+    feedforward: Array,
+    limit: Array,
+    dt: float,
+    effort: Array,
+) -> None:
+    """Write ``D (a + 3 w (v - v̂) + 3 w² e + w³ ∫e) + viscous v + bias``.
+
+    The integral of a joint is held while its setpoint is too far for the drive, or the drive is
+    saturated and the error would push it further.
+    """
+    n = effort.shape[0]
+    for i in range(n):
+        row, pole = memory[i], gains[i, 0]
+        follow_motion(row, setpoint[i], measured[i], gains[i, 1], dt)
+        off = setpoint[i] - measured[i]
+        error, share = approach(off, gains[i, 4]), closeness(off, gains[i, 4])
+        wanted = 3.0 * pole * (share * row[4] - row[1] + pole * error) + share * row[5]
+        row[_WANTED] = wanted + row[_INTEGRAL]
+        row[6] = wanted
+    for i in range(n):
+        row, pole, error = memory[i], gains[i, 0], setpoint[i] - measured[i]
+        share = closeness(error, gains[i, 4])
+        asked = feedforward[n + i] + gains[i, 2] * share * row[4]
+        for j in range(n):
+            asked += feedforward[2 * n + n * i + j] * memory[j, _WANTED]
+        effort[i] = min(max(asked, -limit[i]), limit[i])
+        if share == 1.0 and (effort[i] == asked or asked * error < 0.0):
+            row[_INTEGRAL] += pole * pole * pole * beyond(error, gains[i, 3]) * dt
+        # A saturated joint accelerates by less than was wanted of it.
+        row[6] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
+
+
+def computed_torque_gains(
+    parameters: ComputedTorqueParameters, robot: Robot, viscous: Array
+) -> Array:
+    """Pole, fading, viscous friction, dead band and linear range of each joint, (n, 5).
+
+    Raises:
+        ParameterError: The list has another length than the robot has joints.
+    """
+    p = parameters
+    drives, pole = drives_and_poles(robot, "computed_torque", p.bandwidth)
+    fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
+    linear = linear_range(robot, pole, 3.0)
+    return np.stack((pole, fading, viscous, p.dead_band * drives.encoder_step, linear), axis=1)
+
+
+COMPUTED_TORQUE = Controller(
+    "computed_torque", ComputedTorqueParameters, computed_torque_gains, computed_torque_control,
+    MEMORY + 2, begin_motion, uses_model=True,
+)  # fmt: skip

@@ -1,0 +1,105 @@
+"""Disturbance observer: what moves a joint beside its effort is estimated, and cancelled.
+
+The nominal joint is a pure inertia with viscous friction. Whatever else acts on it, dry friction,
+weights that nobody knows, coupling, gravity that is not compensated, is one disturbance; it passes
+a third-order filter Q of the observer's pole before it is taken off the effort. A pair of real
+poles is left for the tracking, with the setpoint's speed and acceleration fed forward.
+
+Source:
+    Ohnishi 1987; Umeno and Hori 1991, eqs. 6-14 (Q-filters of order three); here as an observer
+    with three equal poles, which has the same Q, ``1 / (1 + s / pole)³``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields
+from teleop_core.slave.controllers.motion_estimates import (
+    MEMORY,
+    approach,
+    beyond,
+    closeness,
+    fading_of,
+    follow_motion,
+    friction_of_setpoint,
+    holding,
+    known_friction,
+    linear_range,
+)
+
+_HELD = MEMORY  # what the arm weighs at the start, beyond what is compensated
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisturbanceObserverParameters:
+    """Poles and what is known of friction; an empty list means: from the robot's drive table."""
+
+    bandwidth: tuple[float, ...] = fields.bandwidth("double")
+    observer_ratio: float = fields.ratio("observer")
+    friction_share: float = fields.friction_share("that is fed forward")
+    friction_counts: float = fields.friction_counts()
+    dead_band: float = fields.dead_band("that nothing is done about")
+
+
+@kernel
+def disturbance_observer_control(
+    gains: Array,
+    memory: Array,
+    setpoint: Array,
+    measured: Array,
+    feedforward: Array,
+    limit: Array,
+    dt: float,
+    effort: Array,
+) -> None:
+    """Write ``J (a + 2 w (v - v̂) + w² e - d̂) + viscous v + friction + feedforward``.
+
+    The joint's acceleration that nothing explains is d̂. After an effort at its limit, what is
+    expected of the joint is what the limit left, so the observer does not wind up.
+    """
+    for i in range(effort.shape[0]):
+        inertia, pole, viscous, fading = gains[i, 0], gains[i, 1], gains[i, 2], gains[i, 3]
+        row = memory[i]
+        follow_motion(row, setpoint[i], measured[i], fading, dt)
+        friction = friction_of_setpoint(row, setpoint[i], gains[i, 4], gains[i, 5])
+        off = beyond(setpoint[i] - measured[i], gains[i, 6])
+        error, share = approach(off, gains[i, 7]), closeness(off, gains[i, 7])
+        speed = share * row[4]
+        wanted = share * row[5] + 2.0 * pole * (speed - row[1]) + pole * pole * error - row[2]
+        known = feedforward[i] + friction + row[_HELD]
+        effort[i] = min(max(inertia * wanted + viscous * speed + known, -limit[i]), limit[i])
+        row[6] = (effort[i] - known - viscous * row[1]) / inertia
+
+
+def disturbance_observer_gains(
+    parameters: DisturbanceObserverParameters, robot: Robot, viscous: Array
+) -> Array:
+    """Inertia, pole, viscous friction, fading, dry friction, its travel, dead band, linear range.
+
+    The table is (n, 8).
+
+    Raises:
+        ParameterError: The list has another length than the robot has joints.
+    """
+    p = parameters
+    drives, pole = drives_and_poles(robot, "disturbance_observer", p.bandwidth)
+    fading = fading_of(
+        robot, pole, p.observer_ratio, stiffness=1.0, damping=2.0, rejection=1.0
+    )  # fmt: skip
+    friction = p.friction_share * known_friction(robot)
+    count = drives.encoder_step
+    columns = (
+        drives.inertia, pole, viscous, fading, friction, p.friction_counts * count,
+        p.dead_band * count, linear_range(robot, pole, 1.0),
+    )  # fmt: skip
+    return np.stack(columns, axis=1)
+
+
+DISTURBANCE_OBSERVER = Controller(
+    "disturbance_observer", DisturbanceObserverParameters, disturbance_observer_gains,
+    disturbance_observer_control, MEMORY + 1, *holding(_HELD),
+)  # fmt: skip

@@ -1,0 +1,109 @@
+"""Friction compensation: the PID with the effort fed forward that the setpoint's motion takes.
+
+Inertia and viscous friction of the setpoint's acceleration and speed, and dry friction in the
+direction of its motion, smooth over a few encoder counts of its travel. What is fed forward comes
+from the setpoint alone, so it closes no loop that could swing; the integral rests while the error
+is within a dead band, so that dry friction and encoder counts together make no limit cycle.
+
+Source:
+    Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, sections 5.2 and 5.3 (compensation by the
+    desired motion; dead band in the integral).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.controllers import Controller, drives_and_poles, fields
+from teleop_core.slave.controllers.motion_estimates import (
+    MEMORY,
+    approach,
+    beyond,
+    closeness,
+    fading_of,
+    follow_motion,
+    friction_of_setpoint,
+    holding,
+    known_friction,
+    linear_range,
+)
+from teleop_core.slave.controllers.pid import critically_damped_gains
+
+_INTEGRAL = MEMORY
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionCompensationParameters:
+    """Poles and what is known of friction; an empty list means: from the robot's drive table."""
+
+    bandwidth: tuple[float, ...] = fields.bandwidth("triple")
+    filter_ratio: float = fields.ratio("filters of motion")
+    friction_share: float = fields.friction_share("that is fed forward")
+    friction_counts: float = fields.friction_counts()
+    dead_band: float = fields.dead_band("that the integral does not sum")
+
+
+@kernel
+def friction_compensation_control(
+    gains: Array,
+    memory: Array,
+    setpoint: Array,
+    measured: Array,
+    feedforward: Array,
+    limit: Array,
+    dt: float,
+    effort: Array,
+) -> None:
+    """Write ``Kp e + Ki ∫e + Kd (v - v̂) + J a + viscous v + friction + feedforward``.
+
+    The integral is held while the setpoint is too far for the drive, or the drive is saturated and
+    the error would push it further.
+    """
+    for i in range(effort.shape[0]):
+        row, inertia, viscous = memory[i], gains[i, 3], gains[i, 4]
+        follow_motion(row, setpoint[i], measured[i], gains[i, 5], dt)
+        friction = friction_of_setpoint(row, setpoint[i], gains[i, 6], gains[i, 7])
+        off = setpoint[i] - measured[i]
+        error, share = approach(off, gains[i, 9]), closeness(off, gains[i, 9])
+        speed = share * row[4]
+        free = gains[i, 0] * error + gains[i, 2] * (speed - row[1])
+        free += inertia * share * row[5] + viscous * speed + friction + feedforward[i]
+        integral = row[_INTEGRAL] + gains[i, 1] * beyond(error, gains[i, 8]) * dt
+        is_inside = abs(free + integral) <= limit[i] or (free + integral) * error < 0.0
+        if share == 1.0 and is_inside:
+            row[_INTEGRAL] = integral
+        effort[i] = min(max(free + row[_INTEGRAL], -limit[i]), limit[i])
+        # The load that the integral holds is not what accelerates.
+        known = friction + feedforward[i] + row[_INTEGRAL]
+        row[6] = (effort[i] - known - viscous * row[1]) / inertia
+
+
+def friction_compensation_gains(
+    parameters: FrictionCompensationParameters, robot: Robot, viscous: Array
+) -> Array:
+    """Kp, Ki, Kd, inertia, viscous, fading, dry friction, its travel, dead band, range.
+
+    The table is (n, 10).
+
+    Raises:
+        ParameterError: The list has another length than the robot has joints.
+    """
+    p = parameters
+    drives, pole = drives_and_poles(robot, "friction_compensation", p.bandwidth)
+    kp, ki, kd = critically_damped_gains(drives.inertia, viscous, pole)
+    fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
+    friction, count = p.friction_share * known_friction(robot), drives.encoder_step
+    columns = (
+        kp, ki, kd, drives.inertia, viscous, fading, friction, p.friction_counts * count,
+        p.dead_band * count, linear_range(robot, pole, 3.0),
+    )  # fmt: skip
+    return np.stack(columns, axis=1)
+
+
+FRICTION_COMPENSATION = Controller(
+    "friction_compensation", FrictionCompensationParameters, friction_compensation_gains,
+    friction_compensation_control, MEMORY + 1, *holding(_INTEGRAL),
+)  # fmt: skip

@@ -1,0 +1,62 @@
+"""PD: proportional and derivative action alone, so the arm rests where friction lets it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.controllers import Controller, drives_and_poles
+
+
+@dataclass(frozen=True, kw_only=True)
+class PdParameters:
+    """Double closed-loop pole; empty lists mean: from the robot's drive table."""
+
+    bandwidth: tuple[float, ...] = parameter(
+        (), unit="rad/s", lower=0.1, upper=500.0, doc="double closed-loop pole of each joint"
+    )
+
+
+@kernel
+def pd_control(
+    gains: Array,
+    memory: Array,
+    setpoint: Array,
+    measured: Array,
+    feedforward: Array,
+    limit: Array,
+    dt: float,
+    effort: Array,
+) -> None:
+    """Write ``Kp (setpoint - measured) - Kd speed + feedforward`` of each joint.
+
+    The speed is that of the measured position, through a first-order filter of two ticks; memory
+    holds the last position and the filtered speed.
+    """
+    for i in range(effort.shape[0]):
+        memory[i, 1] += ((measured[i] - memory[i, 0]) / dt - memory[i, 1]) / 2.0
+        memory[i, 0] = measured[i]
+        pull = gains[i, 0] * (setpoint[i] - measured[i]) - gains[i, 1] * memory[i, 1]
+        effort[i] = min(max(pull + feedforward[i], -limit[i]), limit[i])
+
+
+def pd_gains(parameters: PdParameters, robot: Robot, viscous: Array) -> Array:
+    """Kp, Kd of each joint, (n, 2), that make ``inertia (s + bandwidth)²`` of an inertia.
+
+    Raises:
+        ParameterError: The list has another length than the robot has joints.
+    """
+    drives, bandwidth = drives_and_poles(robot, "pd", parameters.bandwidth)
+    kd = (2.0 * bandwidth * drives.inertia - viscous).clip(min=0.0)
+    return np.stack((bandwidth**2 * drives.inertia, kd), axis=1)
+
+
+def begin(memory: Array, measured: Array, effort: Array) -> None:
+    """Start at rest; without an integrator nothing holds gravity that is not compensated."""
+    memory[:, 0] = measured
+
+
+PD = Controller("pd", PdParameters, pd_gains, pd_control, 2, begin)

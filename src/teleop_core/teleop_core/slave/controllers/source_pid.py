@@ -1,0 +1,108 @@
+"""Source PID: the published controller, as printed, with gains by a stated rule.
+
+Proportional, integral and differential action on the error alone: no filter of the derivative,
+which feels every encoder count. Only the axes whose gravity nobody feeds forward have integral
+action; that is what the published rest positions show.
+
+In one thing it differs from what is printed: the integral ends at what the drive can give. Printed
+without a bound, it winds up at each stop from more than about 50 mm/s of joint 3, and the loop,
+whose three poles are at one place, then runs away at a standing setpoint.
+
+Source:
+    Vongbunyong 2008, eqs. 6.1-6.4, with u_I(k-1) in place of the printed u(k-1).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.controllers import Controller, drives_and_poles, per_joint
+from teleop_core.slave.controllers.pid import critically_damped_gains
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourcePidParameters:
+    """Gains; empty lists mean: by the rule, from the robot's drive table."""
+
+    bandwidth: tuple[float, ...] = parameter(
+        (), unit="rad/s", lower=0.1, upper=500.0,
+        doc="closed-loop pole of each joint, double, triple where it has integral action",
+        source="assumed: the source prints no gains; critically damped, as it says they were",
+    )  # fmt: skip
+    kp: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/rad or N/m of each joint")
+    ki: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/(rad·s) or N/(m·s) of each joint")
+    kd: tuple[float, ...] = parameter((), lower=0.0, doc="N·m·s/rad or N·s/m of each joint")
+
+
+@kernel
+def source_pid_control(
+    gains: Array,
+    memory: Array,
+    setpoint: Array,
+    measured: Array,
+    feedforward: Array,
+    limit: Array,
+    dt: float,
+    effort: Array,
+) -> None:
+    """Write ``Kp e + Ki ∫e + Kd Δe / dt + feedforward``; memory: integral effort, last error.
+
+    The integral effort stays within ±limit; see the module.
+    """
+    for i in range(effort.shape[0]):
+        error = setpoint[i] - measured[i]
+        # Without integral action nothing holds what the arm weighed at the start either.
+        integral = memory[i, 0] + gains[i, 1] * dt * error if gains[i, 1] > 0.0 else 0.0
+        memory[i, 0] = min(max(integral, -limit[i]), limit[i])
+        change = (error - memory[i, 1]) / dt
+        memory[i, 1] = error
+        effort[i] = gains[i, 0] * error + memory[i, 0] + gains[i, 2] * change + feedforward[i]
+
+
+def loaded_axes(robot: Robot) -> NDArray[np.bool_]:
+    """Axes (n,) that gravity loads at home and the published controller does not relieve."""
+    assert robot.dynamics is not None
+    effort = np.zeros(robot.n)
+    robot.dynamics.gravity(robot.home.copy(), robot.dynamics.parameters.copy(), effort)
+    return np.asarray((np.abs(effort) > 1e-9) & ~robot.dynamics.compensated)
+
+
+def source_pid_gains(parameters: SourcePidParameters, robot: Robot, viscous: Array) -> Array:
+    """Kp, Ki, Kd of each joint, (n, 3): given, or by the rule.
+
+    The rule: ``inertia (s + bandwidth)²`` without integral action, ``inertia (s + bandwidth)³``
+    with it, for :func:`loaded_axes`.
+
+    Raises:
+        ParameterError: A list has another length than the robot has joints.
+    """
+    drives, pole = drives_and_poles(robot, "source_pid", parameters.bandwidth)
+    double = pole**2 * drives.inertia, np.zeros(robot.n), 2.0 * pole * drives.inertia - viscous
+    triple = critically_damped_gains(drives.inertia, viscous, pole)
+    loaded = loaded_axes(robot)
+    designed = [np.where(loaded, b, a).clip(min=0.0) for a, b in zip(double, triple, strict=True)]
+    given = (("kp", parameters.kp), ("ki", parameters.ki), ("kd", parameters.kd))
+    columns = [
+        per_joint(robot, f"controller.source_pid.{name}", values, default)
+        for (name, values), default in zip(given, designed, strict=True)
+    ]
+    return np.stack(columns, axis=1)
+
+
+def begin(memory: Array, measured: Array, effort: Array) -> None:
+    """Start at rest: what holds the arm is in the integrals, as far as there are any."""
+    memory[:, 0] = effort
+
+
+def shift(memory: Array, effort: Array) -> None:
+    """Leave the integrals: without integral action nothing takes over what gravity feeds less."""
+
+
+SOURCE_PID = Controller(
+    "source_pid", SourcePidParameters, source_pid_gains, source_pid_control, 2, begin, shift
+)

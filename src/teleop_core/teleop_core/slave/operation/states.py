@@ -1,0 +1,196 @@
+"""States of an arm and what leads from one to another: one table for all ways to run it.
+
+The states and commands are those of CRTK (Collaborative Robotics Toolkit, robot operating states),
+with two more commands: ``stop``, the emergency stop, which every state takes, and ``reset``, which
+alone ends it.
+"""
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from teleop_core.base.errors import UnknownNameError
+from teleop_core.graph.topics import STATE_COMMANDS
+from teleop_core.kernels import inner
+
+
+class State(IntEnum):
+    """Operating state of an arm; it moves in ENABLED only."""
+
+    DISABLED = 0
+    ENABLED = 1
+    PAUSED = 2
+    FAULT = 3
+
+
+class Event(IntEnum):
+    """What may change the state: commands, and what the arm finds itself."""
+
+    ENABLE = 0
+    DISABLE = 1
+    PAUSE = 2
+    RESUME = 3
+    HOME = 4
+    UNHOME = 5
+    RESET = 6
+    STOP = 7
+    MOVE = 8  # a move to a goal begins
+    ARRIVED = 9  # the move has ended
+    FAILED = 10  # a fault that latches
+    LAPSED = 11  # commands were silent for so long that motion is resumed on purpose only
+
+
+COMMANDS = STATE_COMMANDS
+"""Events that people and programs send, by name."""
+
+
+class Answer(IntEnum):
+    """What became of an event."""
+
+    DONE = 0
+    ALREADY = 1  # nothing had to change
+    REFUSED = 2  # not in this state
+    STOPPED = 3  # the emergency stop is still pressed, or must be reset first
+    BRAKING = 4  # the arm is not at rest yet
+
+
+_D, _E, _P, _F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT
+_NEXT = {
+    Event.ENABLE: {_D: _E, _E: _E, _P: _E},
+    Event.DISABLE: {_D: _D, _E: _D, _P: _D, _F: _D},
+    Event.PAUSE: {_E: _P, _P: _P},
+    Event.RESUME: {_E: _E, _P: _E},
+    Event.HOME: {_E: _E},
+    Event.UNHOME: {_D: _D, _E: _E, _P: _P, _F: _F},
+    Event.RESET: {_D: _D, _E: _E, _P: _P, _F: _D},
+    Event.STOP: {_D: _F, _E: _F, _P: _F, _F: _F},
+    Event.MOVE: {_E: _E},
+    Event.ARRIVED: {_E: _E},
+    Event.FAILED: {_D: _F, _E: _F, _P: _F, _F: _F},
+    Event.LAPSED: {_E: _P},
+}
+TABLE = np.array(
+    [[_NEXT[event].get(state, -1) for event in Event] for state in State], dtype=np.int64
+)
+"""Next state for each state and event; -1 where the event is refused."""
+
+_DONE, _ALREADY, _REFUSED = int(Answer.DONE), int(Answer.ALREADY), int(Answer.REFUSED)
+_STOPPED, _BRAKING = int(Answer.STOPPED), int(Answer.BRAKING)
+_ENABLED, _PAUSED, _FAULT = int(_E), int(_P), int(_F)
+_ENABLE, _DISABLE, _HOME, _UNHOME = (
+    int(Event.ENABLE), int(Event.DISABLE), int(Event.HOME), int(Event.UNHOME)
+)  # fmt: skip
+_RESET, _STOP, _MOVE, _ARRIVED = (
+    int(Event.RESET), int(Event.STOP), int(Event.MOVE), int(Event.ARRIVED)
+)  # fmt: skip
+_RESUME, _LAPSED = int(Event.RESUME), int(Event.LAPSED)
+
+STATE_FIELDS = [
+    (name, "i8")
+    for name in (
+        "state", "is_homed", "is_busy", "is_homing", "must_plan", "is_stopped", "is_pressed",
+        "is_moving", "must_home", "fault", "fault_joint",
+    )
+] + [("fault_value", "f8"), ("fault_bound", "f8")]  # fmt: skip
+"""Fields of a state record that :func:`change` reads and writes.
+
+``must_plan``: a move is to be planned, to the start where it homes.
+``is_stopped``: an emergency stop is latched. ``is_pressed``: its cause is still there.
+``is_moving``: the arm is not at rest. ``must_home``: a pause interrupted homing, which resume
+begins anew.
+"""
+
+
+@inner
+def change(s: Any, event: int) -> int:
+    """Take an event: write the state record, return the :class:`Answer`."""
+    state, follower = s.state, TABLE[s.state, event]
+    if follower < 0:
+        return _REFUSED
+    if state == _FAULT and event == _RESET and s.is_pressed:
+        return _STOPPED
+    if state == _FAULT and event == _DISABLE and s.is_stopped:
+        return _STOPPED
+    if event in (_ENABLE, _RESUME) and state != _ENABLED and s.is_moving:
+        return _BRAKING
+    if event == _MOVE and not s.is_homed:
+        return _REFUSED
+    answer = _ALREADY if follower == state else _DONE
+    if event != _RESUME and follower != state:
+        s.must_home = s.is_homing if follower == _PAUSED else 0
+    answer = _take(s, event, answer)
+    if follower != _ENABLED:
+        s.is_busy = s.is_homing = s.must_plan = 0
+    if follower not in (state, _FAULT) and event != _LAPSED:
+        s.fault, s.fault_joint, s.fault_value, s.fault_bound = 0, -1, 0.0, 0.0
+    s.state = follower
+    return answer
+
+
+@inner
+def _take(s: Any, event: int, answer: int) -> int:
+    """What an event does beside the state."""
+    if event == _HOME or (event == _RESUME and s.must_home):
+        s.is_busy, s.is_homing, s.must_plan, s.is_homed, s.must_home = 1, 1, 1, 0, 0
+        return _DONE
+    if event == _UNHOME:
+        was = s.is_homed or s.is_homing
+        s.is_homed = s.is_homing = s.is_busy = s.must_plan = s.must_home = 0
+        return _DONE if was else _ALREADY
+    if event == _STOP:
+        was = s.is_stopped
+        s.is_stopped = 1
+        return _ALREADY if was else _DONE
+    if event == _RESET:
+        s.is_stopped = 0
+    if event == _MOVE:
+        s.is_busy, s.must_plan = 1, 1
+        return _DONE
+    if event == _ARRIVED:
+        if s.is_homing:
+            s.is_homed, s.is_homing = 1, 0
+        s.is_busy = 0
+        return _DONE
+    return answer
+
+
+def command_event(name: str) -> Event:
+    """Event of a command's name, such as ``"enable"``.
+
+    Raises:
+        UnknownNameError: There is no such command.
+    """
+    if name not in COMMANDS:
+        raise UnknownNameError("state command", name, COMMANDS)
+    return Event[name.upper()]
+
+
+AT_REST_ONLY = "the arm is not at rest yet; try again"
+"""End of the answer to a command that an arm takes at rest only."""
+
+
+def answer_text(event: Event, answer: Answer, state: State) -> str:
+    """What became of an event, in words that say what would help.
+
+    Args:
+        event: What was asked for.
+        answer: What :func:`change` returned.
+        state: State before.
+    """
+    name = event.name.lower()
+    if answer is Answer.DONE:
+        return f"{name}: done"
+    if answer is Answer.ALREADY:
+        return f"{name}: nothing to do, it is {state.name}"
+    if answer is Answer.STOPPED:
+        pressed = "release the emergency stop, then reset" if event is Event.RESET else "reset"
+        return f"{name} refused: an emergency stop is latched; {pressed} first"
+    if answer is Answer.BRAKING:
+        return f"{name} refused: {AT_REST_ONLY}"
+    allowed = [other.name for other in State if TABLE[other, event] >= 0]
+    hint = {
+        State.FAULT: "; reset first, then enable", State.DISABLED: "; enable first",
+        State.PAUSED: "; resume first",
+    }.get(state, "; home first" if event is Event.MOVE else "")  # fmt: skip
+    return f"{name} refused in {state.name}, allowed in {', '.join(allowed)}{hint}"

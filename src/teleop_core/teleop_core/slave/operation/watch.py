@@ -1,0 +1,203 @@
+"""Watch: finds the faults of an arm, plays its script of commands, tells how it is."""
+
+from typing import Any
+
+import numpy as np
+
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
+from teleop_core.slave.operation.faults import FAULTS, Fault, Reaction
+from teleop_core.slave.operation.parameters import MOST_EVENTS
+from teleop_core.slave.operation.states import STATE_FIELDS, Event, State, change
+
+OPERATION_STATE = [
+    *STATE_FIELDS, ("must_brake", "i8"), ("told", "i8"), ("played", "i8"), ("first_ns", "i8"),
+    ("heard_ns", "i8"), ("pressed_ns", "i8"), ("left_ns", "i8"), ("is_resting", "i8"),
+    ("still_ns", "i8"), ("left_at", "f8", (3,)), ("rest_time", "f8"), ("travel", "f8"),
+    ("sampled_ns", "i8"), ("heard_of_ns", "i8"),
+]  # fmt: skip
+"""Scalars of a state record; beside them it has ``full_ns`` (n,)."""
+OPERATION_PARAMETERS = [
+    ("brakes", "i8"), ("heartbeat_ns", "i8"), ("outage_ns", "i8"), ("effort_ns", "i8"),
+    ("silence_ns", "i8"), ("pressing_ns", "i8"), ("tip_error", "f8"), ("overspeed", "f8"),
+    ("reported", "i8", (len(Fault),)), ("event_count", "i8"), ("event", "i8", (MOST_EVENTS,)),
+    ("event_ns", "i8", (MOST_EVENTS,)),
+]  # fmt: skip
+"""Scalars and tables of a parameter record; beside them it has ``lag`` (n,) [rad or m]."""
+
+_REACTIONS = {Reaction.HOLD: 0, Reaction.BRAKE: 1, Reaction.PAUSE: 2, Reaction.REPORT: 3}
+_REACTION = np.array(
+    [3, *(_REACTIONS[FAULTS[fault].reaction] for fault in Fault if fault)], dtype=np.int64
+)
+_BRAKE, _PAUSE, _REPORT = 1, 2, 3
+_ENABLED, _PAUSED, _FAULT = int(State.ENABLED), int(State.PAUSED), int(State.FAULT)
+_DISABLED = int(State.DISABLED)
+_STOP, _FAILED, _LAPSED = int(Event.STOP), int(Event.FAILED), int(Event.LAPSED)
+_HEARTBEAT, _PRESSED = int(Fault.HEARTBEAT), int(Fault.STOP)
+_TRACKING, _TIP, _EFFORT = int(Fault.TRACKING), int(Fault.TIP), int(Fault.EFFORT)
+_OVERSPEED, _LIMIT = int(Fault.OVERSPEED), int(Fault.JOINT_LIMIT)
+_FEEDBACK = int(Fault.FEEDBACK)
+REST_NS = 50_000_000
+"""An arm rests once no joint has moved for so long [ns]: twice as long as a turn of a swinging
+joint, at the bandwidths of 60 to 80 rad/s that drives have, takes."""
+# A joint this close to its limit [rad or m] is at it.
+_AT = 1e-9
+# A drive that gives this share of its limit gives all.
+_FULL = 0.999
+
+
+@inner
+def fail(p: Any, s: Any, fault: int, joint: int, value: float, bound: float) -> None:
+    """Take note of a fault, and do what it asks for; a fault in force is not overwritten."""
+    reaction = _REPORT if p.reported[fault] else _REACTION[fault]
+    if reaction == _REPORT:
+        s.told = fault
+        if s.fault != 0 or s.state == _FAULT:
+            return
+    elif reaction == _PAUSE:
+        if s.state != _ENABLED:
+            return
+        change(s, _LAPSED)
+    else:
+        if reaction == _BRAKE:
+            s.must_brake = 1
+        is_first = s.state != _FAULT
+        change(s, _STOP if fault in (_PRESSED, _HEARTBEAT) else _FAILED)
+        if not is_first:
+            return
+    s.fault, s.fault_joint, s.fault_value, s.fault_bound = fault, joint, value, bound
+
+
+@inner
+def begin_tick(p: Any, s: Any, now_ns: int) -> None:
+    """Play the commands whose time has come; a stop button that fell silent is pressed."""
+    if s.first_ns == 0:
+        s.first_ns = now_ns
+        s.heard_ns = max(s.heard_ns, now_ns)
+        s.pressed_ns = now_ns - TICK_NS  # no joint was pressed before the first tick
+    while s.played < p.event_count and now_ns - s.first_ns >= p.event_ns[s.played]:
+        if p.event[s.played] == _STOP:
+            fail(p, s, _PRESSED, -1, 0.0, 0.0)
+        else:
+            change(s, p.event[s.played])
+        s.played += 1
+    if p.heartbeat_ns > 0 and now_ns - s.heard_ns > p.heartbeat_ns:
+        s.is_pressed = 1
+        fail(p, s, _HEARTBEAT, -1, 1e-9 * (now_ns - s.heard_ns), 1e-9 * p.heartbeat_ns)
+    if s.state != _FAULT:
+        s.must_brake = 0
+    if s.state == _ENABLED and s.fault != 0 and s.told == 0:
+        s.fault, s.fault_joint, s.fault_value, s.fault_bound = 0, -1, 0.0, 0.0
+    s.told = 0
+
+
+@inner
+def is_braked(p: Any, s: Any) -> bool:
+    """Whether the drives are off and brakes hold the arm."""
+    return bool(s.must_brake or (p.brakes and s.state in (_DISABLED, _FAULT)))
+
+
+@inner
+def watch_joints(p: Any, s: Any, effort: Array, passed_ns: int) -> None:
+    """Find joints that are too far off, too fast, or at the end of what their drives can give.
+
+    Args:
+        p: Parameters.
+        s: State with ``setpoint``, ``measured`` and ``speed`` (n,); written.
+        effort: What the drives gave (n,) [N·m or N].
+        passed_ns: Time since the last time [ns].
+    """
+    for i in range(effort.shape[0]):
+        off = abs(s.setpoint[i] - s.measured[i])
+        if not off <= p.lag[i]:  # NaN is too far as well
+            fail(p, s, _TRACKING, i, off, p.lag[i])
+        fast = p.overspeed * p.speed_limit[i]
+        if not abs(s.speed[i]) <= fast:
+            fail(p, s, _OVERSPEED, i, abs(s.speed[i]), fast)
+        is_full = abs(effort[i]) >= _FULL * p.effort_limit[i]
+        s.full_ns[i] = s.full_ns[i] + passed_ns if is_full else 0
+        if s.full_ns[i] > p.effort_ns:
+            fail(p, s, _EFFORT, i, 1e-9 * s.full_ns[i], 1e-9 * p.effort_ns)
+
+
+@inner
+def watch_tip(p: Any, s: Any, setpoint: Array, measured: Array) -> None:
+    """Find a tip, poses (7,), that is too far from its setpoint."""
+    square = 0.0
+    for i in range(3):
+        square += (setpoint[i] - measured[i]) ** 2
+    if not square <= p.tip_error * p.tip_error:
+        fail(p, s, _TIP, -1, square**0.5, p.tip_error)
+
+
+@inner
+def watch_limits(p: Any, s: Any, now_ns: int) -> None:
+    """Find commands that press a joint into the end of its range."""
+    pressed = -1
+    for i in range(s.target.shape[0]):
+        if s.target[i] <= p.lower[i] + _AT or s.target[i] >= p.upper[i] - _AT:
+            pressed = i
+    if pressed < 0 or s.state != _ENABLED or s.is_busy:
+        s.pressed_ns = now_ns
+    elif now_ns - s.pressed_ns > p.pressing_ns:
+        bound = 1e-9 * p.pressing_ns
+        fail(p, s, _LIMIT, pressed, bound, bound)
+
+
+@inner
+def measure_rest(s: Any, place: Array, now_ns: int) -> None:
+    """Measure how long and how far the tip, at ``place`` (7,), moves after it may move no more."""
+    if s.state == _ENABLED:
+        s.left_ns, s.is_resting = 0, 0
+        return
+    if s.left_ns == 0:
+        s.left_ns, s.travel, s.is_resting = now_ns, 0.0, 0
+        for i in range(3):
+            s.left_at[i] = place[i]
+    if s.is_resting:
+        return
+    square = 0.0
+    for i in range(3):
+        square += (place[i] - s.left_at[i]) ** 2
+    s.travel = max(s.travel, square**0.5)
+    if not s.is_moving:
+        s.is_resting, s.rest_time = 1, 1e-9 * max(s.still_ns - s.left_ns, TICK_NS)
+
+
+@inner
+def find_rest(s: Any, moves: bool, now_ns: int) -> None:
+    """Take note whether the arm moves; it rests after :data:`REST_NS` without motion.
+
+    A joint that swings about its place stands still for a moment at each of its turns.
+    """
+    if moves:
+        s.still_ns, s.is_moving = 0, 1
+        return
+    if s.still_ns == 0:
+        s.still_ns = now_ns
+    s.is_moving = s.is_moving and now_ns - s.still_ns < REST_NS
+
+
+@inner
+def watch_feedback(p: Any, s: Any, now_ns: int) -> None:
+    """Find an arm that has not said for too long where it is."""
+    silence_ns = now_ns - s.heard_of_ns
+    if silence_ns > p.silence_ns:
+        fail(p, s, _FEEDBACK, -1, 1e-9 * silence_ns, 1e-9 * p.silence_ns)
+
+
+@inner
+def is_blind(p: Any, s: Any, now_ns: int) -> bool:
+    """Whether the arm has not said lately, within the command timeout, where it is."""
+    return bool(now_ns - s.heard_of_ns > p.timeout_ns)
+
+
+@inner
+def tell(p: Any, s: Any, row: Array) -> None:
+    """Write the numbers of :data:`~teleop_core.graph.topics.OPERATION`."""
+    row[0], row[1], row[2], row[3] = s.state, s.is_homed, s.is_busy, s.is_stopped
+    row[4], row[5], row[6], row[7] = s.fault, s.fault_joint, s.fault_value, s.fault_bound
+    row[8] = s.rest_time if s.is_resting else 0.0
+    row[9] = s.travel if s.is_resting else 0.0
+    row[10] = is_braked(p, s)

@@ -1,0 +1,141 @@
+"""Plants: what the slave simulator moves, from the amplifier's input to the true tip.
+
+A plant is numbers over one compiled model: rigid bodies, friction, drives, encoders, and what lies
+behind the encoders. Each file says where its numbers come from.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError, PartError, ShapeError
+from teleop_core.base.registry import Registry
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.robot import Robot
+
+__all__ = ["PLANTS", "Physics", "Plant", "register_plant"]
+
+PER_JOINT = (
+    "viscous", "coulomb", "friction_speed", "bristle", "wander", "wander_travel", "bias",
+    "effort_step", "encoder_step", "play", "drive_gain", "gear_stiffness", "motor_inertia",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Physics:
+    """Numbers of a plant, (n,) each unless said otherwise.
+
+    Args:
+        viscous: Viscous friction [N·m·s/rad or N·s/m].
+        coulomb: Dry friction [N·m or N].
+        friction_speed: Where dry friction that does not stick has 71 % of its value
+            [rad/s or m/s].
+        bristle: Stiffness of dry friction that sticks [N·m/rad or N/m]; 0 where it does not.
+        wander: Standard deviation of dry friction over its mean.
+        wander_travel: Way that a joint slips while it changes [rad or m], > 0.
+        bias: Effort that the amplifier adds [N·m or N].
+        effort_step: Smallest difference of effort that the drive makes [N·m or N]; 0: none.
+        encoder_step: Smallest difference that is measured [rad or m].
+        play: Half width of the play between encoder and joint [rad or m].
+        coupling: (n, n), below its diagonal: what a joint moves per lag of an earlier one.
+        tip_geometry: Row of :func:`teleop_core.robots.dh_kernels.fk` for the true links; empty for
+            the robot's own forward kinematics.
+        dynamics: Parameter row of the true dynamics; empty for those that the control law knows.
+        effort_delay: Time from an asked effort to the motor's, beyond the tick [s]: whole ticks.
+        drive_gain: Effort that drives give over the one that is asked of them; None: 1.
+        gear_stiffness: Stiffness of gears that bend [N·m/rad or N/m]; 0, or None, for those that
+            do not.
+        motor_inertia: Inertia of the motors, seen through their gears [kg·m² or kg], which the
+            dynamics contain; of use where gears bend.
+    """
+
+    viscous: Array
+    coulomb: Array
+    friction_speed: Array
+    bristle: Array
+    wander: Array
+    wander_travel: Array
+    bias: Array
+    effort_step: Array
+    encoder_step: Array
+    play: Array
+    coupling: Array
+    tip_geometry: Array
+    dynamics: Array
+    effort_delay: float = 0.0
+    drive_gain: Array | None = None
+    gear_stiffness: Array | None = None
+    motor_inertia: Array | None = None
+
+    def __post_init__(self) -> None:
+        n = len(np.atleast_1d(self.viscous))
+        for name, usual in (("drive_gain", 1.0), ("gear_stiffness", 0.0), ("motor_inertia", 1.0)):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.full(n, usual))
+        for name in PER_JOINT:
+            array = np.array(getattr(self, name), dtype=np.float64)
+            if array.shape != (n,):
+                raise ShapeError(f"plant.{name}", (n,), array.shape)
+            if not np.isfinite(array).all():
+                raise ParameterError(f"plant.{name}", array.tolist(), "finite")
+            object.__setattr__(self, name, array)
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A plant.
+
+    Attributes:
+        name: What ``--set plant=`` calls it.
+        parameters: Its parameter group.
+        physics: ``physics(parameters, robot)`` gives its numbers for a robot with drives.
+    """
+
+    name: str
+    parameters: type
+    physics: Callable[[Any, Robot], Physics]
+
+
+def _checked(name: str, part: object) -> Plant:
+    if not isinstance(part, Plant):
+        raise PartError("plant", name, f"a Plant, not a {type(part).__name__}")
+    if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
+        text = "one whose parameters are a dataclass, not an instance of one"
+        raise PartError("plant", name, text)
+    if not callable(part.physics):
+        raise PartError("plant", name, "one whose physics can be called")
+    return part
+
+
+def _try(part: Plant) -> None:
+    """Try it once, so that what cannot work is told before anything runs."""
+    from teleop_core.robots import load_robot
+
+    try:
+        made = part.physics(part.parameters(), load_robot("scara"))
+    except Exception as error:
+        reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        text = f"one with physics(parameters, robot) -> Physics; it raises {reason}"
+        raise PartError("plant", part.name, text) from error
+    if not isinstance(made, Physics):
+        raise PartError("plant", part.name, f"one that gives Physics, not {type(made).__name__}")
+
+
+PLANTS: Registry[Plant] = Registry(
+    "plant",
+    "plants",
+    {
+        "ideal": "teleop_core.slave.plants.ideal:IDEAL",
+        "hardware": "teleop_core.slave.plants.hardware:HARDWARE",
+    },
+    _checked,
+    _try,
+)
+"""All plants by name."""
+
+
+def register_plant(plant: Plant, *, replace: bool = False) -> Plant:
+    """Add a plant under its own name for the rest of the program; see :meth:`Registry.add`."""
+    return PLANTS.add(plant.name, plant, replace=replace)

@@ -1,0 +1,210 @@
+"""Hardware plant: friction that sticks, drives in steps, and a tip that encoders do not see.
+
+What is known of a robot stands in :attr:`Robot.hardware <teleop_core.robots.robot.Robot.hardware>`;
+a robot without it sticks by the dry friction of its drive table and is made as drawn.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.parameters import parameter
+from teleop_core.kernels import pointer
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.chains import true_chain
+from teleop_core.robots.drives import ACCELERATION
+from teleop_core.robots.hardware import Hardware
+from teleop_core.robots.rigid_body import write_model
+from teleop_core.robots.robot import Robot
+from teleop_core.slave.controllers import per_joint
+from teleop_core.slave.plants import Physics, Plant
+
+FASTEST_GEAR = 1500.0
+"""Frequency [rad/s] of a gear on its spring up to which steps of half a tick follow it."""
+FAULTS = {
+    "friction": "dry friction",
+    "sticking": "that dry friction sticks, and is not smooth",
+    "wandering": "dry friction that changes as a joint moves on",
+    "bias": "amplifiers that give effort when none is asked for",
+    "weights": "weights that the control law does not know",
+    "drive_steps": "efforts in steps of the converter",
+    "play": "backlash and stretch of tendons behind the encoders",
+    "links": "links, and zeros of joints, that are not as drawn",
+}
+"""Faults that can be left out, by name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HardwareParameters:
+    """Which faults there are, numbers in place of the robot's, and what no robot states."""
+
+    without: tuple[str, ...] = parameter(
+        (), choices=tuple(FAULTS), fixed=True, doc="faults that are left out, to see what they add"
+    )
+    coulomb: tuple[float, ...] = parameter(
+        (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the robot's"
+    )
+    wander: tuple[float, ...] = parameter(
+        (), lower=0.0, upper=2.0,
+        doc="standard deviation of each joint's dry friction over its mean; empty: the robot's",
+    )  # fmt: skip
+    bias: tuple[float, ...] = parameter(
+        (), unit="N·m or N", doc="effort of each amplifier when none is asked; empty: the robot's"
+    )
+    play: tuple[float, ...] = parameter(
+        (), unit="rad or m", lower=0.0,
+        doc="half width of the play behind each encoder; empty: the robot's",
+    )  # fmt: skip
+    weights: tuple[str, ...] = parameter(
+        (), fixed=True,
+        doc="symbol=value of the dynamics that the source does not state; empty: the robot's",
+    )  # fmt: skip
+    bristle_frequency: float = parameter(
+        250.0, unit="rad/s", lower=10.0, upper=2000.0,
+        doc="at which a joint swings on its friction before it slips",
+        source="assumed: a joint gives by a few encoder counts before it slips",
+    )  # fmt: skip
+    wander_travel: float = parameter(
+        2000.0, unit="encoder counts", lower=1.0, upper=1e7,
+        doc="way on which dry friction changes as a joint slips; at rest it stays",
+        source="assumed: about a turn of the motor, in which gears and bearings meet themselves",
+    )  # fmt: skip
+    drive_bits: int = parameter(
+        14, lower=4, upper=32, doc="of the converter that commands the amplifier, peak to peak",
+        source="assumed: usual for cards of analog outputs; the source names no number",
+    )  # fmt: skip
+    # Faults that no source of the RCRT-1 speaks of; `teleop experiment robustness` turns them on.
+    effort_delay: float = parameter(
+        0.0, unit="s", lower=0.0, upper=0.03,
+        doc="from the control law to the motor, beyond the tick, in whole ticks",
+        source="assumed: none; buses of drives take 1 to 5 ms",
+    )  # fmt: skip
+    drive_gain: float = parameter(
+        1.0, lower=0.1, upper=20.0, doc="effort of the drives over the one asked for",
+        source="assumed: 1; torque constants are good to some 10 %",
+    )  # fmt: skip
+    gear_stiffness: tuple[float, ...] = parameter(
+        (), unit="N·m/rad or N/m", lower=0.0, fixed=True,
+        doc="stiffness of each gear between motor, with its encoder, and link; 0 or empty: rigid",
+    )  # fmt: skip
+    motor_inertia: tuple[float, ...] = parameter(
+        (), unit="kg·m² or kg", lower=1e-12, fixed=True,
+        doc="of each motor through its gear, a part of its axis's; where gears bend. Empty: known",
+    )  # fmt: skip
+
+
+def faults_of(robot: Robot) -> Hardware:
+    """What is known of the real arm; without anything, the dry friction of its drive table."""
+    if robot.hardware is not None:
+        return robot.hardware
+    assert robot.drives is not None
+    zero = np.zeros(robot.n)
+    return Hardware(
+        coulomb=robot.drives.coulomb, bias=zero, wander=zero, play=zero,
+        coupling=np.zeros((robot.n, robot.n)),
+        sources={"coulomb": "assumed: as in the drive table"},
+    )  # fmt: skip
+
+
+def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
+    """Numbers of a robot's drive table and of its faults, less those that are left out.
+
+    Raises:
+        ParameterError: A list is not of the robot's number of joints, or a weight has no value.
+        UnknownNameError: A weight that the robot's dynamics do not leave open.
+    """
+    drives, faults, out = robot.drives, faults_of(robot), set(parameters.without)
+    assert drives is not None
+
+    def number(name: str, fault: str) -> Array:
+        given = getattr(parameters, name)
+        values = per_joint(robot, f"plant.hardware.{name}", given, getattr(faults, name))
+        return np.zeros(robot.n) if fault in out else values
+
+    ones = np.ones(robot.n)
+    zero, bristle = np.zeros(robot.n), drives.inertia * parameters.bristle_frequency**2
+    return Physics(
+        viscous=drives.viscous,
+        coulomb=number("coulomb", "friction"),
+        friction_speed=drives.friction_speed,
+        bristle=zero if "sticking" in out else bristle,
+        wander=number("wander", "wandering"),
+        wander_travel=parameters.wander_travel * drives.encoder_step,
+        bias=number("bias", "bias"),
+        effort_step=(
+            zero if "drive_steps" in out else 2.0 * drives.effort_limit / 2.0**parameters.drive_bits
+        ),
+        encoder_step=drives.encoder_step,
+        play=number("play", "play"),
+        coupling=np.zeros((robot.n, robot.n)) if "play" in out else faults.coupling,
+        tip_geometry=np.zeros(0) if "links" in out else _tip_geometry(robot, faults),
+        dynamics=np.zeros(0) if "weights" in out else _dynamics(robot, faults, parameters.weights),
+        effort_delay=parameters.effort_delay,
+        drive_gain=parameters.drive_gain * ones,
+        gear_stiffness=_gears(robot, parameters),
+        motor_inertia=_motors(robot, parameters),
+    )
+
+
+def _motors(robot: Robot, parameters: HardwareParameters) -> Array:
+    """Inertias of the motors (n,), seen through their gears: the robot's, or half of the axes'."""
+    faults, drives = faults_of(robot), robot.drives
+    assert drives is not None
+    known = faults.motors if len(faults.motors) else 0.5 * drives.inertia
+    return per_joint(robot, "plant.hardware.motor_inertia", parameters.motor_inertia, known)
+
+
+def _gears(robot: Robot, parameters: HardwareParameters) -> Array:
+    """Stiffness of the gears (n,).
+
+    Raises:
+        ParameterError: A gear that bends with no inertia of a link behind it, or that swings too
+            fast for the ticks.
+    """
+    given, n, model = parameters.gear_stiffness, robot.n, robot.dynamics
+    stiffness = per_joint(robot, "plant.hardware.gear_stiffness", given, np.zeros(n))
+    if not stiffness.any():
+        return stiffness
+    assert model is not None
+    out, motors = np.empty(n + n * n), _motors(robot, parameters)
+    row, home = model.parameters.copy(), robot.home.copy()
+    write_model(pointer(model.acceleration, ACCELERATION), row, home, np.zeros(n), out)
+    links = np.diag(out[n:].reshape(n, n)) - motors
+    for i in np.flatnonzero(stiffness):
+        of = f"plant.hardware.gear_stiffness of {robot.joint_names[i]}"
+        if links[i] <= 1e-9 * motors[i]:
+            raise ParameterError(
+                of, stiffness[i], "0: in this model its motor is all that it moves"
+            )
+        most = FASTEST_GEAR**2 * motors[i] * links[i] / (motors[i] + links[i])
+        if stiffness[i] > most:
+            raise ParameterError(
+                of, stiffness[i], f"<= {most:.3g}, which swings at {FASTEST_GEAR} rad/s"
+            )
+    return stiffness
+
+
+def _dynamics(robot: Robot, faults: Hardware, weights: tuple[str, ...]) -> Array:
+    """Parameter row of the true dynamics; empty where it is the one that the control law knows."""
+    model = robot.dynamics
+    assert model is not None
+    row = (faults.dynamics if len(faults.dynamics) else model.parameters).copy()
+    for text in weights:
+        symbol, _, value = text.partition("=")
+        if symbol not in model.unknown:
+            raise UnknownNameError("plant.hardware.weights", symbol, model.unknown)
+        try:
+            row[model.unknown[symbol]] = float(value)
+        except ValueError:
+            raise ParameterError("plant.hardware.weights", text, f"{symbol}=number") from None
+    return row
+
+
+def _tip_geometry(robot: Robot, faults: Hardware) -> Array:
+    """Geometry row of the arm as built; empty where nothing differs, or the robot is no chain."""
+    built = None if faults.links is None else true_chain(robot, faults.links)
+    return np.zeros(0) if built is None else built
+
+
+HARDWARE = Plant("hardware", HardwareParameters, hardware_physics)
