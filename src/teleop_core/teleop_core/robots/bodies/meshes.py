@@ -57,7 +57,8 @@ def _profiles(solid: Solid, arc: int) -> list[Array]:
         return [corners[i : i + 2] for i in range(3)]
     angle = np.linspace(0.0, 0.5 * math.pi, arc + 1)
     low = np.stack((radius * np.sin(angle), -top - radius * np.cos(angle)), axis=1)
-    return [np.concatenate((low, low[::-1] * (1.0, -1.0)))]
+    high = low[::-1] * (1.0, -1.0)
+    return [np.concatenate((low, high if top else high[1:]))]  # a sphere has one equator
 
 
 def _revolved(profiles: list[Array], around: int) -> Mesh:
