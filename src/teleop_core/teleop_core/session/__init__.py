@@ -1,1 +1,1 @@
-"""Session: a graph made from a configuration and run in virtual time, recorded or replayed."""
+"""Session: a graph run in virtual time, what is recorded of it, replayed, imported and exported."""

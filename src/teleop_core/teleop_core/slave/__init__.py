@@ -1,1 +1,1 @@
-"""Slave: the simulated arm, its joints and drives, and references without jumps."""
+"""Slave: the arm's server, its operation, and its simulated drives: control laws and plants."""
