@@ -95,6 +95,7 @@ def composed(compose):
 
 @pytest.mark.parametrize("name", ["slave", "recorder"])
 def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(peer, composed, tmp_path, name):
+    peer.wait_value("slave", "ticks", lambda ticks: ticks > 100)
     assert change(peer, name, Transition.TRANSITION_ACTIVE_SHUTDOWN)
     peer.wait_state(name, "finalized")
     composed.send_signal(signal.SIGTERM)

@@ -104,7 +104,7 @@ def test_a_node_that_dies_is_named_and_the_recording_is_closed(tmp_path):
 
 def test_a_node_that_cannot_start_is_named_with_its_reason(tmp_path):
     wrong = configure("coarse_box", settings=["operator=bag", "operator.bag=/no/such/bag"])
-    with pytest.raises(SessionError, match=r"(?s)haptic_master ended with exit code 2.*no/such"):
+    with pytest.raises(SessionError, match=r"(?s)operator ended with exit code 2.*no/such"):
         live(wrong, tmp_path / "bag", console())
     assert children() == []
 

@@ -29,7 +29,7 @@ STILL = 3e-4  # [rad or m], a few encoder steps: what counts as not moving
 STEADY = {
     "operator__kind": "hold", "operator__center": [0.0, 0.0, 0.02], "operator__approach_time": 2.0,
     "operator__rotation": 0.0,
-    "hand__tremor_amplitude": 0.0, "device__gimbal_noise": 0.0,
+    "operator__tremor_amplitude": 0.0, "device__gimbal_noise": 0.0,
 }  # fmt: skip
 
 

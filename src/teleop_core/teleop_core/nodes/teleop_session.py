@@ -91,7 +91,7 @@ class TeleopSession:
     def _are_all_there(self) -> bool:
         """Whether every node has been at work that was to begin by itself: no sample is missed."""
         self._seen |= {node for node in self.nodes if node.is_at_work}
-        waited_for = {node for node in self.nodes if node.options.autostart}
+        waited_for = {n for n in self.nodes if n.options.autostart and not n.has_ended}
         return bool(self._seen) and waited_for <= self._seen
 
     def _tick(self, tick_ns: int) -> None:
