@@ -5,7 +5,6 @@ What cannot be a rotation becomes NaN and is counted as strange, what is missing
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +13,10 @@ from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array, multiply_quaternions
 from teleop_core.kernels.portable import dot, length, product
 
-if TYPE_CHECKING:  # half a second to import, and most files hold quaternions
-    from scipy.spatial.transform import Rotation
-
 TOLERANCE = 0.1
 """How far a quaternion's length, or a matrix from being a rotation, may be off."""
 _MISSING = 1e-6  # shorter quaternions and directions mean that nothing was measured
+_AXES = {"x": 1, "y": 2, "z": 3}
 
 
 @dataclass
@@ -62,7 +59,10 @@ class Attitudes:
             )
         if self.kind == "forward":
             return self._of_directions(rows)
-        return self._of_angles(rows)
+        angles = np.radians(rows) if self.degrees else rows
+        if self.kind == "euler":
+            return from_euler(self.order, angles)
+        return from_rotation_vectors(angles)
 
     def _unit(self, quaternions: Array) -> Array:
         lengths = length(quaternions)
@@ -76,25 +76,15 @@ class Attitudes:
         return unit
 
     def _of_matrices(self, matrices: Array) -> Array:
-        from scipy.spatial.transform import Rotation
-
         squares = product(matrices, matrices.transpose(0, 2, 1))
         missing = np.abs(matrices).max(axis=(1, 2), initial=0.0) < _MISSING
         off = np.abs(squares - np.eye(3)).max(axis=(1, 2), initial=0.0) > TOLERANCE
         mirror = dot(np.cross(matrices[:, 0], matrices[:, 1]), matrices[:, 2]) < 0.0
         self.strange += int(((off | mirror) & ~missing).sum())
         self.mirrored += int((mirror & ~off).sum())
-        is_rotation = ~(off | mirror | missing) & np.isfinite(matrices).all(axis=(1, 2))
-        return _where(is_rotation, Rotation.from_matrix(matrices[is_rotation]))
-
-    def _of_angles(self, rows: Array) -> Array:
-        """Of Euler angles (small letters about fixed axes), or of rotation vectors."""
-        from scipy.spatial.transform import Rotation
-
-        known = np.asarray(np.isfinite(rows).all(axis=1))
-        if self.kind == "euler":
-            return _where(known, Rotation.from_euler(self.order, rows[known], self.degrees))
-        return _where(known, Rotation.from_rotvec(rows[known], self.degrees))
+        quaternions = from_matrices(matrices)
+        quaternions[off | mirror | missing] = math.nan
+        return quaternions
 
     def _of_directions(self, directions: Array) -> Array:
         """By parallel transport: from each direction to the next by the shortest turn."""
@@ -145,11 +135,66 @@ def transport(directions: Array, last: Array, quaternions: Array) -> None:
             quaternions[i, j] = last[3 + j]
 
 
-def _where(is_known: NDArray[np.bool_], turns: "Rotation") -> Array:
-    """Quaternions (N, 4), w first, of the rows that are known; NaN in all others."""
-    quaternions = np.full((len(is_known), 4), math.nan)
-    quaternions[is_known] = turns.as_quat(scalar_first=True)
-    return quaternions
+def from_matrices(matrices: Array) -> Array:
+    """Unit quaternions (N, 4) of rotation matrices (N, 3, 3), which may be off by rounding.
+
+    The largest component is computed first (Shepperd 1978).
+    """
+    d = np.diagonal(matrices, axis1=1, axis2=2)
+    trace = d.sum(axis=1)
+    squares = np.column_stack((trace, d))  # largest where that component is the largest
+    largest = np.argmax(squares, axis=1)
+    r = matrices
+    candidates = np.empty((4, len(matrices), 4))
+    wx, wy, wz = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
+    xy, xz, yz = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
+    x, y, z = d.T
+    candidates[0] = np.column_stack((1.0 + trace, wx, wy, wz))
+    candidates[1] = np.column_stack((wx, 1.0 + x - y - z, xy, xz))
+    candidates[2] = np.column_stack((wy, xy, 1.0 - x + y - z, yz))
+    candidates[3] = np.column_stack((wz, xz, yz, 1.0 - x - y + z))
+    chosen = candidates[largest, np.arange(len(matrices))]
+    with np.errstate(invalid="ignore"):
+        unit: Array = chosen / length(chosen)[:, None]
+    return unit
+
+
+def from_rotation_vectors(vectors: Array) -> Array:
+    """Unit quaternions (N, 4) of rotation vectors (N, 3) [rad]."""
+    half = 0.5 * length(vectors)
+    share = 0.5 * np.sinc(half / math.pi)
+    return np.column_stack((np.cos(half), share[:, None] * vectors))
+
+
+def from_euler(order: str, angles: Array) -> Array:
+    """Unit quaternions (N, 4) of Euler angles (N, 3) [rad].
+
+    Args:
+        order: Three axes in the order of the columns; small letters turn about fixed axes, capital
+            ones about the axes that turn along.
+        angles: Rows.
+    """
+    out: Array = np.tile([1.0, 0.0, 0.0, 0.0], (len(angles), 1))
+    for axis, angle in zip(order, angles.T, strict=True):
+        turn = np.zeros((len(angles), 4))
+        turn[:, 0], turn[:, _AXES[axis.lower()]] = np.cos(0.5 * angle), np.sin(0.5 * angle)
+        out = products(out, turn) if order.isupper() else products(turn, out)
+    return out
+
+
+def products(a: Array, b: Array) -> Array:
+    """Quaternions (N, 4) of rotations ``b`` followed by ``a``, each (N, 4) or (4,)."""
+    aw, ax, ay, az = np.moveaxis(a, -1, 0)
+    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    return np.stack(
+        (
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ),
+        axis=-1,
+    )
 
 
 def continuous(quaternions: Array, last: Array | None) -> Array:
