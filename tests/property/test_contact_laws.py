@@ -34,13 +34,13 @@ def session(motion, seconds, hand=None, device=None, seed=1, delay=0, **fixture)
     The wall's force comes ``delay`` ticks late.
     """
     register_operator("leaning", motion, replace=True)
-    person = build(
-        OperatorParameters, {"kind": "leaning", "rotation": 0.0, "seed": seed, "patience": 0.0}
-    )
+    own, hand = {"kind": "leaning", "rotation": 0.0, "seed": seed, "patience": 0.0}, hand or {}
+    own |= {key: hand[key] for key in hand if key.startswith("tremor")}
+    person = build(OperatorParameters, own)
     master = HeldMaster(
         replace(person, buttons=ButtonParameters(fixture=(0.002,))),
         HapticMasterParameters(
-            seed=seed, hand=HandParameters(**(hand or {})),
+            seed=seed, hand=HandParameters(**{k: v for k, v in hand.items() if k not in own}),
             device=DeviceParameters(**(device or {})),
         ),
     )  # fmt: skip

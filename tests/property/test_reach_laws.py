@@ -212,7 +212,7 @@ def setpoints(stamps_ns, **values):
     The reference filter, which lags behind any master, is off.
     """
     values = {"slave.reference_filter.is_on": False} | values
-    session = VirtualTime(configuration(settings=values), is_replay=True)
+    session = VirtualTime(configuration(settings=values), played="haptic_master")
     rows = np.concatenate(list(replayed_blocks(session, master_bag(stamps_ns))[0]))
     last = rows["now_ns"][-1] - stamps_ns[-1]
     rows = rows[rows["slave_setpoint_cp_ns"] > NO_COMMAND_NS]  # after the move to where it starts

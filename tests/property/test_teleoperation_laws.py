@@ -345,7 +345,7 @@ def test_parameters_changed_in_a_running_session_never_move_the_slave(seed):
 
 def test_quaternions_stay_unit_over_a_long_session_of_turning_and_clutching():
     count = 60_000
-    rng, session = np.random.default_rng(8), VirtualTime(configure(), is_replay=True)
+    rng, session = np.random.default_rng(8), VirtualTime(configure(), played="haptic_master")
     turns = Rotation.from_rotvec(0.002 * rng.standard_normal((count, 3)))
     # Products of 100 turns each keep the path smooth and its making fast.
     samples, attitude = session.rows(count), Rotation.identity()

@@ -91,7 +91,7 @@ def test_a_recording_stores_what_repeats_it(recording):
     assert metadata["scenario"] == "mode_switching"
     assert metadata["robot"] == "rcrt1"
     assert metadata["seed"] == "1"
-    assert stored["haptic_master"]["ros__parameters"]["buttons.fixture"] == [2.0, 11.0]
+    assert stored["operator"]["ros__parameters"]["buttons.fixture"] == [2.0, 11.0]
 
 
 def test_state_reports_every_change_of_clutch_mode_and_box(recording):

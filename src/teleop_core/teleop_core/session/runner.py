@@ -96,7 +96,7 @@ def replayed_blocks(session: VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]
     played = session.played_topics
     needed = session.needed_topics
     bag.require(needed)
-    recorded = [topic for topic in played if topic.name in bag.topics]
+    recorded = [t for t in played if t.name in bag.topics and bag.topics[t.name].count]
     series = {name: in_order(found) for name, found in bag.read_many(recorded).items()}
     name = needed[0].name
     first_ns, last_ns = replayed_span(bag.path, name, series[name].stamp_ns)

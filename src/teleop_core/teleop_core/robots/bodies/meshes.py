@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
+from teleop_core.kernels.portable import product
 from teleop_core.robots.bodies.solids import Solid
 
 Faces = NDArray[np.int64]
@@ -22,7 +23,7 @@ def mesh_of(solid: Solid, around: int = AROUND) -> Mesh:
     else:
         vertices, faces = _revolved(_profiles(solid, around // 4), around)
     turn = rotations_from_quaternions(solid.pose[None, 3:])[0]
-    return vertices @ turn.T + solid.pose[:3], faces
+    return product(vertices, turn.T) + solid.pose[:3], faces
 
 
 def merged(meshes: list[Mesh]) -> Mesh:
