@@ -200,6 +200,7 @@ def chain(peer, master=STEADY):
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_the_hand_rests_until_the_slave_follows(peer):
     poses = peer.listen(topics.MASTER_MEASURED_CP)
     peer.start("haptic_master", patience=3600.0, **STEADY)
@@ -243,6 +244,7 @@ def follows(peer, setpoints):
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @pytest.mark.parametrize("name", ["motion_scaling", "inverse_kinematics", "haptic_master"])
 def test_restarting_a_node_does_not_move_the_slave(peer, name):
     measured, setpoints = (
@@ -272,6 +274,7 @@ def test_restarting_a_node_does_not_move_the_slave(peer, name):
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_slave_holds_when_the_master_dies(peer):
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     circle = {"operator__kind": "circle", "operator__approach_time": 0.5, "operator__period": 4.0}

@@ -44,10 +44,13 @@ def test_a_silent_hand_lets_go_and_the_clutch_is_released_once_it_has_the_stylus
     held = Held()
     clutch, _ = held.go(1000, np.zeros(3))
     assert not clutch.any()
-    clutch, places = held.go(500)
-    assert not clutch[:199].any()
-    assert clutch[201:].all()
+    clutch, places = held.go(700)
+    assert not clutch[:499].any()
+    assert clutch[501:].all()
     assert np.ptp(places, axis=0).max() < 1e-6
+    clutch, _ = held.go(10, np.array([1e-3, 0.0, 0.0]))
+    assert not clutch.any()  # it is where it was
+    held.go(700)
     clutch, places = held.go(1000, ELSEWHERE)
     assert clutch[:299].all()
     assert not clutch[301:].any()

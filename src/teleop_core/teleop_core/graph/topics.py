@@ -159,6 +159,10 @@ def in_force(topic: str) -> Stamp:
     return Stamp(f"of the {topic} in force", topic, is_in_force=True)
 
 
+SELDOM_NS = 20_000_000
+"""Time after which a value that has not changed is sent again all the same [ns]."""
+
+
 @dataclass(frozen=True, repr=False)
 class Topic:
     """One topic of an arm.
@@ -173,7 +177,7 @@ class Topic:
         adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
             another source of force; empty for a topic of its own.
         arm: Namespace; empty for the default arm.
-        is_seldom: Whether it is sent only where it is not zero, and once where it becomes zero.
+        is_seldom: Whether it is sent where it changes and every :data:`SELDOM_NS` alone.
         message: Name of the ROS message type where it carries no values, such as a robot's model;
             empty for that of its kind.
     """
@@ -274,7 +278,7 @@ TELEOP_STATE = Topic(
 )  # fmt: skip
 HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Where the operator wants the stylus; silence lets go of it."""
-HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base")
+HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base", is_seldom=True)
 """Which buttons of the stylus the operator presses."""
 HAND_TREMOR = Topic(
     "hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z"), is_seldom=True
@@ -291,7 +295,7 @@ OPERATOR_BUTTONS = Topic(
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (
-    HAND_SERVO_CP, HAND_BUTTONS,
+    HAND_SERVO_CP,
     MASTER_MEASURED_CP, MASTER_MEASURED_CV, MASTER_MEASURED_CF, MASTER_BUTTONS, MASTER_CONTACT,
     MASTER_SERVO_CF,
     SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_REACH, SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP,
@@ -300,5 +304,5 @@ STREAMS = (
 """Topics of the built-in stages that carry one message per tick."""
 REPORTS = (SLAVE_OPERATION, TELEOP_STATE)
 """Topics of the built-in stages that are sent where they change."""
-ALL = (*STREAMS, HAND_TREMOR, *REPORTS, DIAGNOSTICS)
+ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, *REPORTS, DIAGNOSTICS)
 BY_NAME = {topic.name: topic for topic in ALL}

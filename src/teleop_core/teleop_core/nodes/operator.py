@@ -4,8 +4,14 @@ import numpy as np
 
 from teleop_core.base.errors import PartError
 from teleop_core.chain.operators import OPERATORS
+from teleop_core.chain.operators.follower import MOST
 from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.graph.topics import MASTER_MEASURED_CF, Topic
+from teleop_core.graph.topics import (
+    MASTER_MEASURED_CF,
+    MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CP,
+    Topic,
+)
 from teleop_core.nodes.device_hand import DeviceHand
 from teleop_core.nodes.hand import HandInput
 from teleop_core.nodes.ticking import TickingNode
@@ -13,7 +19,7 @@ from teleop_core.nodes.ticking import TickingNode
 _FULL = 3.3
 """Force that is told a person in full [N]; a rumble has no more."""
 _LOOK = 10
-"""Ticks from one look at what is told to the next, of operators who do not answer to it at once."""
+"""Ticks from one look at the state to the next, of operators who answer to nothing."""
 
 
 class OperatorNode(TickingNode):
@@ -30,6 +36,10 @@ class OperatorNode(TickingNode):
         self.stage.reset()
         self._force = self.stage.signals[MASTER_MEASURED_CF.field]
         self._hand, self._device = None, None
+        self._sees = self.stage.ahead <= MOST
+        if not self._sees:  # whoever plans so far ahead answers to nothing
+            for port in (SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF):
+                self.input(port).close()
         kind, hand = parameters.kind, self.stage.hand
         operator = OPERATORS.find(kind.kind)
         if hand is None:
@@ -59,7 +69,7 @@ class OperatorNode(TickingNode):
     def read_ports(self, trigger: Topic | None = None) -> None:
         """Bring the signals up to date, and hear who says where the stylus shall be."""
         self._ticks += 1
-        if self.stage.ahead == 1 or not self.has_own_loop or self._ticks % _LOOK == 0:
+        if self._sees or not self.has_own_loop or self._ticks % _LOOK == 0:
             super().read_ports(trigger)
         if self._hand is not None:
             self._hand.read()

@@ -13,7 +13,7 @@ from teleop_core.base.parameters import NoParameters
 from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import make_signals
 from teleop_core.graph.stage import Stage
-from teleop_core.graph.topics import Kind, Topic
+from teleop_core.graph.topics import SELDOM_NS, Kind, Topic
 from teleop_core.kernels import bare
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.streams import Input, Output
@@ -81,7 +81,7 @@ class Ports:
         self._ports = [(p.name, f"{p.field}_ns", self.inputs[p.name]) for p in stage.reads]
         self._stamped: list[tuple[Output, str]] = []
         self._passed_on: dict[Output, int] = {}  # stamps that went out last
-        self._seldom: dict[Output, bool] = {}  # whether what went out last was not zero
+        self._seldom: dict[Output, tuple[bytes, int]] = {}  # what went out last, and its stamp
         for topic in stage.writes:
             if topic.kind is not Kind.REPORT:
                 form = layout(topic.of_arm(arm), joint_names)
@@ -91,7 +91,7 @@ class Ports:
                 if topic.stamp.of and not topic.stamp.is_in_force:
                     self._passed_on[output] = 0
                 if topic.is_seldom:
-                    self._seldom[output] = False
+                    self._seldom[output] = b"", 0
 
     def _stamp_field(self, written: Topic) -> str:
         """Field of the stamp that an output passes on; empty for the time of sampling."""
@@ -142,9 +142,10 @@ class Ports:
                     continue
                 self._passed_on[output] = stamp_ns
             if output in self._seldom:
-                before, self._seldom[output] = self._seldom[output], output.is_moving()
-                if not (before or self._seldom[output]):
+                values, (before, last_ns) = output.bits(), self._seldom[output]
+                if values == before and stamp_ns - last_ns < SELDOM_NS:
                     continue
+                self._seldom[output] = values, stamp_ns
             output.send(stamp_ns)
 
     def concerns(self) -> list[str]:

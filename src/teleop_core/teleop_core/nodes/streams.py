@@ -343,9 +343,9 @@ class Output:
             self.tap(data, sent_ns)
         self.sent += 1
 
-    def is_moving(self) -> bool:
-        """Whether a present value is not zero."""
-        return bool(self._source.any())
+    def bits(self) -> bytes:
+        """The present values, to be compared."""
+        return self._source.tobytes()
 
     def is_sound(self) -> bool:
         """Whether the present values are finite."""

@@ -15,7 +15,7 @@ from teleop_core.base.errors import RecordingError
 from teleop_core.graph.graph import DEVICE, RECORDER_NAME, Member
 from teleop_core.graph.layers import SESSION, Layer, parse_text
 from teleop_core.graph.signals import STATE_FIELDS, TICK_NS
-from teleop_core.graph.topics import OPERATION, TELEOP_STATE, Kind, Topic, limit_text
+from teleop_core.graph.topics import OPERATION, SELDOM_NS, TELEOP_STATE, Kind, Topic, limit_text
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
@@ -235,7 +235,7 @@ class NewSamples:
 
     def __init__(self) -> None:
         self._last: dict[str, int] = {}
-        self._was_moving: dict[str, bool] = {}
+        self._values: dict[str, Array] = {}
 
     def of(
         self, topic: Topic, block: Any, log_ns: NDArray[np.int64]
@@ -247,12 +247,18 @@ class NewSamples:
         is_new = np.diff(stamps, prepend=self._last.get(topic.name, 0)) != 0
         self._last[topic.name] = int(stamps[-1])
         if topic.is_seldom:
-            moving = values.any(axis=1)
-            is_new &= moving | np.append(self._was_moving.get(topic.name, False), moving[:-1])
-            self._was_moving[topic.name] = bool(moving[-1])
+            is_new &= self._is_due(topic, values, stamps)
         if is_new.all():
             return stamps, values, log_ns
         return stamps[is_new], values[is_new], log_ns[is_new]
+
+    def _is_due(self, topic: Topic, values: Array, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which rows (N,) change, or come when it is time to say it again."""
+        before = self._values.get(topic.name, np.full((1, values.shape[1]), np.nan))
+        self._values[topic.name] = values[-1:].copy()
+        changes = (np.concatenate((before, values[:-1])) != values).any(axis=1)
+        due: NDArray[np.bool_] = changes | (stamps % SELDOM_NS == 0)
+        return due
 
 
 def report_of(

@@ -50,6 +50,7 @@ _GRIP_NS = 300_000_000
 """Time for which the clutch stays pressed after a hand that had let go is there again [ns]; it has
 brought the stylus to where it wants it by then."""
 _FASTEST = 3.0  # a hand that is farther than so fast a one gets [m/s] is another grip
+_NEAR = 2e-3  # one that is no farther after a silence [m] is the same
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,10 +67,10 @@ class HapticMasterParameters:
         source="assumed: no stage asks for more than 20 N, no such device gives more than 10",
     )  # fmt: skip
     hand_timeout: float = parameter(
-        0.2, unit="s", lower=0.02, upper=60.0,
+        0.5, unit="s", lower=0.02, upper=60.0,
         doc="a hand/servo_cp that is silent for longer lets go: the stylus stays, the clutch is "
-        "pressed until 0.3 s after it is there again",
-        source="assumed: some six frames of a slow page",
+        "pressed; if it comes back elsewhere, until 0.3 s later",
+        source="assumed: as of buttons, longer than a busy machine keeps a process waiting",
     )  # fmt: skip
     device: DeviceParameters = field(default_factory=DeviceParameters)
     hand: HandParameters = field(default_factory=HandParameters)
@@ -107,21 +108,21 @@ def _is_sound(p: Any, s: Any, force: Array, now_ns: int) -> bool:
 def _holds(p: Any, s: Any, row: Any) -> bool:
     """Whether a hand holds the stylus; takes where it is wanted from who does.
 
-    A hand that is suddenly elsewhere, as after a silence, is another grip: it brings the stylus
+    A hand that is suddenly elsewhere, or after a silence, is another grip: it brings the stylus
     there before the clutch is released.
     """
+    silence_ns = row.now_ns - s.heard_ns
     if row.hand_servo_cp_ns != s.told_ns:
-        elapsed = 1e-9 * (row.now_ns - s.heard_ns) if s.told_ns > 0 else 0.0
-        if distance(s.aim, row.hand_servo_cp) > _FASTEST * max(elapsed, 1e-3):
+        reach = _FASTEST * max(1e-9 * silence_ns if s.told_ns > 0 else 0.0, 1e-3)
+        if s.told_ns > 0 and silence_ns > p.silence_ns:
+            reach = _NEAR
+        if distance(s.aim, row.hand_servo_cp) > reach:
             s.free_ns = row.now_ns
-        s.told_ns, s.heard_ns = row.hand_servo_cp_ns, row.now_ns
+        s.told_ns, s.heard_ns, silence_ns = row.hand_servo_cp_ns, row.now_ns, 0
         for i in range(7):
             s.aim[i] = row.hand_servo_cp[i]
-    is_silent = row.now_ns - s.heard_ns > p.silence_ns
-    if is_silent:
-        s.free_ns = row.now_ns
     is_new = s.free_ns > 0 and row.now_ns - s.free_ns < _GRIP_NS
-    s.is_held = 0 if is_silent or is_new else 1
+    s.is_held = 0 if silence_ns > p.silence_ns or is_new else 1
     return s.is_held > 0
 
 
