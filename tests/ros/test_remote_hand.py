@@ -1,18 +1,24 @@
 """A person as the hand over real topics: what they send moves the slave, silence holds it."""
 
+import subprocess
+import sys
 import time
 
 import numpy as np
 import pytest
 
+import teleop_core as tc
 from teleop_core.chain.operators.rest import rest_pose
 from teleop_core.graph.topics import (
+    HAND_BUTTONS,
+    HAND_SERVO_CP,
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
     OPERATOR_BUTTONS,
     OPERATOR_SERVO_CP,
     SLAVE_MEASURED_CP,
 )
+from teleop_core.nodes.children import environment
 
 pytestmark = pytest.mark.ros
 # A device without friction and noise goes where the hand is.
@@ -138,3 +144,28 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
         return is_there and (np.diff(np.array(buttons.values)[:, 1]) > 0.0).sum() == 2
 
     peer.wait(presses, "two presses of the fixture button")
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_a_recorded_hand_that_is_played_is_the_operator(peer, compose, tmp_path):
+    bag = tmp_path / "hand"
+    settings = {"operator.approach_time": 1.0, "tremor_amplitude": 0.0}
+    tc.run("free_motion", duration=60.0, out=bag, settings=settings)
+    compose(operator={"kind": "elsewhere"}, slave={"operation": {"longest_outage": 0.0}})
+    tips = peer.listen(SLAVE_MEASURED_CP)
+    peer.wait(lambda: "nobody holds" in peer.status("haptic_master").message, "a free stylus")
+    peer.wait(at_rest(tips), "rest")
+    command = [sys.executable, "-m", "teleop_core.cli", "play", str(bag), "--loop", "--topics",
+               HAND_SERVO_CP.name, HAND_BUTTONS.name]  # fmt: skip
+    player = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": peer.domain}
+    )
+    try:
+        peer.wait(
+            lambda: tips.take() and np.ptp(np.array(tips.values)[:, :3], axis=0).max() > 5e-3,
+            "motion of the slave",
+        )
+    finally:
+        player.terminate()
+        player.wait(60)

@@ -121,7 +121,7 @@ def test_each_press_of_a_button_is_one_press_of_the_hand():
         assert (np.diff(run.rows[:, column], prepend=0.0) > 0.0).sum() == 3
 
 
-@pytest.mark.parametrize("name", LIVE)
+@pytest.mark.parametrize("name", [*LIVE, "elsewhere"])
 def test_virtual_time_refuses_a_device_and_says_who_works(name):
     with pytest.raises(
         ParameterError, match=rf"'{name}', must be one of random, .*remote.* in virt"

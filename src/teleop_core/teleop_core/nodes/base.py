@@ -263,6 +263,13 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self._own_publishers.append(publisher)
         return publisher
 
+    def leave_topics(self) -> None:
+        """Leave what the stage writes to another node, until the next configuration."""
+        self.ports.mute()
+        for publisher in self._own_publishers:
+            self.destroy_lifecycle_publisher(publisher)
+        self._own_publishers = []
+
     def _open_report(self) -> None:
         """Open the topic that is sent where it changes, if the stage has one."""
         own = (topic for topic in self.description.writes if topic.kind is Kind.REPORT)

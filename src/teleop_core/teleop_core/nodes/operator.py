@@ -42,6 +42,8 @@ class OperatorNode(TickingNode):
                 self.input(port).close()
         kind, hand = parameters.kind, self.stage.hand
         operator = OPERATORS.find(kind.kind)
+        if not operator.is_here:
+            self.leave_topics()
         if hand is None:
             if operator.opens is not None:
                 text = "one whose make gives a RemoteHand, for it opens a device"

@@ -148,6 +148,10 @@ class Ports:
                 self._seldom[output] = values, stamp_ns
             output.send(stamp_ns)
 
+    def mute(self) -> None:
+        """Send nothing: somebody else does."""
+        self._stamped, self.outputs = [], {}
+
     def concerns(self) -> list[str]:
         """What is wrong with what the stage writes, in words."""
         lost = f"{self.refused} steps wrote NaN or infinity: not sent"

@@ -82,6 +82,7 @@ class Operator:
             ``operator.approach_time``.
         length: ``length(parameters, setting)`` says how long its motion lasts [s], which a session
             then does too if its duration is not given; None for a motion without end.
+        is_here: False for one in whose place another node sends ``hand/servo_cp``.
         opens: ``opens(parameters)`` opens a device of this machine that moves the hand, which is
             a :class:`~teleop_core.chain.operators.remote.RemoteHand`; in live sessions alone.
     """
@@ -94,6 +95,7 @@ class Operator:
     approaches: bool = False
     length: Callable[[Any, Setting], float] | None = None
     opens: "Callable[[Any], Device] | None" = None
+    is_here: bool = True
 
 
 def following(name: str, times: object, rows: object) -> Operator:
@@ -159,7 +161,7 @@ OPERATORS: Registry[Operator] = Registry(
     "operators",
     {
         **{kind: f"teleop_core.chain.operators.shapes:{kind.upper()}"
-           for kind in ("random", "line", "circle", "points", "hold")},
+           for kind in ("random", "line", "circle", "points", "hold", "elsewhere")},
         "tour": "teleop_core.chain.operators.tour:TOUR",
         "human": "teleop_core.chain.operators.human:HUMAN",
         "remote": "teleop_core.chain.operators.remote:REMOTE",

@@ -123,8 +123,14 @@ def insist_on_virtual(stage: str, group: object) -> None:
     Raises:
         ParameterError: A person must move its device; the text names who works.
     """
-    if not isinstance(group, OperatorParameters) or OPERATORS.find(group.kind.kind).opens is None:
+    if not isinstance(group, OperatorParameters) or _is_virtual(group.kind.kind):
         return
-    others = ", ".join(name for name in OPERATORS.names() if OPERATORS.find(name).opens is None)
-    text = f"one of {others} in virtual time; a person moves a {group.kind.kind} in teleop live"
+    others = ", ".join(filter(_is_virtual, OPERATORS.names()))
+    text = f"one of {others} in virtual time; {group.kind.kind} is for teleop live"
     raise ParameterError(f"{stage}.kind", group.kind.kind, text)
+
+
+def _is_virtual(name: str) -> bool:
+    """Whether an operator can move the hand faster than time goes."""
+    operator = OPERATORS.find(name)
+    return operator.opens is None and operator.is_here

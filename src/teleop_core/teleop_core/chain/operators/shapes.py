@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -103,3 +104,5 @@ LINE = _operator("line", _line)
 CIRCLE = _operator("circle", _circle)
 POINTS = _operator("points", _points, grows=False)
 HOLD = _operator("hold", _hold)
+ELSEWHERE = replace(HOLD, name="elsewhere", is_here=False)
+"""Nobody here: another node sends the hand's topics, in live sessions alone."""
