@@ -19,7 +19,7 @@ _COEFFICIENTS = {"of the last output": 0.99, "of the last input": -0.09, "of the
 _STEP = (0.1, 0.109, 0.11791)
 _BEFORE, _AFTER = 2e-3, 5e-4
 _RESTS: Settings = {
-    "operator.kind": "hold", "operator.rotation": 0.0, "hand.tremor_amplitude": 0.0,
+    "operator.kind": "hold", "operator.rotation": 0.0, "operator.tremor_amplitude": 0.0,
     "buttons.fixture": (), "duration": 16.0,
 }  # fmt: skip
 _JUDGED = "theta5"  # which the gimbal turns one to one; near the home pose theta4 and 6 turn more
