@@ -31,7 +31,7 @@ def moved(recording: tc.Recording, late_ns: int, which: int = -1) -> tc.Recordin
 
     def later(series: Series) -> Series:
         stamps, logs = series.stamp_ns.copy(), series.log_ns.copy()
-        stamps[which] += late_ns
+        stamps[min(which, len(stamps) - 1)] += late_ns
         logs[-1] += late_ns
         return Series(stamps, logs, series.values, series.names, series.frame_id)
 
