@@ -30,6 +30,9 @@ _SHARE = 0.95  # of intervals
 _ROUNDS = 60
 _UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
 _WANDER = 0.3  # with which the answer to wandering friction is measured
+# Runs in which it is, over those of the table: where a joint sticks is as good as random, so that
+# the last bit of a fitted number changes the spread of ten runs by a tenth, of forty by a thirtieth.
+_TIMES = 4
 
 
 LOSSES: dict[str, Callable[[Array], Array]] = {
@@ -342,12 +345,12 @@ def _wander(
     runs = max(10, *(len(rests) for rests in problem.table.rests))
     robot, measured = problem.robot, problem.table.spread
 
-    def spread(wander: Array) -> Array:
+    def spread(wander: Array, runs: int) -> Array:
         rests = problem.rests(x, runs, wander)
         off = rests - rests.mean(axis=1, keepdims=True)
         return np.asarray(np.sqrt((off**2).sum(axis=(0, 1)) / (off.shape[0] * (runs - 1))))
 
-    answered = spread(np.full(robot.n, _WANDER))
+    answered = spread(np.full(robot.n, _WANDER), _TIMES * runs)
     progress(0.85)
     share = {name: _WANDER * measured[i] / answered[i] for i, name in enumerate(robot.joint_names)
              if f"coulomb.{name}" in problem.free and answered[i] > 0.0}  # fmt: skip
@@ -358,6 +361,6 @@ def _wander(
         Fitted(f"wander.{name}", "", float(w), float(w * low), float(w * high))
         for name, w in share.items()
     ]
-    predicted = spread(wander)
+    predicted = spread(wander, runs)
     progress(1.0)
     return numbers, predicted
