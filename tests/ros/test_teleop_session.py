@@ -197,6 +197,7 @@ def rest_of(measured):
     return joints[-1].tolist() if is_still else None
 
 
+@pytest.mark.alone
 def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(peer, session):
     change(peer, "inverse_kinematics", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("inverse_kinematics", "inactive")

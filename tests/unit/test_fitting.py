@@ -48,7 +48,7 @@ def test_the_plant_has_the_numbers_that_its_fit_finds(found):
         else:
             value = getattr(faults, kind)[NAMES.index(of)]
         assert number.low < number.value < number.high
-        if kind == "wander":  # drawn from ten runs, which a last bit changes by a tenth; d3 has none
+        if kind == "wander":  # drawn from ten runs, which a last bit changes by a tenth
             assert abs(value / number.value - 1.0) < 0.25, number
             continue
         # A solver's last step depends on the processor, and is small beside what the fit tells.

@@ -31,7 +31,7 @@ _ROUNDS = 60
 _UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
 _WANDER = 0.3  # with which the answer to wandering friction is measured
 # Runs in which it is, over those of the table: where a joint sticks is as good as random, so that
-# the last bit of a fitted number changes the spread of ten runs by a tenth, of forty by a thirtieth.
+# a last bit changes the spread of ten runs by a tenth, that of forty by a thirtieth.
 _TIMES = 4
 
 
