@@ -70,6 +70,35 @@ def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer):
     np.testing.assert_array_equal(answers.values[0], where)
 
 
+def test_a_button_that_was_pressed_and_released_while_the_node_stood_still_was_pressed(peer):
+    peer.start("motion_scaling")
+    answers, stamp = peer.listen(topics.SLAVE_SERVO_CP), 0
+
+    def send(*pressed):
+        nonlocal stamp
+        stamp += MS
+        for topic, values in (
+            (topics.SLAVE_SETPOINT_CP, REST),
+            (topics.MASTER_BUTTONS, pressed),
+            (topics.MASTER_MEASURED_CP, REST),
+        ):
+            peer.send(topic, stamp, values)
+
+    def is_fine():
+        send(0.0, 0.0, 0.0)
+        asked = GetParameters.Request(names=["mode"])
+        answer = peer.call(GetParameters, "/motion_scaling/get_parameters", asked)
+        return answer.values[0].string_value == "fine"
+
+    peer.wait(lambda: (send(0.0, 0.0, 0.0), answers.take())[1], "an answer")
+    (node,) = peer.nodes
+    node.process.send_signal(signal.SIGSTOP)
+    for is_pressed in (0.0, 1.0, 0.0, 0.0):
+        send(0.0, 0.0, is_pressed)
+    node.process.send_signal(signal.SIGCONT)
+    peer.wait(is_fine, "fine mode")
+
+
 def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer):
     robot = load_robot("rcrt1")
     answers = peer.listen(topics.SLAVE_SERVO_JP)

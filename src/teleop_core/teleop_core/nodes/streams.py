@@ -41,6 +41,8 @@ SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""
 _WAITING = 20
 """Messages that wait for a late reader: a stage that answers each of them loses none by 20 ms."""
+_PRESSES = 500
+"""The same of buttons: who presses one while a reader stands still for half a second is heard."""
 
 
 def message_type(ros_type: str) -> Any:
@@ -151,7 +153,8 @@ class Input:
         buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
         self.topic, self._node, self._name = topic, node, name
-        self.subscription: Subscription | None = Subscription(node, topic, name, _WAITING)
+        self._waiting = _PRESSES if topic.kind is Kind.BUTTONS else _WAITING
+        self.subscription: Subscription | None = Subscription(node, topic, name, self._waiting)
         self._is_new = False
         self._joint_names, self._target = topic.names(joint_names), target
         is_report = topic.kind is Kind.REPORT
@@ -191,10 +194,15 @@ class Input:
         return False
 
     def newest(self) -> bool:
-        """Write the newest sound message into the signals; whether there was one."""
-        is_new = False
+        """Write the newest sound message into the signals; whether there was one.
+
+        Of buttons it is the first that presses or releases one, so that no press goes unseen.
+        """
+        is_new, before = False, self._target.tobytes()
         while self.take():
             is_new = True
+            if self.topic.kind is Kind.BUTTONS and self._target.tobytes() != before:
+                break
         return is_new
 
     def _next(self) -> tuple[int, Values] | None:
@@ -284,7 +292,7 @@ class Input:
         if is_inside and self.subscription is not None:
             self.close()
         elif not is_inside and self.subscription is None:
-            self.subscription = Subscription(self._node, self.topic, self._name, _WAITING)
+            self.subscription = Subscription(self._node, self.topic, self._name, self._waiting)
 
     def give(self, stamp_ns: int, values: Values) -> None:
         """Take a sound sample from a sender in this process."""
