@@ -72,9 +72,10 @@ def at_rest(listener, count=1000):
     """Whether the tip has been at rest for so many samples, but for steps of its encoders."""
 
     def is_at_rest():
-        listener.take()
+        if listener.take() < count:
+            return False
         last = np.array(listener.values[-count:])[:, :3]
-        return len(last) == count and np.ptp(last, axis=0).max() < 1e-4
+        return np.ptp(last, axis=0).max() < 1e-4
 
     return is_at_rest
 
@@ -152,20 +153,24 @@ def test_a_recorded_hand_that_is_played_is_the_operator(peer, compose, tmp_path)
     bag = tmp_path / "hand"
     settings = {"operator.approach_time": 1.0, "tremor_amplitude": 0.0}
     tc.run("free_motion", duration=60.0, out=bag, settings=settings)
-    compose(operator={"kind": "elsewhere"}, slave={"operation": {"longest_outage": 0.0}})
+    slave = {"starts_at_home": True, "operation": {"longest_outage": 0.0}}
+    compose(operator={"kind": "elsewhere"}, slave=slave)
     tips = peer.listen(SLAVE_MEASURED_CP)
     peer.wait(lambda: "nobody holds" in peer.status("haptic_master").message, "a free stylus")
     peer.wait(at_rest(tips), "rest")
-    command = [sys.executable, "-m", "teleop_core.cli", "play", str(bag), "--loop", "--topics",
+    tips.forget()
+    command = [sys.executable, "-m", "teleop_core.cli", "play", str(bag), "--topics",
                HAND_SERVO_CP.name, HAND_BUTTONS.name]  # fmt: skip
     player = subprocess.Popen(
         command, stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": peer.domain}
     )
+
+    def moves():
+        assert player.poll() is None, "the player ended"
+        return tips.take() and np.ptp(np.array(tips.values)[:, :3], axis=0).max() > 5e-3
+
     try:
-        peer.wait(
-            lambda: tips.take() and np.ptp(np.array(tips.values)[:, :3], axis=0).max() > 5e-3,
-            "motion of the slave",
-        )
+        peer.wait(moves, "motion of the slave")
     finally:
         player.terminate()
         player.wait(60)
