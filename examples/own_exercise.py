@@ -44,7 +44,7 @@ def main() -> int:
     from teleop_drill.nodes.drill import drill  # needs ROS
 
     with tempfile.TemporaryDirectory() as folder:
-        (outcome,) = drill([SHAKEN], Path(folder) / "drill", print)
+        (outcome,) = drill([SHAKEN], Path(folder) / "drill", print, is_composed=True)
     print(f"went {1e3 * outcome.measured('path_m').value:.0f} mm, {outcome.state_text}")
     print("\n".join(outcome.failures()))  # what the recording lacks is known at the end
     return len(outcome.failures())

@@ -195,7 +195,9 @@ class _Drill:
             is_fair = late < _STOOD_STILL * self._numbers.command_timeout
             if not outcome.failures() or is_fair or math.isnan(outcome.recovered):
                 break
-            self._say(f"{_line(outcome)}; but this machine stood still for {1e3 * late:.0f} ms: again")
+            self._say(
+                f"{_line(outcome)}; but this machine stood still for {1e3 * late:.0f} ms: again"
+            )
             self._ready()
             outcome = self._repeated(exercise, rig)
         return outcome

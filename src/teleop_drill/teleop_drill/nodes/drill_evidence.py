@@ -57,13 +57,14 @@ def seen_of(
         scheduling: How late this machine was at the start.
     """
     begin_ns, end_ns = time_ns
-    true_cp = rig.tap.trace(SLAVE_TRUE_CP)  # which only a simulator tells
-    tip = true_cp if len(true_cp) else rig.tap.trace(SLAVE_MEASURED_CP)
+    true_cp, measured_cp, setpoints, joints = rig.tap.traces(
+        SLAVE_TRUE_CP, SLAVE_MEASURED_CP, SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS
+    )
+    tip = true_cp if len(true_cp) else measured_cp  # the true one only a simulator tells
     told_ns = None if outcome.told is None else begin_ns + round(1e9 * outcome.told)
     warned = [ns for ns in rig.warned.values() if ns >= begin_ns]
     return Seen(
-        begin_ns, end_ns, rig.tap.trace(SLAVE_SETPOINT_JS), rig.tap.trace(SLAVE_MEASURED_JS),
-        tip, told_ns, min(warned, default=None),
+        begin_ns, end_ns, setpoints, joints, tip, told_ns, min(warned, default=None),
         rig.tap.scheduling(begin_ns).beside(scheduling), max(0.0, 1e-9 * (rig.woken_ns - begin_ns)),
     )  # fmt: skip
 

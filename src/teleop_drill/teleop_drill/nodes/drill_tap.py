@@ -77,6 +77,7 @@ class Tap:
         self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
         self._counted = {topic.name: (array("q"), array("q")) for topic in STREAMS_HEARD}
         self._late: list[tuple[int, float]] = []
+        self._listened_ns = 0  # when it last began to take what had come
         self._subscriptions = [Subscription(node, t, f"/{t.name}", _QUEUE) for t in _HEARD]
         self._hand = _Hand(node, self) if has_hand else None
         self._is_running, self._lock = True, threading.Lock()
@@ -98,11 +99,20 @@ class Tap:
                 keep = -1 if topic in {SLAVE_OPERATION, TELEOP_STATE} else -400
                 self._heard[topic.name] = self._heard[topic.name][keep:]
 
-    def trace(self, topic: Topic) -> Trace:
-        """What was heard of a stream."""
+    def traces(self, *topics: Topic) -> list[Trace]:
+        """What was heard of streams, all until one moment.
+
+        Reading thousands of messages takes a busy machine a tenth of a second: of what came
+        meanwhile, the stream that is read first would seem to have fallen silent.
+        """
         with self._lock:
-            heard = list(self._heard[topic.name])
+            heard = [list(self._heard[topic.name]) for topic in topics]
+            until_ns = self._listened_ns
+        return [self._trace(*both, until_ns) for both in zip(topics, heard, strict=True)]
+
+    def _trace(self, topic: Topic, heard: Heard, until_ns: int) -> Trace:
         form = layout(topic, self._joint_names)
+        heard = [one for one in heard if one[0] < until_ns]
         found = [(sent, number, self._read(topic, form, data)) for sent, number, data in heard]
         sound = [(s, number, one) for s, number, one in found if not isinstance(one, Refusal)]
         rows = [values for *_, (_, values) in sound]
@@ -174,6 +184,7 @@ class Tap:
 
     def _listen(self) -> None:
         with self._lock:
+            self._listened_ns = time.time_ns()
             for subscription in self._subscriptions:
                 heard = self._heard[subscription.topic.name]
                 while (taken := subscription.take()) is not None:
