@@ -56,6 +56,12 @@ def test_own_fixture_holds_the_hand_as_the_built_in_ones_do(tmp_path):
     assert all(0.1 < depth < 4.0 for depth in depths)
 
 
+def test_own_object_is_touched_as_the_built_in_ones_are(tmp_path):
+    text = run("own_world_object", tmp_path)
+    assert re.findall(r"(\w+): pushed", text) == ["box", "sphere", "ring"]
+    assert all(0.9 < peak < 1.2 for peak in numbers(r"at most ([\d.]+) N", text))
+
+
 def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path):
     at_once, late, later = numbers(r"([\d.]+) s to the goal", run("own_operator", tmp_path))
     # exp(-2 t) takes 29 mm to half a millimetre in 2.0 s; the device's friction makes it uneven.

@@ -12,8 +12,8 @@ Everything a user needs is here:
 - :func:`import_recording`, :func:`export_recording`: recordings of others, and ours for others;
 - :func:`configuration`: what a session runs, checked;
 - :func:`load_robot`, :func:`list_robots`, :func:`robot_from_table`: arms;
-- :class:`Stage`, :class:`Fixture`, :class:`Controller`, :class:`Plant`, :class:`Operator`,
-  :class:`Metric` and the ``register_...`` functions: parts of your own;
+- :class:`Stage`, :class:`Fixture`, :class:`Controller`, :class:`Plant`, :class:`WorldObject`,
+  :class:`Operator`, :class:`Metric` and the ``register_...`` functions: parts of your own;
 - :func:`kernel`, :func:`parameter`, ``topics``: what parts are made of.
 
 ``teleop_lab`` and ``teleop_drill`` are distributions of their own that use this one.

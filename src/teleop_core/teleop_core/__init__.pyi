@@ -39,6 +39,10 @@ from .chain.operators import (
 )
 from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
 from .base.parameters import NoParameters as NoParameters, parameter as parameter
+from .slave.world import (
+    WorldObject as WorldObject,
+    register_world_object as register_world_object,
+)
 from .slave.plants import Physics as Physics, Plant as Plant, register_plant as register_plant
 from .session.recording import (
     Recording as Recording,

@@ -298,9 +298,11 @@ def _parts(_: argparse.Namespace) -> int:
     from teleop_core.robots import ROBOTS
     from teleop_core.slave.controllers import CONTROLLERS
     from teleop_core.slave.plants import PLANTS
+    from teleop_core.slave.world import WORLD_OBJECTS
 
-    for registry in (OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, STAGES, METRICS):
-        print(f"{registry.kinds:12} {', '.join(registry)}")
+    parts = (OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, STAGES, METRICS)
+    for registry in parts:
+        print(f"{registry.kinds:14}{', '.join(registry)}")
     return 0
 
 

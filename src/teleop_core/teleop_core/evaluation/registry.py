@@ -94,6 +94,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "fixture": f"{_FOLDER}.fixture:FixtureMetric",
         "force_n": f"{_FOLDER}.force:ForceMetric",
         "contact": f"{_FOLDER}.contact:ContactMetric",
+        "touch": f"{_FOLDER}.touch:TouchMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",
         "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
         "ticks": f"{_FOLDER}.counts:TicksMetric",

@@ -262,6 +262,10 @@ SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, SAMPLED, "slave_base"
 SLAVE_MEASURED_CP = Topic(
     "slave/measured_cp", Kind.POSE, passed_on("slave/measured_js"), "slave_base"
 )
+SLAVE_MEASURED_CF = Topic(
+    "slave/measured_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True
+)  # fmt: skip
+"""What the tip feels: the world's force on it, along slave_base, and no torque about the tip."""
 SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
 """Where the tip really is, which no encoder sees: only a simulator knows, or a tracker."""
 SLAVE_OPERATION = Topic("slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED,
@@ -304,5 +308,5 @@ STREAMS = (
 """Topics of the built-in stages that carry one message per tick."""
 REPORTS = (SLAVE_OPERATION, TELEOP_STATE)
 """Topics of the built-in stages that are sent where they change."""
-ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, *REPORTS, DIAGNOSTICS)
+ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, SLAVE_MEASURED_CF, *REPORTS, DIAGNOSTICS)
 BY_NAME = {topic.name: topic for topic in ALL}

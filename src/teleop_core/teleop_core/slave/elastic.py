@@ -12,6 +12,7 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.rigid_body import invert_positive, write_model
 from teleop_core.slave.friction import bend, friction
+from teleop_core.slave.world.contact import add_push
 
 _DAMPING = 0.02  # assumed: of a gear on its spring, share of critical with the motor alone
 
@@ -58,6 +59,8 @@ def _derivative(
             net[i] = p.gear_stiffness[i] * (place[0, i] - place[1, i])
             net[i] += p.gear_damping[i] * (speed[0, i] - speed[1, i])
             found[0, i] = (own - net[i]) / p.motor_inertia[i]
+    if s.is_near:
+        add_push(p, s, place[1], speed[1], net)
     _accelerate_links(acceleration, dynamics, p, place[1], speed[1], net, found[1])
     for i in range(n):
         if p.gear_stiffness[i] == 0.0:

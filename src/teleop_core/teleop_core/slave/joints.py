@@ -7,6 +7,7 @@ import numpy as np
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.friction import bend, friction
+from teleop_core.slave.world.contact import add_push
 
 
 @inner
@@ -25,6 +26,8 @@ def _derivative(
     """Write accelerations (n,) under the drive effort less friction, at ``q`` come from start."""
     for i in range(q.shape[0]):
         net[i] = effort[i] - friction(p, s, i, q[i] - start[i], dq[i])
+    if s.is_near:
+        add_push(p, s, q, dq, net)
     acceleration(q, dq, net, dynamics, ddq)
 
 

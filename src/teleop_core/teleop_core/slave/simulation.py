@@ -13,6 +13,7 @@ from teleop_core.slave.friction import wander
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.plants import PER_JOINT
 from teleop_core.slave.transmission import LONGEST_DELAY, drive, follow_encoders
+from teleop_core.slave.world.contact import WORLD_PARAMETERS, touch, world_state
 
 # A joint that is farther from its setpoint [rad or m] is no joint of a simulation in its senses.
 _ASTRAY = 10.0
@@ -27,10 +28,12 @@ def simulation_records(n: int) -> tuple[Any, Any]:
               "compensated", "braking")  # fmt: skip
     rows: list[Field] = [(name, "f8", (n,)) for name in joints]
     rows += [(name, "i8") for name in ("steps", "delay_ticks", "has_gears")]
+    rows += WORLD_PARAMETERS
     plant = ("measured", "speed", "bent", "grip", "astray", "slipped", "carried", "link",
              "link_speed")  # fmt: skip
     state: list[Field] = [(name, "f8", (n,)) for name in plant]
     state += [("noise", "i8", (n,)), ("driven", "i8"), ("late", "f8", (LONGEST_DELAY + 1, n))]
+    state += world_state(n)
     return records(rows)[0], records(state)[0]
 
 
@@ -38,6 +41,8 @@ class Arm(NamedTuple):
     """Model, control law and motion of the arm: pointers and plain arrays, which kernels take."""
 
     tip_fk: Any  # of the links as they were made
+    jacobian: Any  # of the same
+    distance: Any  # of the object that the tip can touch
     acceleration: Any
     gravity: Any
     control: Any
@@ -57,6 +62,10 @@ class Arm(NamedTuple):
     joints: Array  # room for joints
     tip: Array  # true joint positions (n,), behind the transmission
     T: Array
+    shape: Array  # numbers of the object
+    offset: Array  # rooms for what the tip feels: (3,), (3,) and (6, n)
+    normal: Array
+    J: Array
 
 
 @inner
@@ -111,6 +120,15 @@ def _see_joints(p: Any, s: Any, arm: Any) -> None:
 
 
 @inner
+def _touch(p: Any, s: Any, arm: Any, row: Any) -> None:
+    """Let the tip feel the object, at the links that move it."""
+    if p.has_gears:
+        touch(p, s, arm, s.link, s.link_speed, row.slave_measured_cf)
+    else:
+        touch(p, s, arm, arm.q, arm.dq, row.slave_measured_cf)
+
+
+@inner
 def _move_on(p: Any, s: Any, arm: Any, braked: bool, dt: float) -> None:
     """Move the arm by a tick: by its brakes, or under the effort of its drives."""
     if braked:
@@ -155,5 +173,7 @@ def simulation_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     _see_joints(p, s, arm)
     arm.tip_fk(arm.tip, arm.tip_geometry, arm.T)
     pose_from_transform(arm.T, row.slave_true_cp)
+    if p.has_world:
+        _touch(p, s, arm, row)
     wander(p, s)
     _move_on(p, s, arm, braked, dt)

@@ -10,6 +10,7 @@ from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
     NO_COMMAND_NS,
+    SLAVE_MEASURED_CF,
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
     SLAVE_SETPOINT_JS,
@@ -29,6 +30,8 @@ from teleop_core.slave.plants import PER_JOINT, PLANTS, Physics
 from teleop_core.slave.simulation import Arm, simulation_records, simulation_step
 from teleop_core.slave.stability import check_friction, check_stable, loop_key
 from teleop_core.slave.transmission import LONGEST_DELAY
+from teleop_core.slave.world import WORLD_OBJECTS
+from teleop_core.slave.world.parameters import WorldParameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +68,7 @@ class SlaveSimParameters(RobotParameters):
         (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the plant's"
     )
     plant: PlantParameters = field(default_factory=PlantParameters)
+    world: WorldParameters = field(default_factory=WorldParameters)
     controller: ControllerParameters = field(default_factory=ControllerParameters)
     trials: str = parameter(
         "all", choices=("all", "small"),
@@ -77,11 +81,11 @@ class SlaveSim(RunningStage):
     """Stage that simulates an arm: control ticks of continuous drives and links.
 
     It is at home first, at rest and in balance: the control law holds the gravity that is not
-    compensated, if it can.
+    compensated, if it can. Its tip touches the world, whose push the drives feel.
 
     Raises:
-        ParameterError: The robot has no drives, a list is not of its number of joints, or the loop
-            does not let errors die.
+        ParameterError: The robot has no drives, a list is not of its number of joints, the loop
+            does not let errors die, or the tip begins inside an object.
     """
 
     def __init__(self, parameters: SlaveSimParameters, dt: float = DT) -> None:
@@ -95,8 +99,13 @@ class SlaveSim(RunningStage):
         self._seed, physics = parameters.seed, self._physics(parameters)
         gains = self._gains(parameters, physics.viscous)
         is_as_drawn = len(physics.tip_geometry) == 0
+        touched = WORLD_OBJECTS.find(parameters.world.kind.kind)
         self.arm = Arm(
             tip_fk=self.robot.fk_pointer if is_as_drawn else pointer(dh_kernels.fk, FK),
+            jacobian=pointer(
+                self.robot.kernels.jacobian if is_as_drawn else dh_kernels.jacobian, FK
+            ),
+            distance=touched.distance_pointer,
             acceleration=pointer(model.acceleration, ACCELERATION),
             gravity=pointer(model.gravity, GRAVITY),
             control=self._law.control_pointer,
@@ -111,10 +120,13 @@ class SlaveSim(RunningStage):
             q=np.zeros(n), dq=np.zeros(n), effort=np.zeros(n), setpoint=np.zeros(n),
             measured=np.zeros(n), feedforward=np.zeros(self._law.feedforward(n)), limit=np.zeros(n),
             joints=np.zeros(n), tip=np.zeros(n), T=np.zeros((4, 4)),
+            shape=parameters.world.shape, offset=np.zeros(3), normal=np.zeros(3),
+            J=np.zeros((6, n)),
         )  # fmt: skip
         self.kernel, self.arguments = simulation_step, (self.parameters, self.state, self.arm)
         self._take(parameters)
         self.reset()
+        self._check_world(parameters.world)
         self._check_loop(parameters)
         self._examined, self._gains_in_force = parameters, self.arm.gains.copy()
         missing_effort(self.arm, np.zeros(n), self.arm.gains, dt, ticks=0)  # compiles it
@@ -144,6 +156,7 @@ class SlaveSim(RunningStage):
         s["link"] = home - bent
         row = self.signals
         row["slave_setpoint_js"], row["slave_measured_js"] = home, 0.0
+        row["slave_measured_cf"] = 0.0
         row["slave_measured_js"][: self.robot.n] = s["measured"]
         row["slave_measured_js_ns"] = NO_COMMAND_NS  # where it stands before the first tick
 
@@ -190,6 +203,7 @@ class SlaveSim(RunningStage):
         p["delay_ticks"] = min(round(physics.effort_delay / self.dt), LONGEST_DELAY)
         p["effort_limit"], p["speed_limit"] = drives.effort_limit, drives.speed_limit
         self.arm.limit[:] = drives.effort_limit
+        self._take_world(parameters.world)
         compensated = {
             "published": robot.dynamics.compensated, "all": 1.0, "none": 0.0
         }[parameters.gravity_compensation]  # fmt: skip
@@ -200,6 +214,28 @@ class SlaveSim(RunningStage):
             parameters.integration_steps,
             drives.effort_limit / drives.inertia,
         )
+
+    def _take_world(self, world: WorldParameters) -> None:
+        """Write where the object is, and what it is made of."""
+        p, made_of = self.parameters, world.made_of
+        p["has_world"] = world.kind.kind != "empty"
+        if p["has_world"]:
+            p["world_center"] = world.middle(self.robot.fk(self.robot.start)[:3, 3])
+        p["world_stiffness"], p["world_damping"] = made_of.stiffness, made_of.damping
+        p["world_friction"] = made_of.friction
+        self.arm.shape[:] = world.shape
+
+    def _check_world(self, world: WorldParameters) -> None:
+        """Make sure that the tip begins outside.
+
+        Raises:
+            ParameterError: It begins inside the object.
+        """
+        center, home = self.parameters["world_center"], self.robot.fk(self.robot.home)[:3, 3]
+        inside = -world.distance(home, center) if self.parameters["has_world"] else 0.0
+        if inside > 0.0:
+            text = f"outside of the tip at home, which is {1e3 * inside:.1f} mm inside the object"
+            raise ParameterError("world.place", tuple(center.tolist()), text)
 
     def _check_loop(self, parameters: SlaveSimParameters) -> None:
         """Try the loop as it is set, where the arm is; see :mod:`teleop_core.slave.stability`."""
@@ -250,7 +286,7 @@ SLAVE_SIM = Stage(
     "slave_sim",
     SlaveSimParameters,
     reads=(SLAVE_SETPOINT_JS, SLAVE_OPERATION),
-    writes=(SLAVE_MEASURED_JS, SLAVE_TRUE_CP),
+    writes=(SLAVE_MEASURED_JS, SLAVE_MEASURED_CF, SLAVE_TRUE_CP),
     make=SlaveSim,
     node="teleop_core.nodes.slave_sim:SlaveSimNode",
 )

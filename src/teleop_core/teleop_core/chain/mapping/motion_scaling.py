@@ -1,5 +1,6 @@
 """Motion scaling: from the master's pose to the slave's, with modes, clutch and fixture."""
 
+import math
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -46,6 +47,8 @@ from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
     MASTER_SERVO_CF,
     NO_COMMAND_NS,
+    SELDOM_NS,
+    SLAVE_MEASURED_CF,
     SLAVE_REACH,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
@@ -64,6 +67,7 @@ _PARAMETERS = [
     ("axis", "i8", (3,)), ("sign", "f8", (3,)),
     ("size", "f8", (3,)), *WALL_PARAMETERS, ("timeout_ns", "i8"), ("pause_ns", "i8"),
     ("rotation_gain", "f8"), ("reach_stiffness", "f8"), ("reach_depth", "f8"),
+    ("reflected", "f8"), ("reflected_most", "f8"),
     *PLAUSIBILITY_PARAMETERS,
 ]  # fmt: skip
 _STATE = [
@@ -71,7 +75,7 @@ _STATE = [
     ("is_fixture_on", "i8"), ("last_ns", "i8"),
     ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
     ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
-    *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"),
+    *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"), ("heard", "f8"),
 ]  # fmt: skip
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
@@ -79,6 +83,8 @@ _CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
 _LIMIT, _JOINT = STATE["limit"], STATE["limited_joint"]
 # Depth [m] up to which the hand's stand against a limit is measured, where no force is felt.
 _SHALLOW = 2e-3
+# Time [s] over which a force that comes from afar sets in, or fades where nothing comes any more.
+_FADE = 0.1
 # Period [s] that the first sample is taken to have.
 _LONG = 1e-3
 
@@ -200,6 +206,30 @@ def _push_back(p: Any, s: Any, force: Array) -> None:
 
 
 @inner
+def _reflect(p: Any, s: Any, period: float, row: Any) -> None:
+    """Add what the slave touches to the hand's force (3,) [N]; what falls silent fades.
+
+    Source:
+        Position-force architecture, Lawrence 1993: the slave gets the hand's place, the hand gets
+        the slave's force.
+    """
+    if p.reflected == 0.0:
+        return
+    force, felt = row.master_servo_cf, row.slave_measured_cf
+    # A force that does not change is sent now and then alone.
+    is_heard = row.master_measured_cp_ns - row.slave_measured_cf_ns <= p.timeout_ns + SELDOM_NS
+    step = period / _FADE
+    s.heard = min(max(s.heard + (step if is_heard else -step), 0.0), 1.0)
+    square = 0.0
+    for i in range(3):
+        square += felt[i] * felt[i]
+    asked = p.reflected * math.sqrt(square)
+    share = p.reflected * (p.reflected_most / asked if asked > p.reflected_most else 1.0)
+    for i in range(3):
+        force[p.axis[i]] += p.sign[i] * s.heard * share * felt[i]
+
+
+@inner
 def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
     """Write teleop_state; the fixture in the slave's base, where it holds the slave in."""
     state = row.teleop_state
@@ -291,6 +321,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     remember(s, sent, s.last_ns)
     _wall(p, s, fixture, period, pose, row.master_servo_cf)
     _push_back(p, s, row.master_servo_cf)
+    _reflect(p, s, period, row)
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
     _report(p, s, gain, is_following, row)
@@ -347,6 +378,8 @@ class MotionScaling(RunningStage):
         p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
         p["silence_ns"] = round(hand.button_silence * 1e9)
         self._take_reach_force(parameters.reach_force)
+        p["reflected"] = parameters.reflection.force_gain
+        p["reflected_most"] = parameters.reflection.max_force
         if parameters.mode != self._values.mode:
             self.state["is_fine"] = MODES.index(parameters.mode)
         turned = ("tool_roll", "axes", "tool_axes")
@@ -407,9 +440,9 @@ class MotionScaling(RunningStage):
 MOTION_SCALING = Stage(
     "motion_scaling",
     MotionScalingParameters,
-    reads=(MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SETPOINT_CP, SLAVE_REACH),
+    reads=(MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF),
     writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE),
-    late=(SLAVE_SETPOINT_CP, SLAVE_REACH),
+    late=(SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF),
     trigger=MASTER_MEASURED_CP,
     needs=(SLAVE_SETPOINT_CP,),
     make=MotionScaling,

@@ -60,6 +60,21 @@ class ReachForceParameters:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ReflectionParameters:
+    """The push of what the slave touches, which the hand feels."""
+
+    force_gain: float = parameter(
+        0.0, unit="N/N", lower=0.0, upper=10.0,
+        doc="force at the hand over slave/measured_cf; 0: the hand feels nothing of it "
+        "(unilateral); more: position goes there, force comes back (position-force)",
+    )  # fmt: skip
+    max_force: float = parameter(
+        3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further",
+        source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
 class MotionScalingParameters:
     """Parameters of :class:`MotionScaling`."""
 
@@ -97,6 +112,7 @@ class MotionScalingParameters:
     )  # fmt: skip
     fixture: FixtureParameters = field(default_factory=FixtureParameters)
     reach_force: ReachForceParameters = field(default_factory=ReachForceParameters)
+    reflection: ReflectionParameters = field(default_factory=ReflectionParameters)
     plausible: PlausibilityParameters = field(default_factory=PlausibilityParameters)
 
     def __post_init__(self) -> None:

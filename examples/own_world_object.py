@@ -1,0 +1,58 @@
+"""Touch an object of your own: a lying ring, as a compiled kernel."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import teleop_core as tc
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RingParameters:
+    """What ``--set world.ring.radius=...`` sets; the distance gets the numbers in this order."""
+
+    radius: float = tc.parameter(0.02, unit="m", lower=1e-3, upper=1.0, doc="of its middle line")
+    thickness: float = tc.parameter(0.02, unit="m", lower=1e-3, upper=1.0, doc="of its wire")
+
+
+@tc.kernel
+def ring_distance(offset: Array, shape: Array, normal: Array) -> float:
+    """Write the way from the ring's middle line; return how far a point is outside of its wire."""
+    x, y, z = offset[0], offset[1], offset[2]
+    from_axis = max(math.sqrt(x * x + y * y), 1e-9)
+    aside = from_axis - shape[0]
+    away = max(math.sqrt(aside * aside + z * z), 1e-9)
+    share = aside / (away * from_axis)
+    normal[0], normal[1], normal[2] = share * x, share * y, z / away
+    return away - 0.5 * shape[1]
+
+
+def ring_outline(p: RingParameters) -> Array:
+    """Draw its middle line."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 41)
+    return p.radius * np.stack((np.cos(angle), np.sin(angle), np.zeros(41)), axis=1)
+
+
+RING = tc.WorldObject("ring", RingParameters, ring_distance, ring_outline)
+tc.register_world_object(RING)
+
+
+def main() -> None:
+    """Print how hard the same hand presses the slave onto a box, a ball and the ring."""
+    for name, place in (
+        ("box", [0.241, -0.236, -0.087]),
+        ("sphere", [0.241, -0.236, -0.087]),
+        ("ring", [0.261, -0.236, -0.082]),
+    ):
+        settings = {"world": name, "world.place": place}
+        recording = tc.run("palpation", duration=12.0, settings=settings)
+        peak = recording.score().value("touch.peak_n")
+        print(f"{name}: pushed with at most {peak:.2f} N")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""Touch: what the slave's tip felt of the world."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.evaluation.accumulators import Moments
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
+from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.rows import Row, number, row
+from teleop_core.evaluation.traces import Envelope
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.topics import SLAVE_MEASURED_CF
+
+GROUP = "what the slave touched"
+
+
+@dataclass(frozen=True)
+class TouchScore:
+    """Forces on the slave's tip; None where none were recorded."""
+
+    count: int | None = figure("1", "touches: how often the force on the slave's tip set in")
+    peak_n: float | None = figure("N", "largest force on the tip; null without a touch")
+    rms_n: float | None = figure("N", "root mean square of the samples with a force")
+    share: float | None = figure("1", "share of the recorded time in touch")
+
+
+class TouchMetric(Metric):
+    """Touches of the tip with the world, and their forces."""
+
+    name = "touch"
+    keys = keys_of("touch", TouchScore)
+    topics = (SLAVE_MEASURED_CF,)
+
+    def __init__(self, context: Context) -> None:
+        self._force = Moments()
+        self._count, self._time_ns, self._seen = 0, 0, 0
+        self._last = (0, False)  # stamp, and whether it touched
+        self._begin_ns = 0
+        self._trace = Envelope(context.bag.start_ns, context.bag.end_ns, columns=4)
+
+    def add(self, window: Window) -> None:
+        """Take one window; the topic is sent where it changes, and now and then."""
+        samples = window.samples(SLAVE_MEASURED_CF)
+        if not len(samples.values):
+            return
+        force = samples.values[:, :3]
+        magnitude = np.sqrt(np.einsum("ij,ij->i", force, force))
+        touches = magnitude > 0.0
+        if not self._seen:
+            self._begin_ns, self._last = int(samples.log_ns[0]), (int(samples.log_ns[0]), False)
+        self._seen += len(touches)
+        before = np.append(self._last[1], touches[:-1])
+        times = np.diff(np.append(self._last[0], samples.log_ns))
+        self._count += int(np.sum(touches & ~before))
+        self._time_ns += int(times[before].sum())  # a value holds until the next one
+        self._last = int(samples.log_ns[-1]), bool(touches[-1])
+        self._force.add(magnitude[touches])
+        self._trace.add(samples.log_ns, np.column_stack((force, magnitude)))
+
+    def values(self) -> TouchScore:
+        """Score of everything so far."""
+        if not self._seen:
+            return TouchScore(None, None, None, None)
+        spread, whole = self._force.spread(), self._last[0] - self._begin_ns
+        share = self._time_ns / whole if whole else 0.0
+        return TouchScore(self._count, spread.max, spread.rms, share)
+
+    def rows(self) -> list[Row]:
+        """Number of touches and the largest force; nothing where nothing was touched."""
+        score = self.values()
+        if not score.count:
+            return []
+        return [
+            Row(GROUP, "touches", "", str(score.count)),
+            row(GROUP, "force on the tip, max", "N", score.peak_n),
+            row(GROUP, "share of the time in touch", "%", 100.0 * (score.share or 0.0)),
+        ]
+
+    def figures(self) -> list[Figure]:
+        """Force on the tip against time; none where nothing was touched."""
+        times, values = self._trace.line()
+        if not self._count:
+            return []
+        traces = [
+            line(times, values[:, i], f"{axis} (slave)", color, 1.2, "N")
+            for i, (axis, color) in enumerate(zip("xyz", (FIRST, SECOND, THIRD), strict=True))
+        ]
+        traces.append(line(times, values[:, 3], "magnitude", DARK, 1.4, "N"))
+        score = self.values()
+        sentence = f"The world pushes the slave's tip with {number(score.peak_n)} N at most"
+        layout = {
+            "xaxis": time_axis(),
+            "yaxis": {"title": {"text": "force [N]"}},
+            "hovermode": "x unified",
+        }
+        text = f"{sentence}, in {score.count} touches."
+        return [Figure("Force on the slave's tip", text, traces, layout, 340)]

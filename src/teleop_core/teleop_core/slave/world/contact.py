@@ -1,0 +1,153 @@
+"""Contact: how an object pushes the tip, and how the push reaches the joints.
+
+Where the tip is against the object is found once in a tick. Within the tick the surface counts as
+flat there and the arm's Jacobian as constant, so that every Runge-Kutta stage of the arm's motion
+feels the push of its own place and speed: a contact that is steep for the tick is smooth for the
+integrator.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from teleop_core.graph.signals import Field
+from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
+
+WORLD_PARAMETERS: list[Field] = [
+    ("has_world", "i8"), ("world_stiffness", "f8"), ("world_damping", "f8"),
+    ("world_friction", "f8"), ("world_center", "f8", (3,)),
+]  # fmt: skip
+_NEAR = 5e-3
+"""A tip that is farther outside [m] does not get there within a tick."""
+
+
+def world_state(n: int) -> list[Field]:
+    """Fields of the state of a contact of an arm with ``n`` joints, at the start of the tick."""
+    return [
+        ("is_near", "i8"), ("gap", "f8"), ("normal", "f8", (3,)), ("stuck", "f8", (3,)),
+        ("touch_q", "f8", (n,)), ("touch_J", "f8", (3, n)),
+    ]  # fmt: skip
+
+
+@inner
+def _push(p: Any, s: Any, moved: Array, speed: Array, force: Array) -> None:
+    """Write the force (3,) [N] on a tip that moved (3,) [m] since the tick began, at a speed (3,).
+
+    Along the normal a spring with the damper of Hunt and Crossley, which pulls nobody back; across
+    it a bristle as stiff, which holds until it carries the dry friction, and then slips.
+
+    Source:
+        Hunt and Crossley 1975, with exponent 1: F = K x (1 + a dx/dt). Dry friction as that of the
+        joints, see :mod:`teleop_core.slave.friction`.
+    """
+    out = rate = 0.0
+    for k in range(3):
+        out += s.normal[k] * moved[k]
+        rate += s.normal[k] * speed[k]
+    depth = -(s.gap + out)
+    normal_force = p.world_stiffness * depth * (1.0 - p.world_damping * rate)
+    if depth <= 0.0 or normal_force <= 0.0:
+        force[0] = force[1] = force[2] = 0.0
+        return
+    square = 0.0
+    for k in range(3):
+        force[k] = -p.world_stiffness * (s.stuck[k] + moved[k] - out * s.normal[k])
+        square += force[k] * force[k]
+    most, asked = p.world_friction * normal_force, math.sqrt(square)
+    share = most / asked if asked > most else 1.0
+    for k in range(3):
+        force[k] = share * force[k] + normal_force * s.normal[k]
+
+
+@inner
+def add_push(p: Any, s: Any, q: Array, dq: Array, effort: Array) -> None:
+    """Add what the object does to the joints: the transposed Jacobian times its push.
+
+    Args:
+        p: Record with :data:`WORLD_PARAMETERS`.
+        s: Record with :func:`world_state`.
+        q: Joints of the links (n,) [rad or m].
+        dq: Their speeds (n,).
+        effort: Written (n,) [N·m or N].
+    """
+    moved, speed, force = np.zeros(3), np.zeros(3), np.empty(3)
+    for i in range(q.shape[0]):
+        for k in range(3):
+            moved[k] += s.touch_J[k, i] * (q[i] - s.touch_q[i])
+            speed[k] += s.touch_J[k, i] * dq[i]
+    _push(p, s, moved, speed, force)
+    for i in range(q.shape[0]):
+        for k in range(3):
+            effort[i] += s.touch_J[k, i] * force[k]
+
+
+@inner
+def _slide(s: Any, q: Array) -> None:
+    """Take the bristle along with the tip to joints (n,), as far as it went since the last tick."""
+    for k in range(3):
+        for i in range(q.shape[0]):
+            s.stuck[k] += s.touch_J[k, i] * (q[i] - s.touch_q[i])
+
+
+@inner
+def _lay_flat(s: Any) -> None:
+    """Keep of the bristle what lies in the surface; nothing where the tip is off it."""
+    out, kept = 0.0, 1.0 if s.gap < 0.0 else 0.0
+    for k in range(3):
+        out += s.normal[k] * s.stuck[k]
+    for k in range(3):
+        s.stuck[k] = kept * (s.stuck[k] - out * s.normal[k])
+
+
+@inner
+def _begin_at(s: Any, arm: Any, q: Array, dq: Array, speed: Array) -> None:
+    """Take surface and Jacobian as they are now, for the tick; write the tip's speed (3,)."""
+    arm.jacobian(arm.tip, arm.tip_geometry, arm.J)
+    for k in range(3):
+        s.normal[k] = arm.normal[k]
+        for i in range(q.shape[0]):
+            s.touch_J[k, i] = arm.J[k, i]
+            speed[k] += arm.J[k, i] * dq[i]
+    for i in range(q.shape[0]):
+        s.touch_q[i] = q[i]
+
+
+@inner
+def _keep_bend(p: Any, s: Any, force: Array) -> None:
+    """Leave the bristle the bend that friction carries of the push (3,) [N]; the rest slipped."""
+    push = 0.0
+    for k in range(3):
+        push += s.normal[k] * force[k]
+    for k in range(3):
+        s.stuck[k] = (push * s.normal[k] - force[k]) / p.world_stiffness
+
+
+@inner
+def touch(p: Any, s: Any, arm: Any, q: Array, dq: Array, felt: Array) -> None:
+    """Find where the tip is against the object, and write what it feels (6,) [N, N·m].
+
+    Args:
+        p: Record with :data:`WORLD_PARAMETERS`.
+        s: Record with :func:`world_state`; written.
+        arm: With ``T`` of the true tip, its joints ``tip``, ``jacobian``, ``distance`` and
+            ``shape``; its rooms ``offset``, ``normal`` and ``J`` are written.
+        q: Joints of the links (n,) [rad or m], which move the tip from here on.
+        dq: Their speeds (n,).
+        felt: Force on the tip along the slave's base, and no torque about the tip; written.
+    """
+    speed, force = np.zeros(3), np.zeros(3)
+    for k in range(3):
+        arm.offset[k] = arm.T[k, 3] - p.world_center[k]
+    if s.is_near:
+        _slide(s, q)
+    s.gap = arm.distance(arm.offset, arm.shape, arm.normal)
+    s.is_near = int(s.gap < _NEAR)
+    if s.is_near:
+        _begin_at(s, arm, q, dq, speed)
+        _lay_flat(s)
+        _push(p, s, np.zeros(3), speed, force)
+        _keep_bend(p, s, force)
+    for k in range(3):
+        felt[k], felt[3 + k] = force[k], 0.0

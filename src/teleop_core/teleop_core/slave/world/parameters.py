@@ -1,0 +1,108 @@
+"""Parameters of the world: the object, where it is, and what it is made of."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.kernels.geometry import Array
+from teleop_core.slave.world import WORLD_OBJECTS, shape_of
+
+
+class Material(NamedTuple):
+    """What an object is made of.
+
+    Attributes:
+        stiffness: Of its surface [N/m].
+        damping: Of Hunt and Crossley's law [s/m]: share of the force per speed.
+        friction: Dry friction over normal force.
+    """
+
+    stiffness: float
+    damping: float
+    friction: float
+
+
+MATERIALS = {
+    "tissue": Material(200.0, 2.0, 0.1),
+    "silicone": Material(1000.0, 1.5, 0.6),
+    "rubber": Material(5000.0, 1.0, 0.8),
+    "wood": Material(20000.0, 0.7, 0.4),
+    "steel": Material(50000.0, 0.5, 0.2),
+}
+"""Materials by name. All numbers are assumed: what a tip meets depends on its own size as well."""
+_FARTHEST = 3.0  # below a tip, where an object is looked for [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldParameters:
+    """What the tip can touch."""
+
+    kind: Choice = choice(WORLD_OBJECTS, "empty", fixed=True, doc="what the tip can touch")
+    place: tuple[float, ...] = parameter(
+        (), unit="m", lower=-10.0, upper=10.0, fixed=True,
+        doc="middle of the object in the slave's base; empty: straight below the tip of the "
+        "robot's start, gap apart",
+    )  # fmt: skip
+    gap: float = parameter(
+        0.01, unit="m", lower=0.0, upper=1.0, fixed=True,
+        doc="between that tip and the object, if no place is given",
+    )  # fmt: skip
+    material: str = parameter(
+        "tissue", choices=(*MATERIALS, "own"),
+        doc="what it is made of; own: of the following three numbers",
+        source="assumed: all five; what a tip meets depends on its own size as well",
+    )  # fmt: skip
+    stiffness: float = parameter(
+        1000.0, unit="N/m", lower=1.0, upper=1e5, doc="of the surface, if the material is own"
+    )
+    damping: float = parameter(
+        1.0, unit="s/m", lower=0.0, upper=100.0,
+        doc="share of the force per speed, if the material is own",
+        source="assumed: the number; the law is that of Hunt and Crossley 1975",
+    )  # fmt: skip
+    friction_coefficient: float = parameter(
+        0.3, lower=0.0, upper=2.0, doc="over the normal force, if the material is own"
+    )
+
+    @property
+    def made_of(self) -> Material:
+        """The material, the own one or that of the name."""
+        if self.material == "own":
+            return Material(self.stiffness, self.damping, self.friction_coefficient)
+        return MATERIALS[self.material]
+
+    @property
+    def shape(self) -> Array:
+        """Numbers of the object, as its distance takes them."""
+        return shape_of(self.kind.parameters)
+
+    def distance(self, tip: Array, center: Array) -> float:
+        """How far a tip (3,) is outside the object with its middle at ``center`` (3,) [m]."""
+        part = WORLD_OBJECTS.find(self.kind.kind)
+        return float(part.distance(tip - center, self.shape, np.zeros(3)))
+
+    def middle(self, tip: Array) -> Array:
+        """Middle of the object (3,) [m] in the slave's base.
+
+        Args:
+            tip: Of the robot where it starts, (3,) [m].
+
+        Raises:
+            ParameterError: None is given, and none is found straight below.
+        """
+        if self.place:
+            if len(self.place) != 3:
+                raise ParameterError("world.place", self.place, "x, y, z, or empty")
+            return np.array(self.place)
+        down, near, far = np.array([0.0, 0.0, -1.0]), 0.0, _FARTHEST
+        if not self.distance(tip, tip) < self.gap <= self.distance(tip, tip + far * down):
+            text = f"given for a {self.kind.kind} that cannot lie straight below the tip"
+            raise ParameterError("world.place", self.place, text)
+        for _ in range(60):  # to a rounding of the place
+            way = 0.5 * (near + far)
+            is_apart = self.distance(tip, tip + way * down) >= self.gap
+            near, far = (near, way) if is_apart else (way, far)
+        return tip + far * down

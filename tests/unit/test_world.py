@@ -1,0 +1,219 @@
+"""World: shapes against a library of others, the push of a contact, and its energy."""
+
+import math
+
+import coal
+import numpy as np
+import pytest
+
+from teleop_core.base.errors import ParameterError, PartError
+from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.slave.slave_sim import SlaveSim
+from teleop_core.slave.world import WORLD_OBJECTS, WorldObject, register_world_object, shape_of
+from teleop_core.slave.world.box import BoxParameters
+from teleop_core.slave.world.parameters import MATERIALS
+
+BLOCK = [0.241, -0.236, -0.087]
+"""Middle of the block that the scenario ``palpation`` presses, whose top is at -0.072."""
+ALONG_Y = coal.Transform3s(np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]), np.zeros(3))
+SHAPES = {
+    "plane": (lambda p: coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), None),
+    "sphere": (lambda p: coal.Sphere(p.radius), None),
+    "box": (lambda p: coal.Box(*p.edges), None),
+    "cylinder": (lambda p: coal.Cylinder(p.radius, p.height), None),
+    "capsule": (lambda p: coal.Capsule(p.radius, p.length), ALONG_Y),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_library_of_others_finds_the_same_distance_and_the_same_way_out(name):
+    part = WORLD_OBJECTS.find(name)
+    parameters = part.parameters()
+    make, turned = SHAPES[name]
+    shape, numbers, normal = make(parameters), shape_of(parameters), np.zeros(3)
+    dot, place = coal.Sphere(1e-9), turned or coal.Transform3s()
+    for offset in np.random.default_rng(1).uniform(-0.06, 0.06, (300, 3)):
+        found = part.distance(offset, numbers, normal)
+        there = coal.Transform3s(np.eye(3), offset)
+        result = coal.DistanceResult()
+        coal.distance(shape, place, dot, there, coal.DistanceRequest(True, True), result)
+        if found > 0.0 or name != "cylinder":  # inside of one it is content with a longer way out
+            assert found == pytest.approx(result.min_distance + 1e-9, abs=2e-6)
+        assert math.hypot(*normal) == pytest.approx(1.0, abs=1e-12)
+        farther = part.distance(offset + 1e-7 * normal, numbers, np.zeros(3))
+        assert farther - found == pytest.approx(1e-7, rel=1e-3)
+
+
+def pressed(*texts, ticks=20_000, seconds=12.0):
+    """Signals of the scenario ``palpation`` from ``seconds`` on."""
+    session = VirtualTime(configure("palpation", settings=list(texts)))
+    return session.run(ticks)[round(1e3 * seconds) :]
+
+
+def test_the_push_is_stiffness_times_depth_where_the_tip_is_truly():
+    rows = pressed("reflection.force_gain=0.0", "world.damping=0", "world.material=own")
+    depth = BLOCK[2] + 0.015 - rows["slave_true_cp"][:, 2]
+    push = rows["slave_measured_cf"]
+    assert depth.max() > 5e-3
+    np.testing.assert_allclose(push[:, 2], np.maximum(1000.0 * depth, 0.0), atol=1e-9)
+    assert np.all(np.hypot(push[:, 0], push[:, 1]) <= 0.3 * push[:, 2] + 1e-9)
+    assert not push[:, 3:].any()
+
+
+def after_a_tick(robot, joints, texts, plant="ideal"):
+    """Speeds (n,) that an arm at rest has after a tick, and what its tip felt at its begin (3,)."""
+    zero = [0.0] * robot.n
+    settings = [f"robot={robot.name}", f"plant={plant}", f"slave_sim.coulomb={zero}", *texts]
+    arm = SlaveSim(configure("free_motion", settings=settings).group("slave_sim"))
+    arm.arm.q[:] = arm.state["link"] = arm.state["carried"] = joints
+    arm.signals["slave_setpoint_js"] = joints
+    arm.step()
+    return arm.arm.dq.copy(), arm.signals["slave_measured_cf"][:3].copy()
+
+
+@pytest.mark.parametrize("name", ["rcrt1", "puma560", "planar_3r", "rps3", "stewart"])
+def test_every_arm_is_accelerated_by_the_transposed_jacobian_of_the_push(name):
+    robot = load_robot(name)
+    J = robot.jacobian(robot.start)[:3]
+    way = J @ J.T @ np.array([0.3, 0.5, -0.8])  # one that the arm can go
+    way /= np.linalg.norm(way)
+    pressed = robot.start + 1e-3 * np.linalg.pinv(J) @ way
+    ball = robot.fk(robot.start)[:3, 3] + 0.0052 * way  # its surface is 0.2 mm ahead of the start
+    texts = ["world=sphere", f"world.place={ball.tolist()}", "world.sphere.radius=0.005",
+             "world.material=own", "world.stiffness=500.0"]  # fmt: skip
+    free, _ = after_a_tick(robot, pressed, [])
+    pushed, force = after_a_tick(robot, pressed, texts)
+    assert force @ way == pytest.approx(-0.4, rel=0.05)
+    found = [np.zeros(robot.n), np.zeros(robot.n)]
+    effort = robot.jacobian(pressed)[:3].T @ force
+    for net, ddq in zip((np.zeros(robot.n), effort), found, strict=True):
+        model = robot.dynamics
+        model.acceleration(pressed.copy(), np.zeros(robot.n), net, model.parameters.copy(), ddq)
+    wanted = 1e-3 * (found[1] - found[0])
+    np.testing.assert_allclose(pushed - free, wanted, atol=0.07 * np.abs(wanted).max())
+
+
+def test_the_plant_that_is_the_machine_feels_the_push_behind_its_gears():
+    robot = load_robot("rcrt1")
+    center = (robot.fk(robot.start)[:3, 3] - [0.0, 0.0, 0.0155]).tolist()
+    down = robot.start + 1e-3 * np.linalg.pinv(robot.jacobian(robot.start)[:3])[:, 2] * -2.0
+    texts = ["world=box", f"world.place={center}"]
+    (free, _), (pushed, force) = (
+        after_a_tick(robot, down, more, "hardware") for more in ([], texts)
+    )
+    assert force[2] > 0.05
+    assert np.abs(pushed - free).max() > 1e-9
+
+
+def test_a_surface_that_is_left_fast_does_not_pull():
+    sticky = ("world.material=own", "world.damping=100.0", "reflection.force_gain=0.0")
+    rows = pressed(*sticky)
+    push, tip = rows["slave_measured_cf"], rows["slave_true_cp"]
+    is_leaving = (tip[1:, 2] - tip[:-1, 2] > 1.2e-5) & (tip[1:, 2] < BLOCK[2] + 0.0145)
+    assert is_leaving.sum() > 20
+    assert not push[1:][is_leaving].any()
+    assert push[:, 2].min() == 0.0
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+def test_a_contact_gives_back_no_more_than_it_took(material):
+    """Of the work of the push on the tip, from a moment without touch on."""
+    top = -0.0801 + 4.0 / MATERIALS[material].stiffness  # pressed with some 4 N
+    place = f"world.place={[*BLOCK[:2], top - 0.015]}"
+    rows = pressed(f"world.material={material}", place, "reflection.force_gain=0.0", seconds=10.0)
+    force, tip = rows["slave_measured_cf"][:, :3], rows["slave_true_cp"][:, :3]
+    assert not force[0].any()
+    assert 2.0 < force[:, 2].max() < 8.0
+    ways = np.diff(tip, axis=0)
+    power = np.einsum("ij,ij->i", 0.5 * (force[1:] + force[:-1]), ways)
+    given = np.cumsum(power)  # of the block to the tip
+    assert given.min() < -1e-5
+    assert given.max() <= 1e-3 * np.abs(power).sum()
+
+
+def test_dry_friction_holds_a_tip_that_is_dragged_less_than_it_carries():
+    texts = ("world.material=own", "world.stiffness=1000.0", "reflection.force_gain=0.0",
+             "operator.kind=circle", "operator.size=[0.004,0.0,0.004]",
+             "operator.center=[0.0,-0.04,0.04]")  # fmt: skip
+    slips = {}
+    for friction in (0.0, 2.0):
+        rows = pressed(f"world.friction_coefficient={friction}", *texts)
+        force = rows["slave_measured_cf"]
+        across = np.hypot(force[:, 0], force[:, 1])
+        slips[friction] = np.median(across / force[:, 2])
+    assert slips[0.0] == 0.0
+    assert 0.05 < slips[2.0] < 2.0
+
+
+def test_an_object_that_the_tip_begins_in_is_refused_with_its_depth():
+    table, wall = ["world=plane"], ["world=plane", "world.plane.normal=[1.0,0.0,0.0]"]
+    with pytest.raises(ParameterError, match="mm inside the object"):
+        VirtualTime(configure("free_motion", settings=table))
+    with pytest.raises(ParameterError, match="cannot lie straight below"):
+        VirtualTime(configure("free_motion", settings=wall))
+    with pytest.raises(ParameterError, match="a direction"):
+        configure("free_motion", settings=["world=plane", "world.plane.normal=[0.0,0.0,0.0]"])
+
+
+@pytest.mark.parametrize(
+    ("distance", "expected"),
+    [
+        (lambda offset, shape, normal: 0.1, "normal of length 1"),
+        (lambda offset, shape, normal: _upwards(normal, 2.0 * offset[2]), "grows by 2 times"),
+        (lambda offset, shape, normal: 1 / 0, "raises ZeroDivisionError"),
+    ],
+)
+def test_an_object_that_is_none_is_refused_when_it_is_registered(distance, expected):
+    part = WORLD_OBJECTS.find("box")
+    with pytest.raises(PartError, match=expected):
+        register_world_object(WorldObject("bad", BoxParameters, distance, part.outline))
+
+
+def _upwards(normal, length):
+    normal[:] = (0.0, 0.0, 1.0)
+    return length
+
+
+def test_the_hand_feels_the_push_along_its_own_axes_and_no_more_than_asked():
+    rows = pressed("world.stiffness=2000.0", "world.material=own", "reflection.max_force=1.0",
+                   "reflection.force_gain=0.5", "reach_force.is_on=false")  # fmt: skip
+    push, force = rows["slave_measured_cf"][:-1], rows["master_servo_cf"][1:]
+    asked = 0.5 * np.column_stack((-push[:, 1], push[:, 2], -push[:, 0]))
+    length = np.linalg.norm(asked, axis=1, keepdims=True)
+    assert length.max() > 1.0
+    np.testing.assert_allclose(force[:, :3], asked / np.maximum(length, 1.0), atol=1e-12)
+
+
+def swing(stiffness, delay):
+    """Fastest that the hand gets [m/s] where it presses a block whose force comes late."""
+    texts = ["world.material=own", f"world.stiffness={stiffness}", "world.damping=0.0",
+             "world.friction_coefficient=0.0", "reflection.max_force=10.0", "feedback_timeout=1.0",
+             f"delays=[slave/measured_cf@motion_scaling={delay}]"]  # fmt: skip
+    places = pressed(*texts)["master_measured_cp"][:, :3]
+    return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
+
+
+def test_late_force_of_something_stiff_throws_the_hand_and_that_of_tissue_never_does():
+    calm = swing(200.0, 0.001)
+    assert all(swing(200.0, delay) < 1.1 * calm for delay in (0.05, 0.1, 0.3))
+    assert all(swing(20_000.0, delay) > 3.0 * calm for delay in (0.02, 0.1))
+
+
+def test_force_that_falls_silent_fades_within_a_tenth_of_a_second():
+    session = VirtualTime(configure("palpation", settings=["feedback_timeout=0.05"]))
+    stage = session.stages["motion_scaling"]
+    row = stage.signals
+    session.run(15_800)
+    assert row["master_servo_cf"][1] > 0.5
+    heard, pose_ns = int(row["slave_measured_cf_ns"]), int(row["master_measured_cp_ns"])
+    pushes = []
+    for tick in range(1, 201):
+        row["master_measured_cp_ns"] = pose_ns + tick * 1_000_000
+        row["slave_measured_cf_ns"] = heard
+        stage.step()
+        pushes.append(row["master_servo_cf"][1])
+    steps = np.abs(np.diff(pushes))
+    assert pushes[-1] == 0.0
+    assert steps.max() < 0.02 * pushes[0]
