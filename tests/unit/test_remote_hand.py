@@ -234,6 +234,21 @@ def test_every_tap_is_seen_as_one_press(taps, is_held):
     assert rows[-1, 8] == float(is_held)
 
 
+@given(
+    st.lists(st.tuples(st.floats(1e-3, 1.0), st.booleans()), min_size=1, max_size=30),
+)
+def test_every_press_is_seen_also_where_the_time_between_two_was_slept_through(turns):
+    hand, now, shown, presses, was_down = RemoteHand(), 0.0, [], 0, False
+    for gap, is_down in [*turns, *[(0.2, False)] * 60]:  # in the end there is time for all
+        presses += is_down and not was_down
+        was_down = is_down
+        hand.press("fixture", is_pressed=is_down)
+        now += gap
+        shown.append(float(hand.draw(now, DT, 1)["buttons"][0][1]))
+    assert (np.diff(shown, prepend=0.0) > 0.0).sum() == presses
+    assert shown[-1] == 0.0
+
+
 def test_a_pressed_clutch_leaves_the_stylus_to_the_hand():
     run = Run()
     run.hand.press("clutch")

@@ -284,18 +284,26 @@ class _Button:
     def __init__(self) -> None:
         self.presses = self._shown = 0
         self._until = self._next = -math.inf
+        self._is_pressed = False
 
     def at(self, now: float, *, is_down: bool) -> bool:
-        """Whether it is pressed at a time [s], which rises from call to call."""
+        """Whether it is pressed at a time [s], which rises from call to call.
+
+        It is released between two presses, also where the time between them was slept through.
+        """
         if self._shown < self.presses and now >= self._next:
-            self._shown += 1
-            self._until = now + _PRESSED
-            self._next = self._until + _BETWEEN
+            if self._is_pressed:
+                self._until, self._next = -math.inf, now + _BETWEEN
+            else:
+                self._shown += 1
+                self._until = now + _PRESSED
+                self._next = self._until + _BETWEEN
         is_last = self._shown == self.presses
         if is_down and is_last and self._shown:
             self._until = max(self._until, now)
             self._next = now + _BETWEEN
-        return now <= self._until
+        self._is_pressed = now <= self._until
+        return self._is_pressed
 
 
 def _row(name: str, pose: object) -> Array:
