@@ -153,6 +153,10 @@ def test_an_object_that_the_tip_begins_in_is_refused_with_its_depth():
         VirtualTime(configure("free_motion", settings=table))
     with pytest.raises(ParameterError, match="cannot lie straight below"):
         VirtualTime(configure("free_motion", settings=wall))
+    with pytest.raises(ParameterError, match="x, y, z, or empty"):
+        configure("free_motion", settings=["world=box", "world.place=[0.1,0.2]"])
+    with pytest.raises(ParameterError, match="given for scara_stewart"):
+        VirtualTime(configure("free_motion", settings=["world=box", "robot=scara_stewart"]))
     with pytest.raises(ParameterError, match="a direction"):
         configure("free_motion", settings=["world=plane", "world.plane.normal=[0.0,0.0,0.0]"])
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from teleop_core.base.errors import ParameterError
+from teleop_core.base.errors import ClosureError, ParameterError
 from teleop_core.base.parameters import Choice, choice, parameter
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
@@ -220,10 +220,22 @@ class SlaveSim(RunningStage):
         p, made_of = self.parameters, world.made_of
         p["has_world"] = world.kind.kind != "empty"
         if p["has_world"]:
-            p["world_center"] = world.middle(self.robot.fk(self.robot.start)[:3, 3])
+            p["world_center"] = world.place or world.below(self._tip_at_start())
         p["world_stiffness"], p["world_damping"] = made_of.stiffness, made_of.damping
         p["world_friction"] = made_of.friction
         self.arm.shape[:] = world.shape
+
+    def _tip_at_start(self) -> Array:
+        """Where the tip (3,) is at the robot's start [m].
+
+        Raises:
+            ParameterError: Its direct kinematics finds no way to close the loops there.
+        """
+        try:
+            return self.robot.fk(self.robot.start)[:3, 3]
+        except ClosureError as error:
+            text = f"given for {self.robot.name}, whose tip is not known where it starts"
+            raise ParameterError("world.place", (), text) from error
 
     def _check_world(self, world: WorldParameters) -> None:
         """Make sure that the tip begins outside.

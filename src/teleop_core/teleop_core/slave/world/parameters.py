@@ -84,19 +84,16 @@ class WorldParameters:
         part = WORLD_OBJECTS.find(self.kind.kind)
         return float(part.distance(tip - center, self.shape, np.zeros(3)))
 
-    def middle(self, tip: Array) -> Array:
-        """Middle of the object (3,) [m] in the slave's base.
+    def __post_init__(self) -> None:
+        if len(self.place) not in {0, 3}:
+            raise ParameterError("world.place", self.place, "x, y, z, or empty")
 
-        Args:
-            tip: Of the robot where it starts, (3,) [m].
+    def below(self, tip: Array) -> Array:
+        """Middle of the object (3,) [m] that lies straight below a tip (3,) [m], a gap apart.
 
         Raises:
-            ParameterError: None is given, and none is found straight below.
+            ParameterError: There is none.
         """
-        if self.place:
-            if len(self.place) != 3:
-                raise ParameterError("world.place", self.place, "x, y, z, or empty")
-            return np.array(self.place)
         down, near, far = np.array([0.0, 0.0, -1.0]), 0.0, _FARTHEST
         if not self.distance(tip, tip) < self.gap <= self.distance(tip, tip + far * down):
             text = f"given for a {self.kind.kind} that cannot lie straight below the tip"
