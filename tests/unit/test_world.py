@@ -5,7 +5,10 @@ import math
 import coal
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+import teleop_core as tc
 from teleop_core.base.errors import ParameterError, PartError
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
@@ -190,10 +193,11 @@ def test_the_hand_feels_the_push_along_its_own_axes_and_no_more_than_asked():
     np.testing.assert_allclose(force[:, :3], asked / np.maximum(length, 1.0), atol=1e-12)
 
 
-def swing(stiffness, delay):
+def swing(stiffness, delay, passivity="none"):
     """Fastest that the hand gets [m/s] where it presses a block whose force comes late."""
     texts = ["world.material=own", f"world.stiffness={stiffness}", "world.damping=0.0",
              "world.friction_coefficient=0.0", "reflection.max_force=10.0", "feedback_timeout=1.0",
+             f"reflection.passivity={passivity}",
              f"delays=[slave/measured_cf@motion_scaling={delay}]"]  # fmt: skip
     places = pressed(*texts)["master_measured_cp"][:, :3]
     return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
@@ -203,6 +207,52 @@ def test_late_force_of_something_stiff_throws_the_hand_and_that_of_tissue_never_
     calm = swing(200.0, 0.001)
     assert all(swing(200.0, delay) < 1.1 * calm for delay in (0.05, 0.1, 0.3))
     assert all(swing(20_000.0, delay) > 3.0 * calm for delay in (0.02, 0.1))
+
+
+def test_a_tank_keeps_late_force_of_something_stiff_from_throwing_the_hand():
+    calm = swing(200.0, 0.001)
+    for stiffness in (1000.0, 20_000.0):
+        assert all(
+            swing(stiffness, delay, "tank") < 2.0 * calm for delay in (0.001, 0.02, 0.1, 0.3)
+        )
+
+
+def test_with_a_tank_no_touch_gives_back_more_than_it_took_and_pressing_feels_the_same():
+    """By the account that the device keeps of its true motion."""
+    scores = {}
+    for passivity in ("none", "tank"):
+        texts = {"reflection.passivity": passivity, "haptic_master.device.gimbal_noise": 0.0}
+        scores[passivity] = tc.run("palpation", duration=16.0, settings=texts).score()
+    returned = {name: score.value("contact.returned_max") for name, score in scores.items()}
+    assert returned["none"] > 1.5
+    assert returned["tank"] <= 1.02
+    largest = {name: score.value("force_n.max") for name, score in scores.items()}
+    assert largest["tank"] == pytest.approx(largest["none"], rel=0.05)
+
+
+@settings(max_examples=6, deadline=None, derandomize=True)
+@given(
+    stiffness=st.floats(100.0, 50_000.0), delay=st.sampled_from([0.001, 0.02, 0.1, 0.35]),
+    gain=st.floats(0.3, 5.0), kind=st.sampled_from(["line", "human", "circle"]),
+)  # fmt: skip
+def test_a_tank_is_passive_but_for_a_step_of_the_reading_whatever_is_touched(
+    stiffness, delay, gain, kind
+):
+    """By what the tank can know: forces that were asked for, and places that were read."""
+    rows = pressed(
+        "reflection.passivity=tank", f"reflection.force_gain={gain}", "world.damping=0.0",
+        "world.material=own", f"world.stiffness={stiffness}", "reach_force.is_on=false",
+        f"delays=[slave/measured_cf@motion_scaling={delay}]", "feedback_timeout=1.0",
+        f"operator.kind={kind}", seconds=3.0,
+    )  # fmt: skip
+    force, place = rows["master_servo_cf"][:-1, :3], rows["master_measured_cp"][:, :3]
+    work = np.einsum("ij,ij->i", force, np.diff(place, axis=0))  # on the hand
+    largest = total = 0.0
+    for step, pushes in zip(work.tolist(), force.any(axis=1).tolist(), strict=True):
+        total = total + step if pushes else 0.0
+        largest = max(largest, total)
+    # The largest force over one step of the reading, which nobody sees in between.
+    assert largest < 3.3 * 55e-6
 
 
 def test_force_that_falls_silent_fades_within_a_tenth_of_a_second():

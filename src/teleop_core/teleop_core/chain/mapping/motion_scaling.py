@@ -67,7 +67,7 @@ _PARAMETERS = [
     ("axis", "i8", (3,)), ("sign", "f8", (3,)),
     ("size", "f8", (3,)), *WALL_PARAMETERS, ("timeout_ns", "i8"), ("pause_ns", "i8"),
     ("rotation_gain", "f8"), ("reach_stiffness", "f8"), ("reach_depth", "f8"),
-    ("reflected", "f8"), ("reflected_most", "f8"),
+    ("reflected", "f8"), ("reflected_most", "f8"), ("has_tank", "i8"),
     *PLAUSIBILITY_PARAMETERS,
 ]  # fmt: skip
 _STATE = [
@@ -75,7 +75,8 @@ _STATE = [
     ("is_fixture_on", "i8"), ("last_ns", "i8"),
     ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
     ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
-    *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"), ("heard", "f8"),
+    *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"), ("heard", "f8"), ("tank", "f8"),
+    ("push", "f8", (3,)), ("pushed_at", "f8", (3,)), ("pushed_way", "f8"),
 ]  # fmt: skip
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
@@ -85,6 +86,8 @@ _LIMIT, _JOINT = STATE["limit"], STATE["limited_joint"]
 _SHALLOW = 2e-3
 # Time [s] over which a force that comes from afar sets in, or fades where nothing comes any more.
 _FADE = 0.1
+# Of a tank: push that an empty one allows [N], and a step of the device's reading [m].
+_SPARE, _READING = 0.005, 0.06e-3
 # Period [s] that the first sample is taken to have.
 _LONG = 1e-3
 
@@ -206,7 +209,7 @@ def _push_back(p: Any, s: Any, force: Array) -> None:
 
 
 @inner
-def _reflect(p: Any, s: Any, period: float, row: Any) -> None:
+def _reflect(p: Any, s: Any, period: float, pose: Array, row: Any) -> None:
     """Add what the slave touches to the hand's force (3,) [N]; what falls silent fades.
 
     Source:
@@ -225,8 +228,43 @@ def _reflect(p: Any, s: Any, period: float, row: Any) -> None:
         square += felt[i] * felt[i]
     asked = p.reflected * math.sqrt(square)
     share = p.reflected * (p.reflected_most / asked if asked > p.reflected_most else 1.0)
+    _fill_tank(s, pose)
     for i in range(3):
-        force[p.axis[i]] += p.sign[i] * s.heard * share * felt[i]
+        s.push[p.axis[i]] = p.sign[i] * s.heard * share * felt[i]
+    if p.has_tank:
+        _draw_from_tank(s)
+    for i in range(3):
+        force[i] += s.push[i]
+
+
+@inner
+def _fill_tank(s: Any, pose: Array) -> None:
+    """Take from the tank what the last push gave the hand, which moved to a place since then."""
+    s.pushed_way = 0.0
+    for i in range(3):
+        way = pose[i] - s.pushed_at[i]
+        s.tank -= s.push[i] * way
+        s.pushed_way += abs(way)
+        s.pushed_at[i] = pose[i]
+
+
+@inner
+def _draw_from_tank(s: Any) -> None:
+    """Make the push (3,) [N] no larger than the tank can pay for until the next sample.
+
+    Source:
+        The energy tank of Franken, Stramigioli, Misra, Secchi and Macchelli 2011, at the hand
+        alone: what is in it came from the hand in this touch.
+    """
+    square = 0.0
+    for i in range(3):
+        square += s.push[i] * s.push[i]
+    if square == 0.0:  # the touch is over
+        s.tank = 0.0
+    push, most = math.sqrt(square), _SPARE + max(s.tank, 0.0) / (_READING + 2.0 * s.pushed_way)
+    if push > most:
+        for i in range(3):
+            s.push[i] *= most / push
 
 
 @inner
@@ -258,6 +296,8 @@ def _doubt(p: Any, s: Any, sent: Any, row: Any) -> None:
     forget_wall(s, row.master_measured_cp)
     for i in range(6):
         row.master_servo_cf[i] = 0.0
+    for i in range(3):
+        s.push[i], s.pushed_at[i] = 0.0, row.master_measured_cp[i]
     is_following = _follows(p, s, row)
     for i in range(7):
         if not (is_following and s.is_engaged):
@@ -321,7 +361,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     remember(s, sent, s.last_ns)
     _wall(p, s, fixture, period, pose, row.master_servo_cf)
     _push_back(p, s, row.master_servo_cf)
-    _reflect(p, s, period, row)
+    _reflect(p, s, period, pose, row)
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
     _report(p, s, gain, is_following, row)
@@ -380,6 +420,7 @@ class MotionScaling(RunningStage):
         self._take_reach_force(parameters.reach_force)
         p["reflected"] = parameters.reflection.force_gain
         p["reflected_most"] = parameters.reflection.max_force
+        p["has_tank"] = parameters.reflection.passivity == "tank"
         if parameters.mode != self._values.mode:
             self.state["is_fine"] = MODES.index(parameters.mode)
         turned = ("tool_roll", "axes", "tool_axes")

@@ -72,6 +72,11 @@ class ReflectionParameters:
         3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )  # fmt: skip
+    passivity: str = parameter(
+        "none", choices=("none", "tank"),
+        doc="tank: the push gives the hand no more energy than it took from it in this touch, "
+        "however late it comes; none: what the slave feels, which may throw the hand",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

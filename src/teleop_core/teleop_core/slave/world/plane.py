@@ -9,6 +9,7 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import parameter
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import length
 from teleop_core.slave.world import WorldObject
 
 _DRAWN = 0.05  # half of what is drawn of it [m]
@@ -30,19 +31,19 @@ class PlaneParameters:
 @kernel
 def plane_distance(offset: Array, shape: Array, normal: Array) -> float:
     """Write the plane's normal (3,); returns how far a point (3,) [m] is above it."""
-    length = math.sqrt(shape[0] * shape[0] + shape[1] * shape[1] + shape[2] * shape[2])
+    size = math.sqrt(shape[0] * shape[0] + shape[1] * shape[1] + shape[2] * shape[2])
     above = 0.0
     for i in range(3):
-        normal[i] = shape[i] / length
+        normal[i] = shape[i] / size
         above += normal[i] * offset[i]
     return above
 
 
 def plane_outline(parameters: PlaneParameters) -> Array:
     """A square of 100 mm around the middle, (5, 3) [m]."""
-    normal = np.array(parameters.normal) / np.linalg.norm(parameters.normal)
+    normal = np.array(parameters.normal) / length(parameters.normal)
     first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    first /= np.linalg.norm(first)
+    first /= length(first)
     second = np.cross(normal, first)
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
     return _DRAWN * np.array([a * first + b * second for a, b in corners])
