@@ -28,7 +28,7 @@ def ring_distance(offset: Array, shape: Array, normal: Array) -> float:
     away = max(math.sqrt(aside * aside + z * z), 1e-9)
     share = aside / (away * from_axis)
     normal[0], normal[1], normal[2] = share * x, share * y, z / away
-    return away - 0.5 * shape[1]
+    return float(away - 0.5 * shape[1])
 
 
 def ring_outline(p: RingParameters) -> Array:
@@ -48,7 +48,7 @@ def main() -> None:
         ("sphere", [0.241, -0.236, -0.087]),
         ("ring", [0.261, -0.236, -0.082]),
     ):
-        settings = {"world": name, "world.place": place}
+        settings: dict[str, str | list[float]] = {"world": name, "world.place": place}
         recording = tc.run("palpation", duration=12.0, settings=settings)
         peak = recording.score().value("touch.peak_n")
         print(f"{name}: pushed with at most {peak:.2f} N")
