@@ -129,8 +129,12 @@ def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client):
     client.reaches(("PAUSED", True, False))
     client.send("move_jp", JointState(position=[a - 0.05 for a in MIDDLE]))
     client.peer.wait_value("slave", "refused.slave/move_jp", lambda count: count == 1)
-    client.send("state_command", crtk.StringStamped(string="resume"))
-    client.reaches(("ENABLED", True, False))
+
+    def resumed():  # which an arm refuses that is not known to be at rest yet
+        client.send("state_command", crtk.StringStamped(string="resume"))
+        return client.state() == ("ENABLED", True, False)
+
+    client.wait(resumed, "resumed")
     client.wait(lambda: np.array_equal(client.joints(), MIDDLE), "where it was")
 
 
