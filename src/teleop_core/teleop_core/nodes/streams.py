@@ -198,10 +198,11 @@ class Input:
 
         Of buttons it is the first that presses or releases one, so that no press goes unseen.
         """
-        is_new, before = False, self._target.tobytes()
+        is_new, has_buttons = False, self.topic.kind is Kind.BUTTONS
+        before = self._target.tobytes() if has_buttons else b""
         while self.take():
             is_new = True
-            if self.topic.kind is Kind.BUTTONS and self._target.tobytes() != before:
+            if has_buttons and self._target.tobytes() != before:
                 break
         return is_new
 

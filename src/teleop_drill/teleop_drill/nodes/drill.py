@@ -198,7 +198,10 @@ class _Drill:
             self._say(
                 f"{_line(outcome)}; but this machine stood still for {1e3 * late:.0f} ms: again"
             )
-            self._ready()
+            try:
+                self._ready()
+            except SessionError:
+                break  # what was found stands
             outcome = self._repeated(exercise, rig)
         return outcome
 

@@ -216,7 +216,8 @@ def _reflect(p: Any, s: Any, period: float, pose: Array, row: Any) -> None:
         Position-force architecture, Lawrence 1993: the slave gets the hand's place, the hand gets
         the slave's force.
     """
-    if p.reflected == 0.0:
+    if p.reflected == 0.0:  # once it is switched on, the push sets in from nothing
+        s.heard = s.push[0] = s.push[1] = s.push[2] = 0.0
         return
     force, felt = row.master_servo_cf, row.slave_measured_cf
     # A force that does not change is sent now and then alone.
