@@ -11,6 +11,7 @@ A program adds them with :meth:`Registry.add`. Nothing is imported before it is 
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import is_dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, TypeVar
@@ -139,3 +140,28 @@ class Registry(Generic[Part]):
             reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
             expected = f"loadable from {entry.value} ({reason})"
             raise PartError(self.kind, name, expected) from error
+
+
+def part_check(kind: str, form: type[Part], *calls: str) -> Callable[[str, object], Part]:
+    """Check of a registry whose parts are dataclasses with ``parameters`` and functions.
+
+    Args:
+        kind: As the registry's.
+        form: Class of its parts.
+        calls: Names of their attributes that can be called.
+    """
+
+    def check(name: str, part: object) -> Part:
+        if not isinstance(part, form):
+            text = f"a {form.__name__}, not a {type(part).__name__}"
+            raise PartError(kind, name, text)
+        group = getattr(part, "parameters", None)
+        if not (isinstance(group, type) and is_dataclass(group)):
+            text = "one whose parameters are a dataclass, not an instance of one"
+            raise PartError(kind, name, text)
+        for field in calls:
+            if not callable(getattr(part, field)):
+                raise PartError(kind, name, f"one whose {field} can be called")
+        return part
+
+    return check

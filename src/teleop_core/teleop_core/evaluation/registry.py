@@ -95,6 +95,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "force_n": f"{_FOLDER}.force:ForceMetric",
         "contact": f"{_FOLDER}.contact:ContactMetric",
         "touch": f"{_FOLDER}.touch:TouchMetric",
+        "network": f"{_FOLDER}.network:NetworkMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",
         "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
         "ticks": f"{_FOLDER}.counts:TicksMetric",

@@ -229,10 +229,11 @@ class Graph:
                 if topic.name == port.name:
                     found = (stage, topic)
         for stage in self.stages:
-            if stage.replaces is not None and stage.replaces.name == port.name:
-                if stage is reader:
-                    break
-                found = (stage, stage.writes[0])
+            for old, new in zip(stage.replaced, stage.writes, strict=False):
+                if old.name == port.name and stage is reader:
+                    return found
+                if old.name == port.name:
+                    found = (stage, new)
         return found
 
     def _delay(self, topic: Topic, reader: Stage) -> float:
@@ -280,7 +281,7 @@ class Graph:
         for stage in self.stages:
             for topic in stage.writes:
                 alike = [t.name for t in stage.reads if t.kind is topic.kind]
-                is_lost = topic.name not in read and not topic.adds_to and stage.replaces is None
+                is_lost = topic.name not in read and not topic.adds_to and not stage.replaced
                 if is_lost and alike and stage.name not in BUILT_IN:
                     found.append(
                         f"stage {stage.name!r} writes {topic.name}, which no stage reads; "

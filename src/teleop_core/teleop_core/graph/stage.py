@@ -94,7 +94,7 @@ class Stage:
         trigger: The topic whose messages it answers, one step each; None for a stage with a clock
             of its own, which makes one step per tick.
         replaces: Topic whose other readers read ``writes[0]`` in its place, as for a limit or a
-            filter between two stages.
+            filter between two stages; or several, for ``writes`` in their order.
         notes: Further fields of its record, which nobody reads.
         node: ``module:class`` of its node, if a general one does not do.
         needs: Topics without which the node answers nothing.
@@ -112,7 +112,7 @@ class Stage:
     make: Callable[[Any, float], Runner] | None = None
     late: tuple[Topic, ...] = ()
     trigger: Topic | None = None
-    replaces: Topic | None = None
+    replaces: Topic | tuple[Topic, ...] | None = None
     notes: tuple[Field, ...] = ()
     node: str = ""
     needs: tuple[Topic, ...] = ()
@@ -138,10 +138,11 @@ class Stage:
             is_known = topic.stamp.is_in_force or topic.stamp.of in {"", *known}
             text = f"with {topic.stamp.of}, whose stamp {topic.name} passes on, among its reads"
             self._insist(is_known, text)
-        if self.replaces is not None:
-            is_like = bool(self.writes) and self.writes[0].kind is self.replaces.kind
-            text = f"one that reads {self.replaces.name} and writes its like first"
-            self._insist(self.replaces.name in known and is_like, text)
+        for i, topic in enumerate(self.replaced):
+            is_like = i < len(self.writes) and self.writes[i].kind is topic.kind
+            place = "first" if i == 0 else f"at place {i + 1}"
+            text = f"one that reads {topic.name} and writes its like {place}"
+            self._insist(topic.name in known and is_like, text)
         if self.reads or self.writes:
             text = "with a step, step(parameters, state, signals, dt), or a make"
             self._insist(callable(self.step) is not callable(self.make), text)
@@ -174,6 +175,13 @@ class Stage:
 
     def __repr__(self) -> str:
         return f"Stage({self.name!r})"
+
+    @property
+    def replaced(self) -> tuple[Topic, ...]:
+        """Topics whose other readers read ``writes`` in their place, in that order."""
+        if self.replaces is None:
+            return ()
+        return self.replaces if isinstance(self.replaces, tuple) else (self.replaces,)
 
     @property
     def ports(self) -> tuple[Topic, ...]:
@@ -351,6 +359,7 @@ STAGES: Registry[Stage] = Registry(
         "operator": "teleop_core.chain.master.operator:OPERATOR",
         "haptic_master": "teleop_core.chain.master.haptic_master:HAPTIC_MASTER",
         "motion_scaling": "teleop_core.chain.mapping.motion_scaling:MOTION_SCALING",
+        "network": "teleop_core.chain.network.network:NETWORK",
         "inverse_kinematics": "teleop_core.chain.mapping.inverse_kinematics:INVERSE_KINEMATICS",
         "slave": "teleop_core.slave.slave:SLAVE",
         "slave_sim": "teleop_core.slave.slave_sim:SLAVE_SIM",

@@ -159,6 +159,11 @@ def in_force(topic: str) -> Stamp:
     return Stamp(f"of the {topic} in force", topic, is_in_force=True)
 
 
+def arrived(topic: str) -> Stamp:
+    """Stamp of the newest message of ``topic`` that came through the network."""
+    return Stamp(f"of the {topic} that arrived last", topic, is_in_force=True)
+
+
 SELDOM_NS = 20_000_000
 """Time after which a value that has not changed is sent again all the same [ns]."""
 
@@ -280,6 +285,25 @@ TELEOP_STATE = Topic(
         "fixture_size_x", "fixture_size_y", "fixture_size_z", "limit", "limited_joint",
     ),
 )  # fmt: skip
+NETWORK_SERVO_CP = Topic("network/servo_cp", Kind.POSE, arrived("slave/servo_cp"), "slave_base")
+"""What arrived of slave/servo_cp, as the four that follow of what the slave says of itself."""
+NETWORK_SETPOINT_CP = Topic(
+    "network/setpoint_cp", Kind.POSE, arrived("slave/setpoint_cp"), "slave_base"
+)
+NETWORK_MEASURED_CP = Topic(
+    "network/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base"
+)
+NETWORK_MEASURED_CF = Topic(
+    "network/measured_cf", Kind.WRENCH, arrived("slave/measured_cf"), "slave_base"
+)
+NETWORK_REACH = Topic(
+    "network/reach", Kind.NUMBERS, arrived("slave/reach"), "slave_base", columns=SLAVE_REACH.columns
+)
+NETWORK_STATE = Topic(
+    "network/state", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
+    columns=("sent_there", "lost_there", "behind_there", "sent_back", "lost_back", "behind_back"),
+)  # fmt: skip
+"""Packets sent, lost, and by how many the newest that arrived is behind, of both directions."""
 HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Where the operator wants the stylus; silence lets go of it."""
 HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base", is_seldom=True)
@@ -308,5 +332,10 @@ STREAMS = (
 """Topics of the built-in stages that carry one message per tick."""
 REPORTS = (SLAVE_OPERATION, TELEOP_STATE)
 """Topics of the built-in stages that are sent where they change."""
+NETWORK_TOPICS = (
+    NETWORK_SERVO_CP, NETWORK_SETPOINT_CP, NETWORK_MEASURED_CP, NETWORK_MEASURED_CF, NETWORK_REACH,
+    NETWORK_STATE,
+)  # fmt: skip
+"""Topics of a session with a network between both sides."""
 ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, SLAVE_MEASURED_CF, *REPORTS, DIAGNOSTICS)
-BY_NAME = {topic.name: topic for topic in ALL}
+BY_NAME = {topic.name: topic for topic in (*ALL, *NETWORK_TOPICS)}

@@ -1,6 +1,6 @@
 """Ports: what a node reads and writes, on the fields of its stage's signals."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import Any
 
@@ -85,7 +85,7 @@ class Ports:
         for topic in stage.writes:
             if topic.kind is not Kind.REPORT:
                 form = layout(topic.of_arm(arm), joint_names)
-                output = Output(publisher(topic), form, signals[topic.field])
+                output = Output(publisher(topic), form, signals[topic.field], topic.name)
                 self.outputs[topic.of_arm(arm)] = output
                 self._stamped.append((output, self._stamp_field(topic)))
                 if topic.stamp.of and not topic.stamp.is_in_force:
@@ -125,8 +125,8 @@ class Ports:
         for name, parts in self._summed:
             self.row[name] = np.sum(parts, axis=0)
 
-    def send(self, now_ns: int) -> None:
-        """Send what the stage wrote, each under the stamp that its topic says.
+    def send(self, now_ns: int, silent: Collection[str] = ()) -> None:
+        """Send what the stage wrote, each under the stamp that its topic says, but for some topics.
 
         What passes on a stamp that went out already is no new answer, and is not sent. A stage
         that is not of this package may write anything: what is not finite is not sent.
@@ -136,6 +136,8 @@ class Ports:
             self.refused += 1
             return
         for output, stamp_field in self._stamped:
+            if output.name in silent:
+                continue
             stamp_ns = int(row[stamp_field]) if stamp_field else now_ns
             if output in self._passed_on:
                 if self._passed_on[output] == stamp_ns:

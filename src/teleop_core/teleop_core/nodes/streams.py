@@ -319,6 +319,7 @@ class Output:
         publisher: Where the bytes go.
         form: Layout of the messages.
         source: Where the values stand, shape (width,).
+        name: Of the topic, below the node's namespace.
 
     Attributes:
         sent: Number of messages.
@@ -328,7 +329,8 @@ class Output:
         pending: Where messages wait for :meth:`publish` of their session; None to publish at once.
     """
 
-    def __init__(self, publisher: Publisher, form: Layout, source: Array) -> None:
+    def __init__(self, publisher: Publisher, form: Layout, source: Array, name: str = "") -> None:
+        self.name = name
         self._publish, self._encode, self._source = publisher.publish, form.encode_one, source
         self.sent = 0
         self.inputs: list[Input] = []

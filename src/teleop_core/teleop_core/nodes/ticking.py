@@ -33,7 +33,7 @@ class TickingNode(CoreNode):
             now_ns = tick_ns + self.epoch_ns
             self.row["now_ns"] = now_ns
             self.advance(now_ns)
-            self.ports.send(now_ns)
+            self.send(now_ns)
             if report is not None:
                 report(now_ns)
 
@@ -45,3 +45,7 @@ class TickingNode(CoreNode):
         """Make one step that starts at ``now_ns`` [ns]."""
         with self.lock:
             self.stage.step()
+
+    def send(self, now_ns: int) -> None:
+        """Send what a step wrote that started at ``now_ns`` [ns]."""
+        self.ports.send(now_ns)

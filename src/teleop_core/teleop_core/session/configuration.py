@@ -125,7 +125,10 @@ def _check_names(merged: Layer, graph: Graph) -> None:
         if arm and arm not in graph.arms:
             raise UnknownNameError(f"arm of {name}", arm, [a for a in graph.arms if a] or ["none"])
         if stage not in {SESSION, RECORDER_NAME, *stages} and stage in STAGES.names():
-            keys = ", ".join(f"{name}.{key}" for key in merged[name])
+            own = [key for key in merged[name] if key != _SHARED[0]]  # a seed is said to all
+            if not own:
+                continue
+            keys = ", ".join(f"{name}.{key}" for key in own)
             needed = f"left out: this session has no stage {stage}; add stages=[{stage}]"
             raise ParameterError(keys, tuple(merged[name].values()), needed)
         if stage not in {SESSION, RECORDER_NAME, *stages}:

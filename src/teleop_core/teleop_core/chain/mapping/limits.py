@@ -22,7 +22,7 @@ from teleop_core.kernels.geometry import (
     turn_within,
 )
 
-SENT = 512
+SENT = 8192
 """Commands that are remembered until the answer comes how far they could be followed."""
 SENT_FIELDS = [("stamp_ns", "i8"), ("moved", "f8", (3,)), ("turned", "f8", (4,))]
 LIMIT_FIELDS = [

@@ -1,6 +1,5 @@
 """Motion scaling: from the master's pose to the slave's, with modes, clutch and fixture."""
 
-import math
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from teleop_core.base.parameters import values_of
 from teleop_core.chain.fixtures import FIXTURES, shape_of
+from teleop_core.chain.mapping.following import FOLLOWING_STATE, follows, hear, is_in_doubt
 from teleop_core.chain.mapping.limits import (
     LIMIT_FIELDS,
     SENT,
@@ -32,6 +32,11 @@ from teleop_core.chain.mapping.plausibility import (
     has_lost_buttons,
     is_plausible,
 )
+from teleop_core.chain.mapping.reflection import (
+    REFLECTION_PARAMETERS,
+    REFLECTION_STATE,
+    reflect,
+)
 from teleop_core.chain.mapping.walls import (
     WALL_PARAMETERS,
     WALL_STATE,
@@ -40,14 +45,12 @@ from teleop_core.chain.mapping.walls import (
     forget_wall,
     wall_force,
 )
-from teleop_core.graph.signals import DT, STATE, assign
+from teleop_core.graph.signals import DT, STATE, assign, copy
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
     MASTER_SERVO_CF,
-    NO_COMMAND_NS,
-    SELDOM_NS,
     SLAVE_MEASURED_CF,
     SLAVE_REACH,
     SLAVE_SERVO_CP,
@@ -67,16 +70,14 @@ _PARAMETERS = [
     ("axis", "i8", (3,)), ("sign", "f8", (3,)),
     ("size", "f8", (3,)), *WALL_PARAMETERS, ("timeout_ns", "i8"), ("pause_ns", "i8"),
     ("rotation_gain", "f8"), ("reach_stiffness", "f8"), ("reach_depth", "f8"),
-    ("reflected", "f8"), ("reflected_most", "f8"), ("has_tank", "i8"),
-    *PLAUSIBILITY_PARAMETERS,
+    *REFLECTION_PARAMETERS, *PLAUSIBILITY_PARAMETERS,
 ]  # fmt: skip
 _STATE = [
     ("buttons", "f8", (3,)), ("is_fine", "i8"), ("is_engaged", "i8"), ("must_latch", "i8"),
     ("is_fixture_on", "i8"), ("last_ns", "i8"),
     ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
     ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
-    *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"), ("heard", "f8"), ("tank", "f8"),
-    ("push", "f8", (3,)), ("pushed_at", "f8", (3,)), ("pushed_way", "f8"),
+    *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"), *REFLECTION_STATE, *FOLLOWING_STATE,
 ]  # fmt: skip
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
@@ -84,10 +85,6 @@ _CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
 _LIMIT, _JOINT = STATE["limit"], STATE["limited_joint"]
 # Depth [m] up to which the hand's stand against a limit is measured, where no force is felt.
 _SHALLOW = 2e-3
-# Time [s] over which a force that comes from afar sets in, or fades where nothing comes any more.
-_FADE = 0.1
-# Of a tank: push that an empty one allows [N], and a step of the device's reading [m].
-_SPARE, _READING = 0.005, 0.06e-3
 # Period [s] that the first sample is taken to have.
 _LONG = 1e-3
 
@@ -174,15 +171,6 @@ def _move(p: Any, s: Any, gain: float, position: Array, turn: Array) -> None:
 
 
 @inner
-def _follows(p: Any, s: Any, row: Any) -> bool:
-    """Whether the slave had the last command in force, and the master has not paused since."""
-    pause_ns = row.master_measured_cp_ns - s.last_ns
-    lag_ns = s.last_ns - row.slave_setpoint_cp_ns
-    is_known = row.slave_setpoint_cp_ns > NO_COMMAND_NS and s.last_ns != 0
-    return is_known and pause_ns <= p.pause_ns and lag_ns <= max(p.timeout_ns, 2 * pause_ns)
-
-
-@inner
 def _wall(p: Any, s: Any, fixture: Any, period: float, pose: Array, force: Array) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
     length = 0.0
@@ -209,66 +197,6 @@ def _push_back(p: Any, s: Any, force: Array) -> None:
 
 
 @inner
-def _reflect(p: Any, s: Any, period: float, pose: Array, row: Any) -> None:
-    """Add what the slave touches to the hand's force (3,) [N]; what falls silent fades.
-
-    Source:
-        Position-force architecture, Lawrence 1993: the slave gets the hand's place, the hand gets
-        the slave's force.
-    """
-    if p.reflected == 0.0:  # once it is switched on, the push sets in from nothing
-        s.heard = s.push[0] = s.push[1] = s.push[2] = 0.0
-        return
-    force, felt = row.master_servo_cf, row.slave_measured_cf
-    # A force that does not change is sent now and then alone.
-    is_heard = row.master_measured_cp_ns - row.slave_measured_cf_ns <= p.timeout_ns + SELDOM_NS
-    step = period / _FADE
-    s.heard = min(max(s.heard + (step if is_heard else -step), 0.0), 1.0)
-    square = 0.0
-    for i in range(3):
-        square += felt[i] * felt[i]
-    asked = p.reflected * math.sqrt(square)
-    share = p.reflected * (p.reflected_most / asked if asked > p.reflected_most else 1.0)
-    _fill_tank(s, pose)
-    for i in range(3):
-        s.push[p.axis[i]] = p.sign[i] * s.heard * share * felt[i]
-    if p.has_tank:
-        _draw_from_tank(s)
-    for i in range(3):
-        force[i] += s.push[i]
-
-
-@inner
-def _fill_tank(s: Any, pose: Array) -> None:
-    """Take from the tank what the last push gave the hand, which moved to a place since then."""
-    s.pushed_way = 0.0
-    for i in range(3):
-        way = pose[i] - s.pushed_at[i]
-        s.tank -= s.push[i] * way
-        s.pushed_way += abs(way)
-        s.pushed_at[i] = pose[i]
-
-
-@inner
-def _draw_from_tank(s: Any) -> None:
-    """Make the push (3,) [N] no larger than the tank can pay for until the next sample.
-
-    Source:
-        The energy tank of Franken, Stramigioli, Misra, Secchi and Macchelli 2011, at the hand
-        alone: what is in it came from the hand in this touch.
-    """
-    square = 0.0
-    for i in range(3):
-        square += s.push[i] * s.push[i]
-    if square == 0.0:  # the touch is over
-        s.tank = 0.0
-    push, most = math.sqrt(square), _SPARE + max(s.tank, 0.0) / (_READING + 2.0 * s.pushed_way)
-    if push > most:
-        for i in range(3):
-            s.push[i] *= most / push
-
-
-@inner
 def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
     """Write teleop_state; the fixture in the slave's base, where it holds the slave in."""
     state = row.teleop_state
@@ -290,7 +218,7 @@ def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
 
 
 @inner
-def _doubt(p: Any, s: Any, sent: Any, row: Any) -> None:
+def _doubt(p: Any, s: Any, sent: Any, is_following: bool, is_doubtful: bool, row: Any) -> None:
     """Answer a sample that no hand can have made: hold, push with nothing, begin anew after it."""
     s.must_latch = 1
     remember(s, sent, row.master_measured_cp_ns)
@@ -299,11 +227,9 @@ def _doubt(p: Any, s: Any, sent: Any, row: Any) -> None:
         row.master_servo_cf[i] = 0.0
     for i in range(3):
         s.push[i], s.pushed_at[i] = 0.0, row.master_measured_cp[i]
-    is_following = _follows(p, s, row)
-    for i in range(7):
-        if not (is_following and s.is_engaged):
-            s.command[i] = row.slave_setpoint_cp[i]
-        row.slave_servo_cp[i] = s.command[i]
+    if not (is_doubtful or (is_following and s.is_engaged)):
+        copy(row.slave_setpoint_cp, s.command)
+    copy(s.command, row.slave_servo_cp)
     s.last_ns = row.master_measured_cp_ns
     _report(p, s, p.gain[s.is_fine], is_following, row)
 
@@ -331,10 +257,12 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     """
     pose, buttons = row.master_measured_cp, row.master_buttons
     period = 1e-9 * (row.master_measured_cp_ns - s.last_ns)
-    is_following = _follows(p, s, row)
+    hear(s, row)
+    is_following = follows(p, s, row)
+    is_doubtful = is_in_doubt(p, s, is_following, row)
     draw_back(s, sent, p.gain[s.is_fine], row)
     if not is_plausible(p, s, pose, row.master_measured_cp_ns):
-        _doubt(p, s, sent, row)
+        _doubt(p, s, sent, is_following, is_doubtful, row)
         return
     clutch = 1.0 if has_lost_buttons(p, s, row) else buttons[0]
     _toggle_mode(s, buttons)
@@ -344,8 +272,8 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     to_slave_axes(p, pose, s.hand)
     if not (is_following and s.is_engaged):
         s.must_latch = 1
-        for i in range(7):
-            s.command[i] = row.slave_setpoint_cp[i]
+        if not is_doubtful:
+            copy(row.slave_setpoint_cp, s.command)
     if s.must_latch and s.is_engaged and s.last_ns != 0:
         s.aligned += 1
     if s.must_latch or clutch > 0.0 or s.buttons[0] > 0.0:
@@ -362,7 +290,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     remember(s, sent, s.last_ns)
     _wall(p, s, fixture, period, pose, row.master_servo_cf)
     _push_back(p, s, row.master_servo_cf)
-    _reflect(p, s, period, pose, row)
+    reflect(p, s, period, pose, row)
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
     _report(p, s, gain, is_following, row)

@@ -112,8 +112,8 @@ class MotionScalingParameters:
     )  # fmt: skip
     feedback_timeout: float = parameter(
         0.1, unit="s", lower=0.002, upper=5.0,
-        doc="slave counts as not following when its setpoint lags behind the last command by more; "
-        "of slow masters twice their period counts",
+        doc="slave counts as not following when its setpoint lags behind the last command by more, "
+        "and no newer one was heard of for as long; of slow masters twice their period counts",
     )  # fmt: skip
     fixture: FixtureParameters = field(default_factory=FixtureParameters)
     reach_force: ReachForceParameters = field(default_factory=ReachForceParameters)

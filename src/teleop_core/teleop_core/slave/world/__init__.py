@@ -7,7 +7,7 @@ drawn. What it is made of, and how it pushes, is the same for all
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,7 @@ from numba import types
 
 from teleop_core.base.errors import PartError
 from teleop_core.base.parameters import values_of
-from teleop_core.base.registry import Registry
+from teleop_core.base.registry import Registry, part_check
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.trials import fenced, is_whole
@@ -61,18 +61,6 @@ def shape_of(parameters: object) -> Array:
     for value in values_of(parameters).values():
         row.extend(value if isinstance(value, tuple) else (value,))  # type: ignore[arg-type]
     return np.array(row, dtype=np.float64)
-
-
-def _checked(name: str, part: object) -> WorldObject:
-    if not isinstance(part, WorldObject):
-        raise PartError("world object", name, f"a WorldObject, not a {type(part).__name__}")
-    if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
-        text = "one whose parameters are a dataclass, not an instance of one"
-        raise PartError("world object", name, text)
-    for field, value in (("distance", part.distance), ("outline", part.outline)):
-        if not callable(value):
-            raise PartError("world object", name, f"one whose {field} can be called")
-    return part
 
 
 _STEP = 1e-6  # along the normal, over which the distance must grow by as much [m]
@@ -135,7 +123,7 @@ WORLD_OBJECTS: Registry[WorldObject] = Registry(
         "cylinder": "teleop_core.slave.world.cylinder:CYLINDER",
         "capsule": "teleop_core.slave.world.capsule:CAPSULE",
     },
-    _checked,
+    part_check("world object", WorldObject, "distance", "outline"),
     _try,
 )
 """All objects by name."""

@@ -1,0 +1,68 @@
+"""Following: whether the slave follows the hand, and what is sent where it does not.
+
+What is heard of the slave may be old, as by way of a network: a slave follows as long as the stamps
+of what it has in force rise. Where they do no longer, the last command is held for as long as an
+answer takes, for it may be followed still; then the slave goes its own way, and the command is
+where it is.
+"""
+
+from typing import Any
+
+from teleop_core.graph.signals import Field
+from teleop_core.graph.topics import NO_COMMAND_NS, SELDOM_NS
+from teleop_core.kernels import inner
+
+FOLLOWING_STATE: list[Field] = [
+    ("in_force_ns", "i8"), ("rose_ns", "i8"), ("lag_ns", "i8"), ("lost_ns", "i8"),
+    ("felt_ns", "i8"), ("felt_at_ns", "i8"),
+]  # fmt: skip
+"""Stamp in force, when it rose last, how old it was then, since when it does not, stamp of the
+slave's force, and when that rose last."""
+
+
+@inner
+def hear(s: Any, row: Any) -> None:
+    """Note when the slave was heard last, of a sample that has come.
+
+    Args:
+        s: State record with :data:`FOLLOWING_STATE`; written.
+        row: Signals.
+    """
+    now_ns, stamp_ns = row.master_measured_cp_ns, row.slave_setpoint_cp_ns
+    if stamp_ns > s.in_force_ns > NO_COMMAND_NS:
+        s.rose_ns, s.lag_ns = now_ns, now_ns - stamp_ns
+    if row.slave_measured_cf_ns > s.felt_ns:
+        s.felt_at_ns = now_ns
+    s.in_force_ns, s.felt_ns = stamp_ns, row.slave_measured_cf_ns
+
+
+@inner
+def is_felt(p: Any, s: Any, row: Any) -> bool:
+    """Whether the slave's force was heard of lately; one that does not change is sent seldom."""
+    return bool(row.master_measured_cp_ns - s.felt_at_ns <= p.timeout_ns + SELDOM_NS)
+
+
+@inner
+def follows(p: Any, s: Any, row: Any) -> bool:
+    """Whether the slave had the last command in force, or newer ones keep coming into force.
+
+    It does not after a pause of the master.
+    """
+    pause_ns = row.master_measured_cp_ns - s.last_ns
+    is_known = row.slave_setpoint_cp_ns > NO_COMMAND_NS and s.last_ns != 0
+    lag_ns = s.last_ns - max(row.slave_setpoint_cp_ns, s.rose_ns)
+    return is_known and pause_ns <= p.pause_ns and lag_ns <= max(p.timeout_ns, 2 * pause_ns)
+
+
+@inner
+def is_in_doubt(p: Any, s: Any, is_following: bool, row: Any) -> bool:
+    """Whether nobody knows where a slave is that does not follow: far away, or not heard of."""
+    now_ns = row.master_measured_cp_ns
+    if is_following:
+        s.lost_ns = 0
+        return False
+    if s.lost_ns == 0:
+        s.lost_ns = now_ns
+    is_far = s.is_engaged != 0 and s.lag_ns > p.timeout_ns
+    is_unheard = s.felt_ns > 0 and not is_felt(p, s, row)
+    return is_far and (now_ns - s.lost_ns <= s.lag_ns or is_unheard)

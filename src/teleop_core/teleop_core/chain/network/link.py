@@ -1,0 +1,142 @@
+"""Link: packets on their way, one direction of a network.
+
+Every packet is due at a tick, found when it is sent. What is due at the same tick shares a place in
+a calendar of ticks, where the newest packet stays; so a tick costs the same with any delay.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.chain.network import CHANCES, MEMORY
+from teleop_core.graph.signals import Field
+from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
+
+LONGEST = 16384
+"""Ticks that a packet may be on the way; one that would take longer is lost."""
+BLOCK = 1000
+"""Ticks for which random numbers are drawn at once."""
+LINK_PARAMETERS: list[Field] = [
+    (name, kind, (2,)) for name, kind in
+    (("least_delay", "f8"), ("loss", "f8"), ("keeps_order", "i8"), ("every", "i8"))
+]  # fmt: skip
+LINK_STATE: list[Field] = [
+    ("tick", "i8"), ("next", "i8"),
+    *((name, "i8", (2,)) for name in
+      ("sent", "lost", "newest", "last_due", "sent_tick", "arrived")),
+]  # fmt: skip
+"""Counters: ticks, random numbers used, and of each direction packets sent and lost, the number of
+the newest that arrived, when the last one is due, when it was sent, and whether one just came."""
+
+
+class Way(NamedTuple):
+    """One direction: how it draws, what is in a packet, and the calendar of what is due."""
+
+    draw: Any
+    numbers: Array
+    memory: Array
+    chances: Array  # (BLOCK, CHANCES + 1)
+    packet: Array  # values of the packet that is made (W,), and stamps of its topics (K,)
+    packet_ns: Any
+    came: Array  # the same of the newest packet that arrived
+    came_ns: Any
+    values: Array  # calendar: values (LONGEST, W), stamps (LONGEST, K), tick and number of each
+    stamps: Any
+    due: Any
+    number: Any
+    way: Array  # motion since the packet before, of all packets due then (LONGEST, 3) [m]
+    moved: Array  # motion of the packet that is made, and of those that arrived (2, 3) [m]
+
+    def clear(self) -> None:
+        """Forget everything on the way."""
+        self.due[:] = 0
+        for array in (self.memory, self.came, self.came_ns, self.moved):
+            array[...] = 0
+
+
+def make_way(width: int, topics: int, draw: Any, numbers: Array) -> Way:
+    """Direction whose packets carry some numbers of some topics."""
+    return Way(
+        draw=draw, numbers=numbers, memory=np.zeros(MEMORY), chances=np.zeros((BLOCK, CHANCES + 1)),
+        packet=np.zeros(width), packet_ns=np.zeros(topics, np.int64),
+        came=np.zeros(width), came_ns=np.zeros(topics, np.int64),
+        values=np.zeros((LONGEST, width)), stamps=np.zeros((LONGEST, topics), np.int64),
+        due=np.zeros(LONGEST, np.int64), number=np.zeros(LONGEST, np.int64),
+        way=np.zeros((LONGEST, 3)), moved=np.zeros((2, 3)),
+    )  # fmt: skip
+
+
+@inner
+def may_send(p: Any, s: Any, k: int) -> bool:
+    """Whether the rate of packets of direction ``k`` allows one more in this tick."""
+    return bool(s.sent[k] == 0 or s.tick - s.sent_tick[k] >= p.every[k])
+
+
+@inner
+def _due(p: Any, s: Any, way: Any, k: int, dt: float) -> int:
+    """Tick at which the packet arrives that is sent now; 0 if it is lost."""
+    chances = way.chances[s.next]
+    drawn = way.draw(way.numbers, way.memory, chances[:CHANCES], s.tick * dt)
+    if drawn < 0.0 or chances[CHANCES] < p.loss[k]:
+        return 0
+    due = s.tick + int((p.least_delay[k] + drawn) / dt + 0.5)
+    if p.keeps_order[k]:
+        due = max(due, s.last_due[k])
+    if due - s.tick >= LONGEST:
+        return 0
+    s.last_due[k] = due
+    return due
+
+
+@inner
+def send_packet(p: Any, s: Any, way: Any, k: int, dt: float) -> None:
+    """Send ``way.packet``; the motion in ``way.moved[0]`` goes with it, and is zero afterwards.
+
+    Args:
+        p: Record with :data:`LINK_PARAMETERS`.
+        s: Record with :data:`LINK_STATE`; written.
+        way: :class:`Way`; written.
+        k: Which direction it is.
+        dt: Tick [s].
+    """
+    s.sent[k] += 1
+    s.sent_tick[k] = s.tick
+    due = _due(p, s, way, k, dt)
+    if due == 0:
+        s.lost[k] += 1
+    else:
+        at = due % LONGEST
+        if way.due[at] != due:
+            way.due[at] = due
+            for i in range(3):
+                way.way[at, i] = 0.0
+        way.number[at] = s.sent[k]  # newer than what is due then already
+        for i in range(way.packet.shape[0]):
+            way.values[at, i] = way.packet[i]
+        for i in range(way.packet_ns.shape[0]):
+            way.stamps[at, i] = way.packet_ns[i]
+        for i in range(3):
+            way.way[at, i] += way.moved[0, i]
+    for i in range(3):
+        way.moved[0, i] = 0.0
+
+
+@inner
+def take_packet(s: Any, way: Any, k: int) -> None:
+    """Take what is due now: ``way.came`` is the newest packet, ``s.arrived`` whether it is new.
+
+    ``way.moved[1]`` gets the motion of all that is due, overtaken or not.
+    """
+    s.arrived[k] = 0
+    at = s.tick % LONGEST
+    is_due = way.due[at] == s.tick
+    for i in range(3):
+        way.moved[1, i] = way.way[at, i] if is_due else 0.0
+    if not is_due or way.number[at] <= s.newest[k]:
+        return
+    s.newest[k], s.arrived[k] = way.number[at], 1
+    for i in range(way.came.shape[0]):
+        way.came[i] = way.values[at, i]
+    for i in range(way.came_ns.shape[0]):
+        way.came_ns[i] = way.stamps[at, i]

@@ -1,0 +1,245 @@
+"""Network: a stage between the master's side and the slave's, which delays and loses packets.
+
+Commands go there, what the slave says of itself comes back; the readers on either side get what
+arrived, under its own stamp, so that its age is known.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from teleop_core.chain.network import CHANCES, NETWORKS
+from teleop_core.chain.network.link import (
+    BLOCK,
+    LINK_PARAMETERS,
+    LINK_STATE,
+    Way,
+    make_way,
+    may_send,
+    send_packet,
+    take_packet,
+)
+from teleop_core.chain.network.parameters import NetworkParameters, WayParameters
+from teleop_core.graph.signals import DT, assign, copy
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
+    NETWORK_MEASURED_CF,
+    NETWORK_MEASURED_CP,
+    NETWORK_REACH,
+    NETWORK_SERVO_CP,
+    NETWORK_SETPOINT_CP,
+    NETWORK_STATE,
+    NO_COMMAND_NS,
+    SLAVE_MEASURED_CF,
+    SLAVE_MEASURED_CP,
+    SLAVE_REACH,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+)
+from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels.geometry import Array
+
+THERE, BACK = 0, 1
+_PARAMETERS = [*LINK_PARAMETERS, ("is_incremental", "i8")]
+_STATE = [*LINK_STATE, ("sent_ns", "i8"), ("sent_at", "f8", (3,)), ("base", "f8", (3,))]
+_TOLD = 20
+"""Ticks from one report to the next."""
+_FOLLOWS_NS = 100_000_000
+"""A slave whose setpoint is of an older command than this goes its own way [ns]."""
+_SETPOINT, _POSE, _FORCE, _REACH = 0, 7, 14, 20
+"""Places in a packet from the slave: setpoint, measured pose, force, reach."""
+_WIDTHS = (7, 20 + len(SLAVE_REACH.columns))
+
+
+@inner
+def _pack(row_values: Array, packet: Array, at: int) -> None:
+    for i in range(row_values.shape[0]):
+        packet[at + i] = row_values[i]
+
+
+@inner
+def _unpack(packet: Array, at: int, row_values: Array) -> None:
+    for i in range(row_values.shape[0]):
+        row_values[i] = packet[at + i]
+
+
+@inner
+def _send_there(p: Any, s: Any, there: Any, row: Any, dt: float) -> None:
+    """Send the command if it is a new one, and its sender has heard where the slave is."""
+    is_new = row.slave_servo_cp_ns not in (0, s.sent_ns)
+    if not (is_new and s.newest[BACK] > 0 and may_send(p, s, THERE)):
+        return
+    for i in range(3):
+        if s.sent_ns != 0:
+            there.moved[0, i] = row.slave_servo_cp[i] - s.sent_at[i]
+        s.sent_at[i] = row.slave_servo_cp[i]
+    s.sent_ns = row.slave_servo_cp_ns
+    _pack(row.slave_servo_cp, there.packet, 0)
+    there.packet_ns[0] = row.slave_servo_cp_ns
+    send_packet(p, s, there, THERE, dt)
+
+
+@inner
+def _send_back(p: Any, s: Any, back: Any, row: Any, dt: float) -> None:
+    """Send what the slave says of itself, once it has said anything."""
+    if row.slave_setpoint_cp_ns == 0 or not may_send(p, s, BACK):
+        return
+    _pack(row.slave_setpoint_cp, back.packet, _SETPOINT)
+    _pack(row.slave_measured_cp, back.packet, _POSE)
+    _pack(row.slave_measured_cf, back.packet, _FORCE)
+    _pack(row.slave_reach, back.packet, _REACH)
+    back.packet_ns[0], back.packet_ns[1] = row.slave_setpoint_cp_ns, row.slave_measured_cp_ns
+    back.packet_ns[2], back.packet_ns[3] = row.slave_measured_cf_ns, row.slave_reach_ns
+    send_packet(p, s, back, BACK, dt)
+
+
+@inner
+def _take_there(p: Any, s: Any, there: Any, row: Any) -> None:
+    """Take the command that arrived; increments count from where the slave is led, or was last."""
+    take_packet(s, there, THERE)
+    if s.arrived[THERE]:
+        copy(there.came, row.network_servo_cp)
+        row.network_servo_cp_ns = there.came_ns[0]
+    if p.is_incremental == 0:
+        return
+    setpoint_ns = row.slave_setpoint_cp_ns
+    is_led = setpoint_ns > NO_COMMAND_NS and there.came_ns[0] - setpoint_ns <= _FOLLOWS_NS
+    for i in range(3):
+        before = s.base[i] if is_led else row.slave_setpoint_cp[i]
+        s.base[i] = before + there.moved[1, i]
+        if s.arrived[THERE]:
+            row.network_servo_cp[i] = s.base[i]
+
+
+@inner
+def _take_back(s: Any, back: Any, row: Any) -> None:
+    """Take what arrived from the slave."""
+    take_packet(s, back, BACK)
+    if s.arrived[BACK] == 0:
+        return
+    _unpack(back.came, _SETPOINT, row.network_setpoint_cp)
+    _unpack(back.came, _POSE, row.network_measured_cp)
+    _unpack(back.came, _FORCE, row.network_measured_cf)
+    _unpack(back.came, _REACH, row.network_reach)
+    row.network_setpoint_cp_ns, row.network_measured_cp_ns = back.came_ns[0], back.came_ns[1]
+    row.network_measured_cf_ns, row.network_reach_ns = back.came_ns[2], back.came_ns[3]
+
+
+@kernel
+def network_step(p: Any, s: Any, there: Any, back: Any, row: Any, dt: float) -> None:
+    """One tick: send what is new on either side, and write what arrives at the other.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        there: :class:`~teleop_core.chain.network.link.Way` to the slave; written.
+        back: The same from the slave.
+        row: Signals.
+        dt: Tick [s].
+    """
+    s.tick += 1
+    _send_there(p, s, there, row, dt)
+    _send_back(p, s, back, row, dt)
+    _take_there(p, s, there, row)
+    _take_back(s, back, row)
+    s.next += 1
+    if s.tick % _TOLD == 1:
+        state = row.network_state
+        for k in range(2):
+            state[3 * k], state[3 * k + 1] = s.sent[k], s.lost[k]
+            state[3 * k + 2] = s.sent[k] - s.newest[k]
+
+
+class NetworkLink(RunningStage):
+    """Stage between both sides: two directions, each a calendar of packets.
+
+    Raises:
+        ParameterError: A trace cannot be read.
+    """
+
+    def __init__(self, parameters: NetworkParameters, dt: float = DT) -> None:
+        super().__init__(NETWORK, 0, dt)
+        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
+        self.kernel, self._seed, self.ahead = network_step, parameters.seed, BLOCK
+        self._ways = [
+            self._made(width, topics, given)
+            for width, topics, given in zip(_WIDTHS, (1, 4), parameters.ways, strict=True)
+        ]
+        self.arguments = (self.parameters, self.state, *self._ways)
+        self._begin = self.signals.copy()
+        self.retune(parameters)
+        self.reset()
+
+    @staticmethod
+    def _made(width: int, topics: int, given: WayParameters) -> Way:
+        kind = NETWORKS.find(given.kind.kind)
+        return make_way(width, topics, kind.draw_pointer, kind.numbers_of(given.kind.parameters))
+
+    def reset(self) -> None:
+        """Nothing is on the way, and the random numbers of the seed begin anew."""
+        assign(self.state, 0)
+        assign(self.signals, self._begin)
+        for way in self._ways:
+            way.clear()
+        self._rng = np.random.default_rng((self._seed, *b"network"))
+        self.state["next"] = BLOCK
+
+    def retune(self, parameters: NetworkParameters) -> None:
+        """Take another network from the next packet on; what is on its way arrives as it would."""
+        p = self.parameters
+        p["is_incremental"] = parameters.commands == "incremental"
+        for k, given in enumerate(parameters.ways):
+            p["least_delay"][k], p["loss"][k] = given.least_delay, given.loss
+            p["keeps_order"][k] = given.packet_order == "kept"
+            p["every"][k] = max(1, math.floor(1.0 / (given.packet_rate * self.dt) + 0.5))
+            self._take_kind(k, given)
+
+    def _take_kind(self, k: int, given: WayParameters) -> None:
+        way, kind = self._ways[k], NETWORKS.find(given.kind.kind)
+        numbers = kind.numbers_of(given.kind.parameters)
+        if kind.draw_pointer is way.draw and len(numbers) == len(way.numbers):
+            way.numbers[:] = numbers  # the tick that is composed already goes on
+            return
+        way.memory[:] = 0.0
+        self._ways[k] = way._replace(draw=kind.draw_pointer, numbers=numbers)
+        self.arguments = (self.parameters, self.state, *self._ways)
+        self._bound = None
+
+    def prepare(self, ticks: int) -> None:
+        """Draw the random numbers of the next ticks."""
+        used = int(self.state["next"])
+        if used + ticks <= BLOCK:
+            return
+        for way in self._ways:
+            way.chances[: BLOCK - used] = way.chances[used:]
+            way.chances[BLOCK - used :] = self._rng.random((used, CHANCES + 1))
+        self.state["next"] = 0
+
+    def concerns(self) -> list[str]:
+        """A direction through which nothing comes, in words."""
+        s, found = self.state, []
+        for k, way in ((THERE, "to the slave"), (BACK, "from the slave")):
+            behind = int(s["sent"][k] - s["newest"][k])
+            if behind and s["sent"][k] == s["lost"][k]:
+                found.append(f"the network lost all {int(s['lost'][k])} packets {way}")
+        return found
+
+
+NETWORK = Stage(
+    "network",
+    NetworkParameters,
+    reads=(
+        SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH,
+    ),
+    writes=(
+        NETWORK_SERVO_CP, NETWORK_SETPOINT_CP, NETWORK_MEASURED_CP, NETWORK_MEASURED_CF,
+        NETWORK_REACH, NETWORK_STATE,
+    ),
+    late=(SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH),
+    replaces=(
+        SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH,
+    ),
+    make=NetworkLink,
+    node="teleop_core.nodes.network:NetworkNode",
+)  # fmt: skip

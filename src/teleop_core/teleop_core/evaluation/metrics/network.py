@@ -1,0 +1,156 @@
+"""Network: how old what arrives is at its reader, and how much never does."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.evaluation.accumulators import Distribution, Integers
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.figure import FIRST, SECOND, Figure, line, time_axis
+from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.rows import Row, number, row
+from teleop_core.evaluation.traces import Envelope
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.signals import TICK_NS
+from teleop_core.graph.topics import (
+    NETWORK_MEASURED_CP,
+    NETWORK_SERVO_CP,
+    NETWORK_STATE,
+    NO_COMMAND_NS,
+)
+
+GROUP = "network"
+_WAYS = (("to the slave", NETWORK_SERVO_CP), ("from the slave", NETWORK_MEASURED_CP))
+_ROUND_NS = 100_000
+"""To so much an age is rounded down [ns]: live ones have all values."""
+
+
+@dataclass(frozen=True)
+class WayScore:
+    """Ages at the reader in one direction, and losses; None where nothing was recorded."""
+
+    age_mean_ms: float | None = figure("ms", "mean age of the newest packet that its reader has")
+    age_p99_ms: float | None = figure("ms", "the age that is exceeded for 1 % of the time")
+    lost_share: float | None = figure("1", "share of the packets that were lost")
+
+
+@dataclass(frozen=True)
+class NetworkScore:
+    """Both directions of the network."""
+
+    there: WayScore
+    back: WayScore
+
+
+class _Ages:
+    """Ages of what arrived on one topic, looked at every tick."""
+
+    def __init__(self) -> None:
+        self.ages, self.sum_ns, self.count = Distribution(), 0, 0
+
+    def add(self, logs: Integers, stamps: Integers, after_ns: int, until_ns: int) -> Integers:
+        """Take arrivals; returns the ages (N,) [ns] right after each.
+
+        Args:
+            logs: When they came [ns]; the one before ``after_ns`` may be the first.
+            stamps: When they were sent [ns].
+            after_ns: Where the time begins that counts [ns].
+            until_ns: Where it ends [ns].
+        """
+        begins = np.maximum(logs, after_ns)
+        lengths = np.diff(np.append(begins, max(until_ns, int(begins[-1]) + TICK_NS)))
+        looks = -(-lengths // TICK_NS)
+        first = np.repeat(begins - stamps, looks)
+        within = np.arange(len(first)) - np.repeat(np.cumsum(looks) - looks, looks)
+        ages = first + within * TICK_NS
+        self.ages.add(ages // _ROUND_NS * _ROUND_NS)
+        self.sum_ns, self.count = self.sum_ns + int(ages.sum()), self.count + len(ages)
+        found: Integers = begins - stamps
+        return found
+
+    def score(self, lost: float | None) -> WayScore:
+        """Mean and 99th percentile, with the losses."""
+        if not self.count:
+            return WayScore(None, None, lost)
+        return WayScore(1e-6 * self.sum_ns / self.count, self.ages.delay().p99, lost)
+
+
+class NetworkMetric(Metric):
+    """Ages and losses of the network between both sides."""
+
+    name = "network"
+    keys = (
+        *keys_of("network.there", WayScore),
+        *keys_of("network.back", WayScore),
+    )
+    topics = (NETWORK_SERVO_CP, NETWORK_MEASURED_CP, NETWORK_STATE)
+
+    def __init__(self, context: Context) -> None:
+        bag = context.bag
+        self._end_ns = bag.end_ns
+        self._ways = tuple(_Ages() for _ in _WAYS)
+        self._traces = tuple(Envelope(bag.start_ns, bag.end_ns, columns=1) for _ in _WAYS)
+        self._first: list[float] | None = None
+        self._last: list[float] = []
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        for ages, trace, (_, topic) in zip(self._ways, self._traces, _WAYS, strict=True):
+            around, own = window.around(topic), window.own(topic)
+            known = slice(max(own.start - 1, 0), own.stop)
+            logs, stamps = around.log_ns[known], around.stamp_ns[known]
+            has_come = stamps > NO_COMMAND_NS
+            logs, stamps = logs[has_come], stamps[has_come]
+            if not len(logs):
+                continue
+            until_ns = min(window.until_ns, self._end_ns)
+            found = ages.add(logs, stamps, max(window.after_ns, int(logs[0])), until_ns)
+            trace.add(np.maximum(logs, window.after_ns), 1e-6 * found[:, np.newaxis])
+        told = window.samples(NETWORK_STATE).values
+        if len(told):
+            self._first = self._first or told[0].tolist()
+            self._last = told[-1].tolist()
+
+    def _lost(self, k: int) -> float | None:
+        if self._first is None:
+            return None
+        sent, lost = (self._last[3 * k + i] - self._first[3 * k + i] for i in range(2))
+        return lost / sent if sent else None
+
+    def values(self) -> NetworkScore:
+        """Score of everything so far."""
+        there, back = (ages.score(self._lost(k)) for k, ages in enumerate(self._ways))
+        return NetworkScore(there, back)
+
+    def rows(self) -> list[Row]:
+        """Ages and losses of both directions; nothing without a network."""
+        found, score = [], self.values()
+        for (name, _), way in zip(_WAYS, (score.there, score.back), strict=True):
+            if way.lost_share is None:
+                continue
+            found += [
+                row(GROUP, f"age {name}, mean", "ms", way.age_mean_ms),
+                row(GROUP, f"age {name}, 99 %", "ms", way.age_p99_ms),
+                row(GROUP, f"lost {name}", "%", 100.0 * way.lost_share),
+            ]
+        return found
+
+    def figures(self) -> list[Figure]:
+        """Ages against time; none without a network."""
+        score, traces = self.values(), []
+        for (name, _), trace, color in zip(_WAYS, self._traces, (FIRST, SECOND), strict=True):
+            times, values = trace.line()
+            if len(times):
+                traces.append(line(times, values[:, 0], name, color, 1.2, "ms"))
+        if not traces:
+            return []
+        layout = {
+            "xaxis": time_axis(),
+            "yaxis": {"title": {"text": "age [ms]"}},
+            "hovermode": "x unified",
+        }
+        text = (
+            f"What its reader has is {number(score.there.age_mean_ms)} ms old on average on the "
+            f"way to the slave, {number(score.back.age_mean_ms)} ms on the way back."
+        )
+        return [Figure("Age of what arrives", text, traces, layout, 300)]

@@ -1,0 +1,36 @@
+"""Node ``network``: delays and loses what goes between both sides, whoever publishes it."""
+
+from typing import Any
+
+from teleop_core.chain.network.network import BACK, THERE
+from teleop_core.chain.network.parameters import NetworkParameters
+from teleop_core.graph.topics import NETWORK_SERVO_CP, NETWORK_SETPOINT_CP, NETWORK_STATE, Topic
+from teleop_core.nodes.ticking import TickingNode
+
+
+class NetworkNode(TickingNode):
+    """Passes on what arrives in a tick; where nothing does, nothing is sent.
+
+    The slave's setpoint counts every time, for it may move under one stamp; the rest once.
+    """
+
+    def setup(self, parameters: NetworkParameters) -> None:
+        """Make the network, and open its topics."""
+        super().setup(parameters)
+        self._passed = {
+            topic: 0 for topic in self.description.writes if topic is not NETWORK_STATE
+        }
+
+    def send(self, now_ns: int) -> None:
+        """Send what arrived in the step, and now and then how much did."""
+        has_come = self.stage.state["arrived"]
+        silent = {topic.name for topic in self._passed if not self._is_due(topic, has_come)}
+        self.ports.send(now_ns, silent)
+
+    def _is_due(self, topic: Topic, has_come: Any) -> bool:
+        """Whether a topic arrived, and anew."""
+        if not has_come[THERE if topic is NETWORK_SERVO_CP else BACK]:
+            return False
+        before_ns, stamp_ns = self._passed[topic], int(self.row[f"{topic.field}_ns"])
+        self._passed[topic] = stamp_ns
+        return stamp_ns > before_ns or topic is NETWORK_SETPOINT_CP

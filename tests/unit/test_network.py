@@ -1,0 +1,425 @@
+"""Network: what is sent arrives late, lost or overtaken as its law says, and never otherwise."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import teleop_core as tc
+from teleop_core.bags.reader import Bag
+from teleop_core.base.errors import ParameterError, PartError, TeleopError
+from teleop_core.base.parameters import NoParameters, build
+from teleop_core.chain.network import LOST, NETWORKS, Network, register_network
+from teleop_core.chain.network.network import NETWORK, NetworkLink
+from teleop_core.chain.network.parameters import PRESETS, NetworkParameters
+from teleop_core.chain.network.trace import read_trace
+from teleop_core.evaluation.metrics.network import _Ages
+from teleop_core.kernels import kernel
+from teleop_core.session.configuration import configure
+from teleop_core.session.virtual import VirtualTime
+
+MS = 1_000_000
+
+
+def link(**values):
+    """Network at work; double underscores in names stand for dots."""
+    named = {name.replace("__", "."): value for name, value in values.items()}
+    return NetworkLink(build(NetworkParameters, named))
+
+
+def through(network, places, setpoints=None, begin=0):
+    """What arrives, tick by tick, of places (N, 3) sent to the slave: places, stamps, losses.
+
+    The slave says where it is from a tick before on; by default it is where it is led.
+    """
+    row, came = network.signals, []
+    row["slave_setpoint_cp"][3] = 1.0
+    for tick, place in enumerate(places, start=begin + 1):
+        row["now_ns"] = row["slave_servo_cp_ns"] = (tick + 1) * MS
+        row["slave_servo_cp"][:3] = place
+        row["slave_setpoint_cp_ns"] = max(int(row["network_servo_cp_ns"]), 1)
+        if setpoints is not None:
+            row["slave_setpoint_cp"][:3] = setpoints[tick - begin - 1]
+        network.step()
+        came.append((*row["network_servo_cp"][:3], int(row["network_servo_cp_ns"])))
+    table = np.array(came)
+    return table[:, :3], table[:, 3].astype(np.int64)
+
+
+def walk(count, seed=3):
+    """Places (count, 3) [m] of a hand that wanders."""
+    return np.cumsum(np.random.default_rng(seed).normal(0.0, 1e-4, (count, 3)), axis=0)
+
+
+@settings(max_examples=20, deadline=None)
+@given(delay=st.integers(0, 400))
+def test_a_constant_delay_shifts_every_command_by_as_many_ticks(delay):
+    places = walk(600)
+    came, stamps = through(link(there__least_delay=delay * 1e-3), places)
+    # The first tick sends nothing: nobody has heard yet where the slave is.
+    np.testing.assert_array_equal(came[delay + 1 :], places[1 : len(places) - delay])
+    np.testing.assert_array_equal(stamps[delay + 1 :], MS * np.arange(3, len(places) - delay + 2))
+    assert (stamps[: delay + 1] == 0).all()
+
+
+def test_both_directions_have_delays_of_their_own():
+    network = link(there__least_delay=0.03, back__least_delay=0.1)
+    row, seen = network.signals, []
+    for tick in range(1, 400):
+        row["now_ns"] = tick * MS
+        for name in ("slave_servo_cp", "slave_setpoint_cp", "slave_measured_cp", "slave_reach"):
+            row[f"{name}_ns"] = tick * MS
+        row["slave_measured_cf_ns"], row["slave_measured_cf"][2] = tick * MS, tick
+        network.step()
+        seen.append((row["network_servo_cp_ns"], row["network_measured_cf_ns"],
+                     MS * row["network_measured_cf"][2], row["network_reach_ns"]))  # fmt: skip
+    ages = (MS * np.arange(1, 400)[:, None] - np.array(seen))[200:] / MS
+    assert (ages == [30, 100, 100, 100]).all()
+
+
+@pytest.mark.parametrize("order", ["newest", "kept"])
+@settings(max_examples=10, deadline=None)
+@given(mean=st.floats(1e-3, 0.2), loss=st.floats(0.0, 0.9), hold=st.sampled_from([0.0, 0.05]),
+       seed=st.integers(0, 10**6))  # fmt: skip
+def test_nothing_overtakes_nothing_is_invented_and_what_arrives_was_sent(
+    order, mean, loss, hold, seed
+):
+    places = walk(800, seed)
+    came, stamps = through(
+        link(seed=seed, there__kind="jitter", there__jitter__mean=mean, there__loss=loss,
+             there__jitter__hold=hold, there__packet_order=order),
+        places,
+    )  # fmt: skip
+    assert (np.diff(stamps) >= 0).all()
+    sent = stamps // MS - 2
+    has_come = stamps > 0
+    np.testing.assert_array_equal(came[has_come], places[sent[has_come]])
+    assert (sent[has_come] <= np.flatnonzero(has_come)).all()
+
+
+def test_where_order_is_kept_the_reader_gets_older_commands():
+    """An independent computation of both, packet by packet, agrees with what arrives."""
+    level = {
+        f"there__{name.replace('.', '__')}": value
+        for name, value in PRESETS["delay_100"]["there"].items()
+    }
+    for order in ("newest", "kept"):
+        network = link(there__packet_order=order, **level)
+        places = walk(30_000)
+        _, stamps = through(network, places)
+        age = np.arange(2, len(places) + 2) - stamps / MS
+        rng = np.random.default_rng(5)
+        slow = rng.random(len(places)) < 0.274
+        drawn = 70.0 + rng.exponential(np.where(slow, 1 / 0.0853, 1 / 0.0271))
+        due = np.arange(len(places)) + drawn
+        if order == "kept":
+            due = np.maximum.accumulate(due)
+        newest = np.zeros(len(places))
+        for packet, at in enumerate(np.ceil(due).astype(int)):
+            if at < len(newest):
+                newest[at] = max(newest[at], packet)
+        expected = np.arange(len(places)) - np.maximum.accumulate(newest)
+        own, theirs = age[3000:].mean(), expected[3000:].mean()
+        assert own == pytest.approx(theirs, rel=0.05)
+        # Published beside them: 76 ms where the newest wins, 213 ms in order, of "100 ms".
+        assert own == pytest.approx(76 if order == "newest" else 213, rel=0.1)
+
+
+def drawn(name, values, packets, seed=2, period=1e-3):
+    """What a kind says of packets sent in a row (packets,)."""
+    part = NETWORKS.find(name)
+    numbers, memory = part.numbers_of(build(part.parameters, values)), np.zeros(4)
+    chances = np.random.default_rng(seed).random((packets, 3))
+    return np.array([part.draw(numbers, memory, c, i * period) for i, c in enumerate(chances)])
+
+
+@pytest.mark.parametrize(
+    ("level", "lost", "burst"),
+    [("loss_10", 9.7, 1.4), ("loss_30", 30.5, 1.8), ("loss_50", 50.6, 2.5)],
+)
+def test_the_published_levels_of_loss_lose_as_much_in_bursts_as_long(level, lost, burst):
+    given = {
+        name.partition(".")[2]: value
+        for name, value in PRESETS[level]["there"].items()
+        if name != "kind"
+    }
+    found = drawn("gilbert_elliott", given, 300_000) == LOST
+    edges = np.diff(np.concatenate(([0], found.astype(int), [0])))
+    lengths = np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)
+    assert 100.0 * found.mean() == pytest.approx(lost, abs=1.2)
+    assert lengths.mean() == pytest.approx(burst, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("level", "mean", "sd"),
+    [("delay_100", 100.0, 34), ("delay_300", 299.6, 91), ("delay_500", 500.2, 95)],
+)
+def test_the_published_levels_of_delay_have_their_mean_and_spread(level, mean, sd):
+    there = PRESETS[level]["there"]
+    given = {k.partition(".")[2]: v for k, v in there.items() if k.startswith("jitter.")}
+    found = 1e3 * (there["least_delay"] + drawn("jitter", given, 200_000))
+    assert found.mean() == pytest.approx(mean, rel=0.01)
+    assert found.std() == pytest.approx(sd, rel=0.04)
+
+
+def test_a_delay_that_holds_has_the_same_spread_but_changes_seldom():
+    own = drawn("jitter", {"mean": 0.03}, 100_000)
+    held = drawn("jitter", {"mean": 0.03, "hold": 0.02}, 400_000)
+    assert held.mean() == pytest.approx(own.mean(), rel=0.05)
+    assert held.std() == pytest.approx(own.std(), rel=0.05)
+    changes = np.count_nonzero(np.diff(held))
+    assert changes == pytest.approx(400_000 * (1.0 - math.exp(-0.05)), rel=0.05)
+
+
+def test_outages_come_in_their_period_and_last_for_any_time_up_to_the_longest():
+    found = drawn("outages", {"period": 2.0, "longest": 1.0}, 200_000) == LOST
+    edges = np.diff(found.astype(int))
+    begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    np.testing.assert_allclose(np.diff(begins), 2000, atol=1)
+    lengths = ends[: len(begins)] - begins[: len(ends)]
+    assert lengths.max() <= 1001
+    assert lengths.mean() == pytest.approx(500.0, rel=0.15)
+
+
+def test_a_trace_is_played_row_by_row_and_begins_anew_at_its_end(tmp_path):
+    file = tmp_path / "pings.csv"
+    file.write_text("time,delay\n10.0,0.05\n10.1,\n10.2,0.07\n")
+    found = drawn("trace", {"file": str(file)}, 700)
+    one = np.repeat([0.05, LOST, 0.07], 100)
+    differing = np.flatnonzero(found != np.concatenate((one, one, one))[:700])
+    assert len(differing) <= 2  # where a sum of milliseconds is a bit beside a border
+    network = link(there__kind="trace", there__trace__file=str(file))
+    _, stamps = through(network, walk(700))
+    age = np.arange(2, 702) - stamps / MS
+    assert age[60:95] == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("0,0.1\n2,0.1\n1,0.1\n", "line 3 says 1 s after 2 s"),
+        ("-1,0.1\n2,0.1\n", "line 1 says -1 s"),
+        ("0,-0.2\n1,0.1\n", "line 1 says -0.2 s"),
+        ("time,delay\n0,0.1\n1,fast\n", "in line 3"),
+        ("0,nan\n1,0\n", "in line 1"),
+        ("0,0.1\n", "two rows"),
+        ("", "two rows"),
+    ],
+)
+def test_a_trace_that_cannot_be_is_refused_by_its_line(tmp_path, text, said):
+    file = tmp_path / "pings.csv"
+    file.write_text(text)
+    with pytest.raises(ParameterError, match=said):
+        read_trace(str(file))
+    with pytest.raises(ParameterError, match="can be read"):
+        read_trace(str(tmp_path / "none.csv"))
+
+
+def test_with_increments_a_lost_packet_is_lost_motion():
+    places = walk(2000)
+    network = link(there__loss=0.5, commands="incremental")
+    came, stamps = through(network, places)
+    sent = stamps // MS - 2
+    arrived = np.unique(sent[stamps > 0])
+    steps = np.diff(places, axis=0, prepend=places[:1])
+    # From the first packet on, of which nobody knows a motion: the steps of those that came.
+    expected = steps[arrived[arrived > 1]].sum(axis=0)
+    assert 0.4 < 1.0 - len(arrived) / len(places) < 0.6
+    np.testing.assert_allclose(came[-1], expected, atol=1e-12)
+    whole, _ = through(link(there__loss=0.5), places)
+    np.testing.assert_allclose(whole[-1], places[sent[-1]], atol=1e-12)
+
+
+def test_increments_count_from_where_a_slave_is_that_goes_its_own_way():
+    places, network = walk(300), link(commands="incremental")
+    row = network.signals
+    row["slave_setpoint_cp"][3], row["slave_setpoint_cp_ns"] = 1.0, 1
+    for tick, place in enumerate(places, start=2):  # no command is in force
+        row["now_ns"] = row["slave_servo_cp_ns"] = tick * MS
+        row["slave_servo_cp"][:3] = place
+        row["slave_setpoint_cp"][:3] = (0.4, 0.1, -0.2)
+        network.step()
+        step = np.linalg.norm(row["network_servo_cp"][:3] - (0.4, 0.1, -0.2))
+        assert tick < 4 or step < 1e-3
+
+
+def test_a_packet_that_would_take_longer_than_the_calendar_is_lost_not_early():
+    network = link(there__kind="jitter", there__least_delay=10.0, there__jitter__mean=5.0)
+    row = network.signals
+    row["slave_setpoint_cp"][3], row["slave_setpoint_cp_ns"] = 1.0, 1
+    least = 10**12
+    for tick in range(1, 40_000):
+        row["now_ns"] = row["slave_servo_cp_ns"] = tick * MS
+        network.step()
+        if row["network_servo_cp_ns"]:
+            least = min(least, tick * MS - int(row["network_servo_cp_ns"]))
+    assert least >= 10_000 * MS
+    lost = network.state["lost"][0] / network.state["sent"][0]
+    assert lost == pytest.approx(math.exp(-(16.384 - 10.0) / 5.0), rel=0.05)
+
+
+def test_the_same_seed_gives_the_same_network_and_another_seed_another():
+    given = {"there__kind": "jitter", "there__loss": 0.3}
+    places, first = walk(400), link(**given)
+    came = through(first, places)[1]
+    first.reset()
+    assert (through(first, places)[1] == came).all()
+    assert (through(link(**given), places)[1] == came).all()
+    assert (through(link(seed=2, **given), places)[1] != came).any()
+
+
+def test_ages_of_live_arrivals_grow_between_them():
+    """Against a look at every tenth of a millisecond."""
+    rng = np.random.default_rng(4)
+    logs = np.cumsum(rng.integers(200_000, 30 * MS, 400)) + 10 * MS
+    stamps = logs - rng.integers(MS, 40 * MS, 400)
+    ages = _Ages()
+    for begin in range(0, 400, 100):  # window by window, each with the arrival before it
+        after = int(logs[begin]) if begin == 0 else int(logs[begin - 1]) + MS
+        until = int(logs[begin + 99]) + MS
+        known = slice(max(begin - 1, 0), begin + 100)
+        ages.add(logs[known], stamps[known], after, until)
+    looks = np.arange(int(logs[0]), int(logs[-1]), MS // 10)
+    expected = (looks - stamps[np.searchsorted(logs, looks, side="right") - 1]) / MS
+    score = ages.score(0.0)
+    assert score.age_mean_ms == pytest.approx(expected.mean(), rel=0.02)
+    assert score.age_p99_ms == pytest.approx(np.percentile(expected, 99), rel=0.02)
+
+
+def test_packets_go_no_faster_than_their_rate():
+    network = link(there__packet_rate=100.0)
+    _, stamps = through(network, walk(1000))
+    assert len(np.unique(stamps)) == pytest.approx(100, abs=1)
+    assert (np.diff(np.unique(stamps)[1:]) == 10 * MS).all()
+
+
+def test_a_network_that_loses_everything_says_so():
+    network = link(there__loss=1.0)
+    _, stamps = through(network, walk(50))
+    assert (stamps == 0).all()
+    assert network.concerns() == ["the network lost all 49 packets to the slave"]
+    assert link().concerns() == []
+
+
+def test_another_network_takes_over_and_what_is_on_its_way_still_arrives():
+    network, places = link(there__least_delay=0.1), walk(600)
+    through(network, places[:300])
+    network.retune(build(NetworkParameters, {"there.least_delay": 0.02, "there.kind": "jitter",
+                                             "there.jitter.mean": 0.0}))  # fmt: skip
+    _, stamps = through(network, places[300:], begin=300)
+    age = np.arange(302, 602) - stamps / MS
+    assert age[0] == 100.0
+    assert (age[25:] == 20.0).all()
+
+
+def session(*given, scenario="free_motion"):
+    """Session in virtual time with a network."""
+    return VirtualTime(configure(scenario, settings=["teleop.stages=[network]", *given]))
+
+
+AT_HOME = "slave.starts_at_home=true"
+
+
+def test_a_network_without_delay_changes_no_command():
+    plain = VirtualTime(configure("free_motion", settings=[AT_HOME])).run(4000)
+    through_it = session(AT_HOME).run(4000)
+    own, other = plain["slave_servo_cp"], through_it["network_servo_cp"]
+    # Following begins two ticks later, at the same place.
+    assert np.abs(own[100:] - other[100:])[:, :3].max() < 1e-4
+    assert np.ptp(other[100:, :3], axis=0).max() > 5e-3
+
+
+@pytest.mark.parametrize("preset", ["iss", "ets7", "delay_500", "loss_50"])
+def test_a_slave_behind_any_network_is_followed_and_stands_still_before_it_is(preset):
+    run = session(AT_HOME, f"network.preset={preset}")
+    rows = run.run(24_000)
+    following = rows["teleop_state"][:, 0] > 0.0
+    first = int(following.argmax())
+    assert following[-4000:].mean() > 0.9
+    still = rows["slave_setpoint_cp"][: first + 100, :3]
+    assert np.abs(still - still[0]).max() < 1e-4
+    again = session(AT_HOME, f"network.preset={preset}").run(24_000)
+    assert all((rows[name] == again[name]).all() for name in rows.dtype.names)
+
+
+@pytest.mark.parametrize("preset", ["iss", "ets7"])
+def test_the_command_never_jumps_back_to_where_a_far_slave_was(preset):
+    """News of a far slave are old: where they fail for a moment, the command holds."""
+    rows = session(AT_HOME, f"network.preset={preset}").run(40_000)
+    following = rows["teleop_state"][:, 0] > 0.0
+    began = int(following.argmax())
+    assert preset == "iss" or not following[began:].all()
+    steps = np.abs(np.diff(rows["slave_servo_cp"][began:, :3], axis=0)).max(axis=1)
+    assert steps.max() < 5e-4
+
+
+def test_a_slave_that_was_stopped_far_away_is_taken_up_where_it_rests():
+    run = session(AT_HOME, "network.preset=iss", "slave.operation.events=[stop@6, reset@9, "
+                  "enable@9.1, resume@9.2]")  # fmt: skip
+    rows = run.run(16_000)
+    stopped = rows["slave_setpoint_cp"][7500, :3]
+    echo = rows["slave_servo_cp"][8500, :3]
+    assert rows["teleop_state"][8500, 0] == 0.0
+    np.testing.assert_allclose(echo, stopped, atol=1e-6)
+
+
+def test_a_force_from_behind_a_network_is_felt_and_fades_where_nothing_comes():
+    given = ["reflection.force_gain=1", "network.back.least_delay=0.3"]
+    run = session(*given, scenario="palpation")
+    rows = run.run(run.lead + 14_000)
+    pushed = np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1)
+    touched = np.linalg.norm(rows["slave_measured_cf"][:, :3], axis=1)
+    assert pushed.max() == pytest.approx(min(touched.max(), 3.3), rel=0.1)
+    first = int((touched > 0.1).argmax())
+    assert 295 <= int((pushed > 0.1).argmax()) - first <= 330
+    gone = build(NetworkParameters, {"back.loss": 1.0, "back.least_delay": 0.3})
+    last = int(np.flatnonzero(touched > 0.2)[-1])
+    other = session(*given, scenario="palpation")
+    other.run(last - 400)
+    other.stages["network"].retune(gone)
+    after = np.linalg.norm(other.run(1500)["master_servo_cf"][:, :3], axis=1)
+    assert after[-500:].max() == 0.0
+    assert np.abs(np.diff(after[302:])).max() < 0.1
+
+
+def test_a_kind_of_ones_own_is_one_call_and_a_wrong_one_is_refused():
+    @kernel
+    def every_other(numbers, memory, chances, now):
+        memory[0] = 1.0 - memory[0]
+        return LOST if memory[0] > 0.0 else 0.0
+
+    register_network(Network("every_other", NoParameters, every_other))
+    try:
+        _, stamps = through(link(there__kind="every_other"), walk(100))
+        assert (np.diff(np.unique(stamps)[1:]) == 2 * MS).all()
+    finally:
+        NETWORKS.remove("every_other")
+    for wrong in (
+        lambda n, m, c, now: math.nan,
+        lambda n, m, c: 0.0,
+        lambda n, m, c, now: m.base[4:].fill(0.0) or 0.0,  # behind what it may remember
+    ):
+        with pytest.raises(PartError):
+            register_network(Network("wrong", NoParameters, wrong))
+    assert "wrong" not in NETWORKS.names()
+
+
+def test_settings_of_a_network_that_is_not_there_are_refused_with_the_way_to_have_one():
+    with pytest.raises(TeleopError, match=r"add stages=\[network\]"):
+        configure("free_motion", settings=["network.preset=iss"])
+    configure("free_motion", settings=["seed=3"])
+    assert [topic.name for topic in NETWORK.replaced] == [topic.name for topic in NETWORK.reads]
+
+
+def test_the_score_tells_the_age_at_the_reader_and_the_losses(tmp_path):
+    out = tmp_path / "bag"
+    ran = tc.run("free_motion", out=out, duration=6.0, stages="network", preset="loss_50")
+    score = ran.score()
+    series = Bag(out).read("network/servo_cp")
+    age = (series.log_ns - series.stamp_ns)[series.stamp_ns > 0] / MS
+    assert score.value("network.there.age_mean_ms") == pytest.approx(age.mean(), rel=1e-3)
+    assert score.value("network.there.age_p99_ms") == pytest.approx(np.percentile(age, 99), abs=1.0)
+    assert score.value("network.there.lost_share") == pytest.approx(0.506, abs=0.05)
+    assert score.value("network.back.lost_share") == 0.0
