@@ -13,7 +13,14 @@ from teleop_core.base.parameters import specs
 from teleop_core.evaluation import key_table
 from teleop_core.graph.graph import Graph, Link, build_graph
 from teleop_core.graph.layers import declared_groups
-from teleop_core.graph.topics import DIAGNOSTICS, OPERATOR_BUTTONS, OPERATOR_SERVO_CP, Kind, Topic
+from teleop_core.graph.topics import (
+    DIAGNOSTICS,
+    NETWORK_TOPICS,
+    OPERATOR_BUTTONS,
+    OPERATOR_SERVO_CP,
+    Kind,
+    Topic,
+)
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import Robot, load_robot
 from teleop_core.robots.hardware import NUMBERS
@@ -65,6 +72,9 @@ def topics_page(graph: Graph) -> str:
     for topic in (OPERATOR_SERVO_CP, OPERATOR_BUTTONS):
         row = topic_row(topic, "[a person](hand.md)", graph)
         rows.append(row.replace("–", "operator, if it is `remote`", 1))
+    with_network = build_graph(stages=["network"])
+    writer = "[network](network.md), a further stage"
+    rows += [topic_row(topic, writer, with_network) for topic in NETWORK_TOPICS]
     return page([
         "# Topics",
         "CRTK names, standard messages, SI units. Streams are offered reliable with a queue of "

@@ -62,6 +62,13 @@ def test_own_object_is_touched_as_the_built_in_ones_are(tmp_path):
     assert all(0.9 < peak < 1.2 for peak in numbers(r"at most ([\d.]+) N", text))
 
 
+def test_own_network_loses_more_the_deeper_it_fades(tmp_path):
+    text = run("own_network", tmp_path)
+    lost, ages = numbers(r"(\d+) % lost", text), numbers(r"than (\d+) ms", text)
+    assert lost == pytest.approx([0.0, 25.0, 49.5], abs=4.0)
+    assert ages[0] < 2.0 < ages[2]
+
+
 def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path):
     at_once, late, later = numbers(r"([\d.]+) s to the goal", run("own_operator", tmp_path))
     # exp(-2 t) takes 29 mm to half a millimetre in 2.0 s; the device's friction makes it uneven.

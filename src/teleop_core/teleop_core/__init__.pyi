@@ -30,6 +30,7 @@ from .session.exchange import (
 from .chain.fixtures import Fixture as Fixture, register_fixture as register_fixture
 from .graph.graph import Graph as Graph, build_graph as build_graph
 from .kernels import kernel as kernel
+from .chain.network import Network as Network, register_network as register_network
 from .chain.operators import (
     Operator as Operator,
     Seen as Seen,

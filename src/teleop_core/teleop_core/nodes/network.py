@@ -17,9 +17,7 @@ class NetworkNode(TickingNode):
     def setup(self, parameters: NetworkParameters) -> None:
         """Make the network, and open its topics."""
         super().setup(parameters)
-        self._passed = {
-            topic: 0 for topic in self.description.writes if topic is not NETWORK_STATE
-        }
+        self._passed = {topic: 0 for topic in self.description.writes if topic is not NETWORK_STATE}
 
     def send(self, now_ns: int) -> None:
         """Send what arrived in the step, and now and then how much did."""

@@ -105,7 +105,8 @@ class NetworkMetric(Metric):
                 continue
             until_ns = min(window.until_ns, self._end_ns)
             found = ages.add(logs, stamps, max(window.after_ns, int(logs[0])), until_ns)
-            trace.add(np.maximum(logs, window.after_ns), 1e-6 * found[:, np.newaxis])
+            shown = (1e-6 * found[:, np.newaxis]).astype(np.float64)
+            trace.add(np.maximum(logs, window.after_ns), shown)
         told = window.samples(NETWORK_STATE).values
         if len(told):
             self._first = self._first or told[0].tolist()
