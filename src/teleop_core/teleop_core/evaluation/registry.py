@@ -95,6 +95,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "force_n": f"{_FOLDER}.force:ForceMetric",
         "contact": f"{_FOLDER}.contact:ContactMetric",
         "touch": f"{_FOLDER}.touch:TouchMetric",
+        "force_sensing": f"{_FOLDER}.force_sensing:ForceSensingMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",
         "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
         "ticks": f"{_FOLDER}.counts:TicksMetric",
