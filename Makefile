@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format bench bench-setup endurance fuzz drill-mutants flaky clean
+.PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format docs bench bench-setup endurance fuzz drill-mutants flaky clean
 
 # Python compiles a module when it is first imported: most of them never are.
 INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check \
@@ -96,6 +96,16 @@ fuzz: $(VENV)/.tested
 coverage: $(VENV)/.tested
 	$(BIN)/python tests/kernel_coverage.py
 
+# The site of the documents, in build/docs; a warning fails it. Pages that changed are built anew and
+# tutorials run with them; after make clean all of them do.
+$(VENV)/.documented: $(VENV)/.installed
+	$(INSTALL) -e 'src/teleop_core[docs]'
+	touch $@
+
+docs: $(VENV)/.documented
+	$(BIN)/python -m sphinx -W --keep-going -q -d build/doctrees docs build/docs
+	@echo "$(CURDIR)/build/docs/index.html"
+
 bench-setup: $(VENV)/.tested
 	$(INSTALL) -e 'src/teleop_core[bench]'
 
@@ -120,4 +130,4 @@ flaky: $(VENV)/.tested
 	$(BIN)/python tests/flaky.py $(FLAKY)
 
 clean:
-	rm -rf $(OUT) ros_ws/build ros_ws/install ros_ws/log
+	rm -rf $(OUT) build ros_ws/build ros_ws/install ros_ws/log

@@ -27,6 +27,9 @@ from teleop_core.robots.hardware import NUMBERS
 from teleop_core.session.configuration import parameter_rows
 from teleop_core.slave.plants.hardware import HardwareParameters
 
+sys.path.insert(0, str(Path(__file__).parent))
+from reference_pages import api_page, commands_page, examples_page
+
 ROOT = Path(__file__).resolve().parents[1]
 NOTE = "<!-- Written by docs/generate.py; change the code, not this page. -->"
 GRAPH = "<!-- graph: written by docs/generate.py -->", "<!-- end of graph -->"
@@ -182,6 +185,9 @@ def pages() -> Iterator[tuple[Path, str]]:
     yield docs / "parameters.md", parameters_page()
     yield docs / "topics.md", topics_page(graph)
     yield docs / "scores.md", scores_page()
+    yield docs / "commands.md", page(commands_page())
+    yield docs / "api.md", page(api_page())
+    yield docs / "examples.md", page(examples_page())
     for path in (ROOT / "README.md", docs / "how_a_sample_travels.md"):
         yield path, between(path.read_text(encoding="utf-8"), GRAPH, diagram(graph))
     plant = docs / "plant.md"

@@ -80,6 +80,7 @@ setup(
             "colcon-ros",
         ],
         "bench": ["EAIK", "ikpy"],
+        "docs": ["sphinx", "furo", "myst-nb", "sphinxcontrib-mermaid", "matplotlib"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_core"]),

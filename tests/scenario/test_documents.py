@@ -19,7 +19,7 @@ from teleop_core.session.configuration import parse_setting
 from teleop_core.session.virtual import VirtualTime
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("bags/*.md")]
+PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("bags/*.md")]
 NAMES = [path.relative_to(ROOT).as_posix() for path in sorted(PAGES)]
 PACKAGE_HEADING = "## As an installed package"
 

@@ -96,6 +96,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "contact": f"{_FOLDER}.contact:ContactMetric",
         "touch": f"{_FOLDER}.touch:TouchMetric",
         "network": f"{_FOLDER}.network:NetworkMetric",
+        "force_sensing": f"{_FOLDER}.force_sensing:ForceSensingMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",
         "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
         "ticks": f"{_FOLDER}.counts:TicksMetric",

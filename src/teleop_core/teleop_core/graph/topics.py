@@ -270,9 +270,12 @@ SLAVE_MEASURED_CP = Topic(
 SLAVE_MEASURED_CF = Topic(
     "slave/measured_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True
 )  # fmt: skip
-"""What the tip feels: the world's force on it, along slave_base, and no torque about the tip."""
+"""What the sensor tells of the force on the tip, along slave_base, and of the torque about it."""
 SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
 """Where the tip really is, which no encoder sees: only a simulator knows, or a tracker."""
+SLAVE_TRUE_CF = Topic("slave/true_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
+"""The world's force on the tip, along slave_base, and no torque about the tip: what an ideal sensor
+would tell. Only a simulator knows."""
 SLAVE_OPERATION = Topic("slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED,
                         columns=OPERATION)  # fmt: skip
 """Whether the slave may move, what stopped it, and what it takes to go on; sent where it changes.
@@ -337,5 +340,5 @@ NETWORK_TOPICS = (
     NETWORK_STATE,
 )  # fmt: skip
 """Topics of a session with a network between both sides."""
-ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, SLAVE_MEASURED_CF, *REPORTS, DIAGNOSTICS)
+ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, SLAVE_MEASURED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS)
 BY_NAME = {topic.name: topic for topic in (*ALL, *NETWORK_TOPICS)}

@@ -70,6 +70,10 @@ class SimulatedArm(RunningStage):
         for stage in (self.server, self.simulated):
             stage.reset()
 
+    def prepare(self, ticks: int) -> None:
+        """Get ready for the next steps."""
+        self.simulated.prepare(ticks)
+
     def retune(self, parameters: ArmParameters) -> None:
         """Take new parameters from the next tick on; raises as the two stages do."""
         self.simulated.retune(parameters)

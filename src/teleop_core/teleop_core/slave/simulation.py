@@ -9,6 +9,7 @@ from teleop_core.kernels import inner, kernel, records
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots.rigid_body import write_model
 from teleop_core.slave.elastic import integrate_elastic
+from teleop_core.slave.force_sensor import SENSOR_PARAMETERS, SENSOR_STATE, sense
 from teleop_core.slave.friction import wander
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.plants import PER_JOINT
@@ -28,12 +29,12 @@ def simulation_records(n: int) -> tuple[Any, Any]:
               "compensated", "braking")  # fmt: skip
     rows: list[Field] = [(name, "f8", (n,)) for name in joints]
     rows += [(name, "i8") for name in ("steps", "delay_ticks", "has_gears")]
-    rows += WORLD_PARAMETERS
+    rows += [*WORLD_PARAMETERS, *SENSOR_PARAMETERS]
     plant = ("measured", "speed", "bent", "grip", "astray", "slipped", "carried", "link",
              "link_speed")  # fmt: skip
     state: list[Field] = [(name, "f8", (n,)) for name in plant]
     state += [("noise", "i8", (n,)), ("driven", "i8"), ("late", "f8", (LONGEST_DELAY + 1, n))]
-    state += world_state(n)
+    state += [*world_state(n), *SENSOR_STATE]
     return records(rows)[0], records(state)[0]
 
 
@@ -66,6 +67,7 @@ class Arm(NamedTuple):
     offset: Array  # rooms for what the tip feels: (3,), (3,) and (6, n)
     normal: Array
     J: Array
+    noises: Array  # of the force sensor in the coming ticks (N, 6)
 
 
 @inner
@@ -123,9 +125,9 @@ def _see_joints(p: Any, s: Any, arm: Any) -> None:
 def _touch(p: Any, s: Any, arm: Any, row: Any) -> None:
     """Let the tip feel the object, at the links that move it."""
     if p.has_gears:
-        touch(p, s, arm, s.link, s.link_speed, row.slave_measured_cf)
+        touch(p, s, arm, s.link, s.link_speed, row.slave_true_cf)
     else:
-        touch(p, s, arm, arm.q, arm.dq, row.slave_measured_cf)
+        touch(p, s, arm, arm.q, arm.dq, row.slave_true_cf)
 
 
 @inner
@@ -175,5 +177,6 @@ def simulation_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     pose_from_transform(arm.T, row.slave_true_cp)
     if p.has_world:
         _touch(p, s, arm, row)
+    sense(p, s, arm, row)
     wander(p, s)
     _move_on(p, s, arm, braked, dt)

@@ -14,6 +14,7 @@ from teleop_core.graph.topics import (
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
     SLAVE_SETPOINT_JS,
+    SLAVE_TRUE_CF,
     SLAVE_TRUE_CP,
 )
 from teleop_core.kernels import pointer
@@ -24,6 +25,7 @@ from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.slave.controllers import CONTROLLERS, per_joint
 from teleop_core.slave.elastic import gear_damping
+from teleop_core.slave.force_sensor import ForceSensorParameters, SensorNoise
 from teleop_core.slave.friction import bristle_damping
 from teleop_core.slave.handover import missing_effort
 from teleop_core.slave.plants import PER_JOINT, PLANTS, Physics
@@ -69,6 +71,7 @@ class SlaveSimParameters(RobotParameters):
     )
     plant: PlantParameters = field(default_factory=PlantParameters)
     world: WorldParameters = field(default_factory=WorldParameters)
+    force_sensor: ForceSensorParameters = field(default_factory=ForceSensorParameters)
     controller: ControllerParameters = field(default_factory=ControllerParameters)
     trials: str = parameter(
         "all", choices=("all", "small"),
@@ -97,6 +100,7 @@ class SlaveSim(RunningStage):
         self.parameters, self.state = simulation_records(n)
         self._law = CONTROLLERS.find(parameters.controller.kind.kind)
         self._seed, physics = parameters.seed, self._physics(parameters)
+        self._noise = SensorNoise(parameters.seed)
         gains = self._gains(parameters, physics.viscous)
         is_as_drawn = len(physics.tip_geometry) == 0
         touched = WORLD_OBJECTS.find(parameters.world.kind.kind)
@@ -121,7 +125,7 @@ class SlaveSim(RunningStage):
             measured=np.zeros(n), feedforward=np.zeros(self._law.feedforward(n)), limit=np.zeros(n),
             joints=np.zeros(n), tip=np.zeros(n), T=np.zeros((4, 4)),
             shape=parameters.world.shape, offset=np.zeros(3), normal=np.zeros(3),
-            J=np.zeros((6, n)),
+            J=np.zeros((6, n)), noises=self._noise.rows,
         )  # fmt: skip
         self.kernel, self.arguments = simulation_step, (self.parameters, self.state, self.arm)
         self._take(parameters)
@@ -139,6 +143,7 @@ class SlaveSim(RunningStage):
         """Stand at joints (n,), at rest and in balance."""
         s, arm = self.state, self.arm
         assign(s, 0)
+        self._noise.reset()
         step = self.parameters["encoder_step"]
         s["measured"], s["speed"] = np.round(home / step) * step, 0.0
         arm.q[:], arm.dq[:], arm.effort[:], arm.memory[:] = home, 0.0, 0.0, 0.0
@@ -156,9 +161,14 @@ class SlaveSim(RunningStage):
         s["link"] = home - bent
         row = self.signals
         row["slave_setpoint_js"], row["slave_measured_js"] = home, 0.0
-        row["slave_measured_cf"] = 0.0
+        row["slave_true_cf"] = row["slave_measured_cf"] = 0.0
         row["slave_measured_js"][: self.robot.n] = s["measured"]
         row["slave_measured_js_ns"] = NO_COMMAND_NS  # where it stands before the first tick
+
+    def prepare(self, ticks: int) -> None:
+        """Draw the noise of the force sensor for the next ticks."""
+        if self.parameters["has_noise"]:
+            self._noise.prepare(self.state, ticks)
 
     def examine(self, parameters: SlaveSimParameters) -> None:
         """Try parameters on an arm of their own, at home and where this one is.
@@ -204,6 +214,7 @@ class SlaveSim(RunningStage):
         p["effort_limit"], p["speed_limit"] = drives.effort_limit, drives.speed_limit
         self.arm.limit[:] = drives.effort_limit
         self._take_world(parameters.world)
+        parameters.force_sensor.write(p, self.dt)
         compensated = {
             "published": robot.dynamics.compensated, "all": 1.0, "none": 0.0
         }[parameters.gravity_compensation]  # fmt: skip
@@ -298,7 +309,7 @@ SLAVE_SIM = Stage(
     "slave_sim",
     SlaveSimParameters,
     reads=(SLAVE_SETPOINT_JS, SLAVE_OPERATION),
-    writes=(SLAVE_MEASURED_JS, SLAVE_MEASURED_CF, SLAVE_TRUE_CP),
+    writes=(SLAVE_MEASURED_JS, SLAVE_MEASURED_CF, SLAVE_TRUE_CP, SLAVE_TRUE_CF),
     make=SlaveSim,
     node="teleop_core.nodes.slave_sim:SlaveSimNode",
 )

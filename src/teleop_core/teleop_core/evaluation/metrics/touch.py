@@ -11,7 +11,7 @@ from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
-from teleop_core.graph.topics import SLAVE_MEASURED_CF
+from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF
 
 GROUP = "what the slave touched"
 
@@ -27,11 +27,14 @@ class TouchScore:
 
 
 class TouchMetric(Metric):
-    """Touches of the tip with the world, and their forces."""
+    """Touches of the tip with the world, and their forces.
+
+    Of the true force where it was recorded: noise and bias of a sensor are no touch.
+    """
 
     name = "touch"
     keys = keys_of("touch", TouchScore)
-    topics = (SLAVE_MEASURED_CF,)
+    topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF)
 
     def __init__(self, context: Context) -> None:
         self._force = Moments()
@@ -42,7 +45,8 @@ class TouchMetric(Metric):
 
     def add(self, window: Window) -> None:
         """Take one window; the topic is sent where it changes, and now and then."""
-        samples = window.samples(SLAVE_MEASURED_CF)
+        is_known = len(window.around(SLAVE_TRUE_CF)) > 0
+        samples = window.samples(SLAVE_TRUE_CF if is_known else SLAVE_MEASURED_CF)
         if not len(samples.values):
             return
         force = samples.values[:, :3]

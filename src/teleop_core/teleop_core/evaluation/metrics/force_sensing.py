@@ -1,0 +1,72 @@
+"""Force sensing: how far the force that was measured is from that on the tip, where it touched."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.evaluation.accumulators import Moments
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.pairing import latest
+from teleop_core.evaluation.rows import Row, row
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF, Topic
+from teleop_core.kernels.geometry import Array
+
+GROUP = "force on the tip as it was told"
+
+
+@dataclass(frozen=True)
+class ForceSensingScore:
+    """Errors of told forces; None where nothing was touched, or nobody knows the true force."""
+
+    measured_rms_n: float | None = figure(
+        "N",
+        "root mean square of the distance of slave/measured_cf from slave/true_cf, at all samples "
+        "of both in touch; null without a touch, or if nobody tells the true force",
+    )
+    measured_max_n: float | None = figure("N", "largest such distance")
+
+
+class ForceSensingMetric(Metric):
+    """Distance of told forces from the true one.
+
+    All three are sent where they change, so each holds until its next sample.
+    """
+
+    name = "force_sensing"
+    keys = keys_of("force_sensing", ForceSensingScore)
+    topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF)
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._measured = Moments()
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        self._measured.add(force_errors(window, SLAVE_MEASURED_CF))
+
+    def values(self) -> ForceSensingScore:
+        """Score of everything so far."""
+        measured = self._measured.spread()
+        return ForceSensingScore(measured.rms, measured.max)
+
+    def rows(self) -> list[Row]:
+        """The root mean squares; nothing where nothing was touched."""
+        score = self.values()
+        if score.measured_rms_n is None:
+            return []
+        return [row(GROUP, "measured, error, rms", "N", score.measured_rms_n)]
+
+
+def force_errors(window: Window, told: Topic) -> Array:
+    """Distances (N,) [N] of told forces from the true one, at the samples of both in touch."""
+    true, said = window.around(SLAVE_TRUE_CF), window.around(told)
+    own = [window.samples(topic).stamp_ns for topic in (SLAVE_TRUE_CF, told)]
+    stamps = np.unique(np.concatenate(own))
+    at_true, at_said = latest(stamps, true.stamp_ns), latest(stamps, said.stamp_ns)
+    is_known = (at_true >= 0) & (at_said >= 0)
+    force, heard = true.values[at_true[is_known], :3], said.values[at_said[is_known], :3]
+    off = (heard - force)[force.any(axis=1)]
+    distances: Array = np.sqrt(np.einsum("ij,ij->i", off, off))
+    return distances

@@ -1,0 +1,126 @@
+"""Force sensor: what a real one makes of the force on the tip.
+
+The world's force goes through a low-pass, as wide as the sensor's electronics; the weight of what
+hangs behind the sensor and its bias are added, and noise that is drawn anew for each sample.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.graph.signals import Field
+from teleop_core.kernels import inner
+
+BLOCK = 1000
+"""Ticks for which the noise is drawn at once."""
+STANDARD_GRAVITY = 9.80665
+"""Weight of a mass [m/s²]; it pulls along -z of the slave's base."""
+_STREAM = 3  # of random numbers beside the seed; those of a human operator are 1 and 2
+SENSOR_PARAMETERS: list[Field] = [
+    ("is_ideal", "i8"), ("has_noise", "i8"), ("sensor_share", "f8"),
+    ("sensor_offset", "f8", (6,)), ("sensor_noise", "f8", (6,)),
+]  # fmt: skip
+SENSOR_STATE: list[Field] = [
+    ("felt", "f8", (6,)), ("sensed", "f8", (6,)), ("next_noise", "i8"),
+]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceSensorParameters:
+    """The force sensor behind the tip; the defaults are an ideal one."""
+
+    force_noise: float = parameter(
+        0.0, unit="N", lower=0.0, upper=100.0,
+        doc="standard deviation of each sample, of every axis",
+        source="assumed: none, an ideal sensor",
+    )  # fmt: skip
+    torque_noise: float = parameter(
+        0.0, unit="N·m", lower=0.0, upper=10.0,
+        doc="standard deviation of each sample, of every axis",
+        source="assumed: none, an ideal sensor",
+    )  # fmt: skip
+    force_bias: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0), unit="N", lower=-100.0, upper=100.0, length=3,
+        doc="what it tells of no force, along the slave's base",
+        source="assumed: none, an ideal sensor",
+    )  # fmt: skip
+    torque_bias: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0), unit="N·m", lower=-10.0, upper=10.0, length=3,
+        doc="what it tells of no torque, along the slave's base",
+        source="assumed: none, an ideal sensor",
+    )  # fmt: skip
+    force_bandwidth: float = parameter(
+        0.0, unit="Hz", lower=0.0, upper=500.0,
+        doc="of its low-pass of first order, before the noise; 0: it passes everything at once",
+        source="assumed: none, an ideal sensor",
+    )  # fmt: skip
+    tool_mass: float = parameter(
+        0.0, unit="kg", lower=0.0, upper=10.0,
+        doc="of what hangs behind the sensor, at the tip: its weight is measured, its inertia not",
+        source="assumed: none, an ideal sensor",
+    )  # fmt: skip
+
+    def write(self, p: Any, dt: float) -> None:
+        """Write a record of :data:`SENSOR_PARAMETERS`, for ticks of ``dt`` [s]."""
+        p["sensor_share"] = -math.expm1(-2.0 * math.pi * self.force_bandwidth * dt)
+        p["sensor_noise"] = [self.force_noise] * 3 + [self.torque_noise] * 3
+        p["sensor_offset"] = self.force_bias + self.torque_bias
+        p["sensor_offset"][2] -= self.tool_mass * STANDARD_GRAVITY
+        p["has_noise"] = np.any(p["sensor_noise"])
+        p["is_ideal"] = not (p["has_noise"] or p["sensor_share"] or np.any(p["sensor_offset"]))
+
+
+class SensorNoise:
+    """Noise of the coming ticks, which the same seed draws again.
+
+    Attributes:
+        rows: Standard normal numbers, shape (:data:`BLOCK`, 6), a row for each sample.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._seed, self.rows = seed, np.zeros((BLOCK, 6))
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin again."""
+        self._rng = np.random.default_rng((self._seed, _STREAM))
+        self._end = 0
+
+    def prepare(self, s: Any, ticks: int) -> None:
+        """Draw what the next ticks take from row ``s.next_noise`` on."""
+        first = int(s["next_noise"])
+        left = self._end - first
+        if left >= ticks:
+            return
+        self.rows[:left] = self.rows[first : self._end]
+        self._end = BLOCK
+        s["next_noise"] = 0
+        self.rows[left:] = self._rng.standard_normal((BLOCK - left, 6))
+
+
+@inner
+def sense(p: Any, s: Any, arm: Any, row: Any) -> None:
+    """Write ``slave_measured_cf``: what the sensor makes of ``slave_true_cf``.
+
+    The low-pass is exact for a force that stays what it is for a tick.
+
+    Args:
+        p: Record with :data:`SENSOR_PARAMETERS`.
+        s: Record with :data:`SENSOR_STATE`; written.
+        arm: Its ``noises`` are standard normal numbers (N, 6).
+        row: Signals.
+    """
+    for i in range(6):
+        true = row.slave_true_cf[i]
+        s.sensed[i] += p.sensor_share * (s.felt[i] - s.sensed[i])
+        s.felt[i] = true
+        if p.is_ideal:
+            row.slave_measured_cf[i] = true
+        else:
+            passed = s.sensed[i] if p.sensor_share > 0.0 else true
+            noise = p.sensor_noise[i] * arm.noises[s.next_noise % arm.noises.shape[0], i]
+            row.slave_measured_cf[i] = passed + p.sensor_offset[i] + noise
+    s.next_noise += p.has_noise
