@@ -1,9 +1,11 @@
 """Node ``network``: delays and loses what goes between both sides, whoever publishes it."""
 
+import time
 from typing import Any
 
 from teleop_core.chain.network.network import BACK, THERE
 from teleop_core.chain.network.parameters import NetworkParameters
+from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import NETWORK_SERVO_CP, NETWORK_SETPOINT_CP, NETWORK_STATE, Topic
 from teleop_core.nodes.ticking import TickingNode
 
@@ -18,6 +20,16 @@ class NetworkNode(TickingNode):
         """Make the network, and open its topics."""
         super().setup(parameters)
         self._passed = {topic: 0 for topic in self.description.writes if topic is not NETWORK_STATE}
+
+    def turn(self) -> None:
+        """Make all steps that are due; a packet is sent now, not in a tick that is made up for."""
+        due, state = list(self.schedule.due()), self.stage.state
+        for tick_ns in due[:-1]:
+            self.make_tick(tick_ns, self.send_report)
+        self.read_ports()
+        state["behind"] = (time.monotonic_ns() - due[-1]) // TICK_NS
+        self.make_tick(due[-1], self.send_report)
+        state["behind"] = 0
 
     def send(self, now_ns: int) -> None:
         """Send what arrived in the step, and now and then how much did."""

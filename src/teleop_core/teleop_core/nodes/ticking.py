@@ -30,12 +30,16 @@ class TickingNode(CoreNode):
         """
         self.read_ports()
         for tick_ns in ticks:
-            now_ns = tick_ns + self.epoch_ns
-            self.row["now_ns"] = now_ns
-            self.advance(now_ns)
-            self.send(now_ns)
-            if report is not None:
-                report(now_ns)
+            self.make_tick(tick_ns, report)
+
+    def make_tick(self, tick_ns: int, report: Callable[[int], None] | None = None) -> None:
+        """Make the step of one tick [ns, monotonic] with what was taken, and send what it wrote."""
+        now_ns = tick_ns + self.epoch_ns
+        self.row["now_ns"] = now_ns
+        self.advance(now_ns)
+        self.send(now_ns)
+        if report is not None:
+            report(now_ns)
 
     def tell(self) -> None:
         """Report the state that the last step led to, if it has changed."""

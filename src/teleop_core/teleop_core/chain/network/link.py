@@ -22,12 +22,13 @@ LINK_PARAMETERS: list[Field] = [
     (("least_delay", "f8"), ("loss", "f8"), ("keeps_order", "i8"), ("every", "i8"))
 ]  # fmt: skip
 LINK_STATE: list[Field] = [
-    ("tick", "i8"), ("next", "i8"),
+    ("tick", "i8"), ("next", "i8"), ("behind", "i8"),
     *((name, "i8", (2,)) for name in
       ("sent", "lost", "newest", "last_due", "sent_tick", "arrived")),
 ]  # fmt: skip
-"""Counters: ticks, random numbers used, and of each direction packets sent and lost, the number of
-the newest that arrived, when the last one is due, when it was sent, and whether one just came."""
+"""Ticks, random numbers used, ticks by which the present one is made late; of each direction packets
+sent and lost, the newest that arrived, when the last one is due and was sent, and whether one just
+came."""
 
 
 class Way(NamedTuple):
@@ -80,7 +81,7 @@ def _due(p: Any, s: Any, way: Any, k: int, dt: float) -> int:
     drawn = way.draw(way.numbers, way.memory, chances[:CHANCES], s.tick * dt)
     if drawn < 0.0 or chances[CHANCES] < p.loss[k]:
         return 0
-    due = s.tick + int((p.least_delay[k] + drawn) / dt + 0.5)
+    due = s.tick + s.behind + int((p.least_delay[k] + drawn) / dt + 0.5)
     if p.keeps_order[k]:
         due = max(due, s.last_due[k])
     if due - s.tick >= LONGEST:
@@ -91,7 +92,7 @@ def _due(p: Any, s: Any, way: Any, k: int, dt: float) -> int:
 
 @inner
 def send_packet(p: Any, s: Any, way: Any, k: int, dt: float) -> None:
-    """Send ``way.packet``; the motion in ``way.moved[0]`` goes with it, and is zero afterwards.
+    """Send ``way.packet``; the motion in ``way.moved[0]`` goes with it.
 
     Args:
         p: Record with :data:`LINK_PARAMETERS`.
@@ -118,8 +119,6 @@ def send_packet(p: Any, s: Any, way: Any, k: int, dt: float) -> None:
             way.stamps[at, i] = way.packet_ns[i]
         for i in range(3):
             way.way[at, i] += way.moved[0, i]
-    for i in range(3):
-        way.moved[0, i] = 0.0
 
 
 @inner

@@ -1,0 +1,98 @@
+"""Network over real topics: a foreign publisher behind it, and a session across it."""
+
+import time
+
+import numpy as np
+import pytest
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+
+from teleop_core.graph.topics import (
+    NETWORK_SERVO_CP,
+    NETWORK_SETPOINT_CP,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+    SLAVE_SETPOINT_JS,
+)
+from teleop_core.session.configuration import configure
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+MS = 1_000_000
+DELAY = 0.15
+
+
+class Sender:
+    """A program that knows nothing of the network: commands, and where a slave is."""
+
+    def __init__(self, peer):
+        self.peer, self.sent_ns = peer, {}
+
+    def send(self):
+        stamp = (len(self.sent_ns) + 2) * MS
+        pose = (1e-9 * stamp, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        self.peer.send(SLAVE_SETPOINT_CP, stamp, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+        self.sent_ns[stamp] = time.monotonic_ns()
+        self.peer.send(SLAVE_SERVO_CP, stamp, pose)
+
+
+def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_time(peer):
+    came, back = peer.listen(NETWORK_SERVO_CP), peer.listen(NETWORK_SETPOINT_CP)
+    peer.start("network", there__least_delay=DELAY)
+    sender, ages = Sender(peer), []
+
+    def many():
+        sender.send()
+        before = len(came.stamps)
+        came.take()
+        now_ns = time.monotonic_ns()
+        ages.extend(now_ns - sender.sent_ns[stamp] for stamp in came.stamps[before:])
+        return len(ages) > 200 and back.take()
+
+    peer.wait(many, "commands that arrive")
+    assert min(ages) >= (DELAY - 1e-3) * 1e9
+    assert (np.diff(came.stamps) > 0).all()
+    np.testing.assert_allclose(np.array(came.values)[:, 0], 1e-9 * np.array(came.stamps))
+    value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.0)
+    request = SetParameters.Request(parameters=[Parameter(name="there.loss", value=value)])
+    assert peer.call(SetParameters, "/network/set_parameters", request).results[0].successful
+    set_ns = time.monotonic_ns()
+
+    def quiet():
+        sender.send()
+        came.take()
+        return time.monotonic_ns() - set_ns > 3 * DELAY * 1e9
+
+    peer.wait(quiet, "what was on its way has come")
+    last = came.stamps[-1]
+    assert sender.sent_ns[last] < set_ns + 50 * MS < max(sender.sent_ns.values())
+
+
+@pytest.mark.parametrize("is_composed", [True, False], ids=["composed", "processes"])
+def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
+    peer, session_until, is_composed
+):
+    settings = [
+        "teleop.stages=[network]", "network.there.least_delay=0.2", "network.back.least_delay=0.2",
+        "slave.starts_at_home=true", "slave.operation.longest_outage=0", "duration=600",
+    ]  # fmt: skip
+    setpoints = peer.listen(SLAVE_SETPOINT_JS)
+
+    def is_led():
+        setpoints.take()
+        q = setpoints.values
+        return len(q) > 1000 and np.abs(q[-1] - q[0]).max() > 2e-3
+
+    bag, text = session_until(
+        configure("free_motion", settings=settings), is_led, is_composed=is_composed
+    )
+    assert "refused 0" in text, text
+    series = bag.read(NETWORK_SERVO_CP.name)
+    ages = (series.log_ns - series.stamp_ns)[series.stamp_ns > 0]
+    assert ages.min() >= 199 * MS
+    sent = bag.read(SLAVE_SERVO_CP.name)
+    known = dict(zip(sent.stamp_ns, sent.values, strict=True))
+    pairs = [(known[s], v) for s, v in zip(series.stamp_ns, series.values, strict=True)
+             if s in known]  # fmt: skip
+    assert len(pairs) > 0.5 * len(series.stamp_ns)
+    for own, arrived in pairs:
+        np.testing.assert_array_equal(own, arrived)
