@@ -190,6 +190,9 @@ def test_a_trace_is_played_row_by_row_and_begins_anew_at_its_end(tmp_path):
     one = np.repeat([0.05, LOST, 0.07], 100)
     differing = np.flatnonzero(found != np.concatenate((one, one, one))[:700])
     assert len(differing) <= 2  # where a sum of milliseconds is a bit beside a border
+    seldom = drawn("trace", {"file": str(file)}, 50, period=0.77)
+    np.testing.assert_array_equal(seldom, np.array([0.05, LOST, 0.07])[
+        (np.arange(50) * 0.77 % 0.3 / 0.1).astype(int)])  # fmt: skip
     network = link(there__kind="trace", there__trace__file=str(file))
     _, stamps = through(network, walk(700))
     age = np.arange(2, 702) - stamps / MS
@@ -266,6 +269,9 @@ def test_the_same_seed_gives_the_same_network_and_another_seed_another():
     came = through(first, places)[1]
     first.reset()
     assert (through(first, places)[1] == came).all()
+    first.reset()
+    first.retune(build(NetworkParameters, {"there.loss": 1.0}))
+    assert (through(first, places)[1] == 0).all()
     assert (through(link(**given), places)[1] == came).all()
     assert (through(link(seed=2, **given), places)[1] != came).any()
 

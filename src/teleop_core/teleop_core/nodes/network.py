@@ -22,14 +22,13 @@ class NetworkNode(TickingNode):
         self._passed = {topic: 0 for topic in self.description.writes if topic is not NETWORK_STATE}
 
     def turn(self) -> None:
-        """Make all steps that are due; a packet is sent now, not in a tick that is made up for."""
+        """Make all steps that are due; a packet is sent when it is read, however late that is."""
         due, state = list(self.schedule.due()), self.stage.state
         for tick_ns in due[:-1]:
             self.make_tick(tick_ns, self.send_report)
         self.read_ports()
         state["behind"] = (time.monotonic_ns() - due[-1]) // TICK_NS
         self.make_tick(due[-1], self.send_report)
-        state["behind"] = 0
 
     def send(self, now_ns: int) -> None:
         """Send what arrived in the step, and now and then how much did."""

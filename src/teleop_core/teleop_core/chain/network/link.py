@@ -26,7 +26,7 @@ LINK_STATE: list[Field] = [
     *((name, "i8", (2,)) for name in
       ("sent", "lost", "newest", "last_due", "sent_tick", "arrived")),
 ]  # fmt: skip
-"""Ticks, random numbers used, ticks by which the present one is made late; of each direction packets
+"""Ticks, random numbers used, ticks by which the present one comes late; of each direction packets
 sent and lost, the newest that arrived, when the last one is due and was sent, and whether one just
 came."""
 
