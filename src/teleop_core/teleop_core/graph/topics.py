@@ -271,6 +271,11 @@ SLAVE_MEASURED_CF = Topic(
     "slave/measured_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True
 )  # fmt: skip
 """What the sensor tells of the force on the tip, along slave_base, and of the torque about it."""
+SLAVE_ESTIMATED_CF = Topic(
+    "slave/estimated_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True
+)  # fmt: skip
+"""What drive efforts and joint motion tell of the force on the tip, along slave_base, without a
+sensor; zero where ``slave_sim.force_sensor.estimate`` is off, and while brakes hold the arm."""
 SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
 """Where the tip really is, which no encoder sees: only a simulator knows, or a tracker."""
 SLAVE_TRUE_CF = Topic("slave/true_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
@@ -340,5 +345,8 @@ NETWORK_TOPICS = (
     NETWORK_STATE,
 )  # fmt: skip
 """Topics of a session with a network between both sides."""
-ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, SLAVE_MEASURED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS)
+ALL = (
+    *STREAMS, HAND_BUTTONS, HAND_TREMOR,
+    SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS,
+)  # fmt: skip
 BY_NAME = {topic.name: topic for topic in (*ALL, *NETWORK_TOPICS)}

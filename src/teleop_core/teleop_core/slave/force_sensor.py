@@ -30,7 +30,7 @@ SENSOR_STATE: list[Field] = [
 
 @dataclass(frozen=True, kw_only=True)
 class ForceSensorParameters:
-    """The force sensor behind the tip; the defaults are an ideal one."""
+    """The force sensor behind the tip, an ideal one by default, and the estimate without one."""
 
     force_noise: float = parameter(
         0.0, unit="N", lower=0.0, upper=100.0,
@@ -63,13 +63,24 @@ class ForceSensorParameters:
         source="assumed: none, an ideal sensor",
     )  # fmt: skip
 
+    estimate: bool = parameter(
+        False,
+        doc="whether slave/estimated_cf tells what drive efforts and joint motion say of the force",
+    )
+    estimate_bandwidth: float = parameter(
+        10.0, unit="Hz", lower=0.1, upper=200.0, doc="of the estimate",
+        source="assumed: faster than a hand moves, slower than what steps of encoders blur",
+    )  # fmt: skip
+
     def write(self, p: Any, dt: float) -> None:
-        """Write a record of :data:`SENSOR_PARAMETERS`, for ticks of ``dt`` [s]."""
+        """Write the record of a simulated arm that makes ticks of ``dt`` [s]."""
         p["sensor_share"] = -math.expm1(-2.0 * math.pi * self.force_bandwidth * dt)
         p["sensor_noise"] = [self.force_noise] * 3 + [self.torque_noise] * 3
         p["sensor_offset"] = self.force_bias + self.torque_bias
         p["sensor_offset"][2] -= self.tool_mass * STANDARD_GRAVITY
         p["has_noise"] = np.any(p["sensor_noise"])
+        p["is_estimated"] = self.estimate
+        p["observer_gain"] = 2.0 * math.pi * self.estimate_bandwidth
         p["is_ideal"] = not (p["has_noise"] or p["sensor_share"] or np.any(p["sensor_offset"]))
 
 

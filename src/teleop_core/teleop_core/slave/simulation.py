@@ -9,6 +9,12 @@ from teleop_core.kernels import inner, kernel, records
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots.rigid_body import write_model
 from teleop_core.slave.elastic import integrate_elastic
+from teleop_core.slave.force_observer import (
+    OBSERVER_PARAMETERS,
+    estimate,
+    forget,
+    observer_state,
+)
 from teleop_core.slave.force_sensor import SENSOR_PARAMETERS, SENSOR_STATE, sense
 from teleop_core.slave.friction import wander
 from teleop_core.slave.joints import integrate
@@ -29,12 +35,12 @@ def simulation_records(n: int) -> tuple[Any, Any]:
               "compensated", "braking")  # fmt: skip
     rows: list[Field] = [(name, "f8", (n,)) for name in joints]
     rows += [(name, "i8") for name in ("steps", "delay_ticks", "has_gears")]
-    rows += [*WORLD_PARAMETERS, *SENSOR_PARAMETERS]
+    rows += [*WORLD_PARAMETERS, *SENSOR_PARAMETERS, *OBSERVER_PARAMETERS]
     plant = ("measured", "speed", "bent", "grip", "astray", "slipped", "carried", "link",
              "link_speed")  # fmt: skip
     state: list[Field] = [(name, "f8", (n,)) for name in plant]
     state += [("noise", "i8", (n,)), ("driven", "i8"), ("late", "f8", (LONGEST_DELAY + 1, n))]
-    state += [*world_state(n), *SENSOR_STATE]
+    state += [*world_state(n), *SENSOR_STATE, *observer_state(n)]
     return records(rows)[0], records(state)[0]
 
 
@@ -131,6 +137,15 @@ def _touch(p: Any, s: Any, arm: Any, row: Any) -> None:
 
 
 @inner
+def _estimate(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
+    """Write what joints and drives tell of the force on the tip; brakes tell nothing."""
+    if p.is_estimated and not row.slave_operation[_BRAKED] > 0.0:
+        estimate(p, s, arm, SPEED_LAG, dt, row.slave_estimated_cf)
+    else:
+        forget(s, row.slave_estimated_cf)
+
+
+@inner
 def _move_on(p: Any, s: Any, arm: Any, braked: bool, dt: float) -> None:
     """Move the arm by a tick: by its brakes, or under the effort of its drives."""
     if braked:
@@ -178,5 +193,6 @@ def simulation_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
     if p.has_world:
         _touch(p, s, arm, row)
     sense(p, s, arm, row)
+    _estimate(p, s, arm, row, dt)
     wander(p, s)
     _move_on(p, s, arm, braked, dt)

@@ -10,6 +10,7 @@ from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
     NO_COMMAND_NS,
+    SLAVE_ESTIMATED_CF,
     SLAVE_MEASURED_CF,
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
@@ -161,7 +162,7 @@ class SlaveSim(RunningStage):
         s["link"] = home - bent
         row = self.signals
         row["slave_setpoint_js"], row["slave_measured_js"] = home, 0.0
-        row["slave_true_cf"] = row["slave_measured_cf"] = 0.0
+        row["slave_true_cf"] = row["slave_measured_cf"] = row["slave_estimated_cf"] = 0.0
         row["slave_measured_js"][: self.robot.n] = s["measured"]
         row["slave_measured_js_ns"] = NO_COMMAND_NS  # where it stands before the first tick
 
@@ -309,7 +310,13 @@ SLAVE_SIM = Stage(
     "slave_sim",
     SlaveSimParameters,
     reads=(SLAVE_SETPOINT_JS, SLAVE_OPERATION),
-    writes=(SLAVE_MEASURED_JS, SLAVE_MEASURED_CF, SLAVE_TRUE_CP, SLAVE_TRUE_CF),
+    writes=(
+        SLAVE_MEASURED_JS,
+        SLAVE_MEASURED_CF,
+        SLAVE_ESTIMATED_CF,
+        SLAVE_TRUE_CP,
+        SLAVE_TRUE_CF,
+    ),
     make=SlaveSim,
     node="teleop_core.nodes.slave_sim:SlaveSimNode",
 )

@@ -213,7 +213,7 @@ def _copies(p: Any, s: Any, arm: Arm, row: Any) -> tuple[Any, Any, Arm, Any]:
     """Copies of an arm."""
     p, s, row = (_copy(record) for record in (p, s, row))
     p["has_world"] = s["is_near"] = 0  # a loop is judged in free air
-    p["is_ideal"], p["has_noise"] = 1, 0
+    p["is_ideal"], p["has_noise"], p["is_estimated"] = 1, 0, 0
     arm = Arm(*(np.array(part) if isinstance(part, np.ndarray) else part for part in arm))
     return p, s, arm, row
 

@@ -1,4 +1,4 @@
-"""Force sensing: how far the force that was measured is from that on the tip, where it touched."""
+"""Force sensing: how far measured and estimated forces are from that on the tip, in touch."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.pairing import latest
 from teleop_core.evaluation.rows import Row, row
 from teleop_core.evaluation.windows import Window
-from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF, Topic
+from teleop_core.graph.topics import SLAVE_ESTIMATED_CF, SLAVE_MEASURED_CF, SLAVE_TRUE_CF, Topic
 from teleop_core.kernels.geometry import Array
 
 GROUP = "force on the tip as it was told"
@@ -26,6 +26,10 @@ class ForceSensingScore:
         "of both in touch; null without a touch, or if nobody tells the true force",
     )
     measured_max_n: float | None = figure("N", "largest such distance")
+    estimated_rms_n: float | None = figure(
+        "N", "the same of slave/estimated_cf; null too if nothing was estimated"
+    )
+    estimated_max_n: float | None = figure("N", "largest such distance")
 
 
 class ForceSensingMetric(Metric):
@@ -36,27 +40,34 @@ class ForceSensingMetric(Metric):
 
     name = "force_sensing"
     keys = keys_of("force_sensing", ForceSensingScore)
-    topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF)
+    topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._measured = Moments()
+        self._measured, self._estimated = Moments(), Moments()
+        self._is_estimated = False
 
     def add(self, window: Window) -> None:
         """Take one window."""
         self._measured.add(force_errors(window, SLAVE_MEASURED_CF))
+        self._estimated.add(force_errors(window, SLAVE_ESTIMATED_CF))
+        self._is_estimated |= bool(window.samples(SLAVE_ESTIMATED_CF).values.any())
 
     def values(self) -> ForceSensingScore:
         """Score of everything so far."""
         measured = self._measured.spread()
-        return ForceSensingScore(measured.rms, measured.max)
+        estimated = (self._estimated if self._is_estimated else Moments()).spread()
+        return ForceSensingScore(measured.rms, measured.max, estimated.rms, estimated.max)
 
     def rows(self) -> list[Row]:
         """The root mean squares; nothing where nothing was touched."""
         score = self.values()
         if score.measured_rms_n is None:
             return []
-        return [row(GROUP, "measured, error, rms", "N", score.measured_rms_n)]
+        found = [row(GROUP, "measured, error, rms", "N", score.measured_rms_n)]
+        if score.estimated_rms_n is not None:
+            found.append(row(GROUP, "estimated, error, rms", "N", score.estimated_rms_n))
+        return found
 
 
 def force_errors(window: Window, told: Topic) -> Array:

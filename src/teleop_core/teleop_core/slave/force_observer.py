@@ -1,0 +1,157 @@
+"""Force observer: the force on the tip without a sensor, from drive efforts and joint motion.
+
+The generalised momentum of the arm changes by what drives, weight and friction do, which is known,
+and by what pushes it. The push is what is left, and known as well as friction is.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from teleop_core.graph.signals import Field, copy
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.rigid_body import invert_positive, write_model
+
+OBSERVER_PARAMETERS: list[Field] = [("is_estimated", "i8"), ("observer_gain", "f8")]
+_DAMPING = 1e-4
+"""Of the way from efforts to force, over its mean square gain: a direction in which the arm feels
+a hundredth of what it feels in others is told at half."""
+
+
+def observer_state(n: int) -> list[Field]:
+    """Fields of the state of the observer of an arm with ``n`` joints."""
+    rows = ("residual", "last_effort", "lagged", "last_speed", "momentum")
+    return [
+        *((name, "f8", (n,)) for name in rows),
+        ("last_inertia", "f8", (n, n)), ("is_observed", "i8"),
+    ]  # fmt: skip
+
+
+@inner
+def _lag(s: Any, effort: Array, model: Array, share: float) -> None:
+    """Let efforts less the arm's own lag as much as the measured speeds do, by a share per tick.
+
+    Speeds are those of differences: from the middle of one tick to that of the next an arm moves
+    under the mean of both efforts, and weighs what it weighs in between.
+    """
+    for i in range(effort.shape[0]):
+        mean = 0.5 * (s.last_effort[i] + effort[i]) - model[i]
+        s.lagged[i] += (mean - s.lagged[i]) * share
+        s.last_effort[i] = effort[i]
+
+
+@inner
+def _known_effort(p: Any, s: Any, i: int) -> float:
+    """Effort of joint ``i`` that drives, the arm itself and friction account for [N·m or N]."""
+    speed, scale = s.speed[i], p.friction_speed[i]
+    dry = p.coulomb[i] * (speed / math.sqrt(speed * speed + scale * scale))
+    return s.lagged[i] - p.viscous[i] * speed - dry
+
+
+@inner
+def _observe(p: Any, s: Any, model: Array, dt: float) -> None:
+    """Bring the residual (n,) [N·m or N] to the present tick, and keep what the next one needs.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        model: Bias and inertia (n + n²,) of the arm as it is known.
+        dt: Tick [s].
+
+    Source:
+        De Luca and Mattone 2003; De Luca, Albu-Schäffer, Haddadin and Hirzinger 2006:
+        r = K (p - ∫(τ + Cᵀ dq - g + r) dt), with Cᵀ dq = dM/dt dq - C dq, in steps that take the
+        new r, so that every gain is stable.
+    """
+    n = s.speed.shape[0]
+    for i in range(n):
+        momentum = turned = 0.0
+        for j in range(n):
+            inertia = model[n + n * i + j]
+            momentum += inertia * s.speed[j]
+            turned += (inertia - s.last_inertia[i, j]) * 0.5 * (s.speed[j] + s.last_speed[j])
+            s.last_inertia[i, j] = inertia
+        if s.is_observed:
+            missing = momentum - s.momentum[i] - turned - dt * _known_effort(p, s, i)
+            found = (s.residual[i] + p.observer_gain * missing) / (1.0 + p.observer_gain * dt)
+            s.residual[i] = found if math.isfinite(found) else 0.0
+        s.momentum[i] = momentum
+    copy(s.speed, s.last_speed)
+
+
+@kernel
+def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> None:
+    """Write the force (3,) [N] on a tip that explains efforts (n,) of the joints best.
+
+    Minimises Σ ((Jᵀ f - efforts)ᵢ / scaleᵢ)² + damping |f|². The way in which a singular arm feels
+    nothing gets no force; where the Jacobian is not finite there is none at all.
+
+    Args:
+        J: Jacobian (6, n) of the tip; its linear rows count, for a push makes no torque there.
+        efforts: Of the push [N·m or N].
+        scale: By what each joint's effort is measured, > 0: its largest.
+        force: Written.
+    """
+    A, b = np.zeros((3, 3)), np.zeros(3)
+    for k in range(3):
+        for i in range(efforts.shape[0]):
+            share = J[k, i] / (scale[i] * scale[i])
+            b[k] += share * efforts[i]
+            for m in range(3):
+                A[k, m] += share * J[m, i]
+    size = A[0, 0] + A[1, 1] + A[2, 2]
+    for k in range(3):
+        A[k, k] += _DAMPING * size / 3.0
+        force[k] = 0.0
+    if not (math.isfinite(size) and size > 0.0):
+        return
+    invert_positive(A)
+    for k in range(3):
+        for m in range(3):
+            force[k] += A[k, m] * b[m]
+
+
+@inner
+def forget(s: Any, wrench: Array) -> None:
+    """Begin anew with the next estimate; until then there is none, and the wrench (6,) is zero."""
+    s.is_observed = 0
+    for i in range(s.residual.shape[0]):
+        s.residual[i] = 0.0
+    for k in range(6):
+        wrench[k] = 0.0
+
+
+@inner
+def estimate(p: Any, s: Any, arm: Any, lag: float, dt: float, wrench: Array) -> None:
+    """Write the force on the tip along the slave's base, without torque, as the joints tell it.
+
+    It knows what an encoder, an amplifier and the control law's model know, and the plant's mean
+    friction. The residual is that of the tick that ended.
+
+    Args:
+        p: Record with :data:`OBSERVER_PARAMETERS` and the friction's parameters.
+        s: Record with :func:`observer_state`; written.
+        arm: Its rooms ``measured``, ``joints`` and ``J`` are written.
+        lag: Time constant of the measured speeds [s].
+        dt: Tick [s].
+        wrench: Written (6,) [N, N·m].
+    """
+    n = arm.q.shape[0]
+    model, residual, scale, force = np.empty(n + n * n), np.empty(n), np.empty(n), np.empty(3)
+    copy(s.measured, arm.measured)
+    copy(s.speed, arm.joints)
+    write_model(arm.acceleration, arm.model, arm.measured, arm.joints, model)
+    if not s.is_observed:
+        copy(arm.effort, s.last_effort)
+        copy(s.speed, s.last_speed)
+    _observe(p, s, model, dt)
+    _lag(s, arm.effort, model, dt / (dt + lag) if s.is_observed else 1.0)
+    s.is_observed = 1
+    copy(s.residual, residual)
+    copy(p.effort_limit, scale)
+    arm.jacobian(arm.measured, arm.tip_geometry, arm.J)
+    force_of_efforts(arm.J, residual, scale, force)
+    for k in range(3):
+        wrench[k] = force[k]
