@@ -118,7 +118,7 @@ def forget(s: Any, wrench: Array) -> None:
     """Begin anew with the next estimate; until then there is none, and the wrench (6,) is zero."""
     s.is_observed = 0
     for i in range(s.residual.shape[0]):
-        s.residual[i] = 0.0
+        s.residual[i] = s.lagged[i] = 0.0
     for k in range(6):
         wrench[k] = 0.0
 
@@ -143,11 +143,11 @@ def estimate(p: Any, s: Any, arm: Any, lag: float, dt: float, wrench: Array) -> 
     copy(s.measured, arm.measured)
     copy(s.speed, arm.joints)
     write_model(arm.acceleration, arm.model, arm.measured, arm.joints, model)
-    if not s.is_observed:
-        copy(arm.effort, s.last_effort)
+    if not s.is_observed:  # it was held until now, in balance or by its brakes
+        copy(model[:n], s.last_effort)
         copy(s.speed, s.last_speed)
     _observe(p, s, model, dt)
-    _lag(s, arm.effort, model, dt / (dt + lag) if s.is_observed else 1.0)
+    _lag(s, arm.effort, model, dt / (dt + lag))
     s.is_observed = 1
     copy(s.residual, residual)
     copy(p.effort_limit, scale)
