@@ -10,6 +10,7 @@ NODES = (
     "haptic_master",
     "motion_scaling",
     "inverse_kinematics",
+    "network",
     "slave",
     "slave_sim",
     "recorder",

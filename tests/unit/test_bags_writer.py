@@ -236,7 +236,7 @@ def test_only_chosen_topics_are_recorded(tmp_path, rng):
 @pytest.mark.parametrize("values", [{"topics": ("slave/measured",)}, {"every_of": ("slave=2",)}])
 def test_topics_that_nobody_announced_are_refused_and_leave_no_folder(tmp_path, values):
     parameters = RecordingParameters(**values)
-    with pytest.raises(UnknownNameError, match="slave/measured_"):
+    with pytest.raises(UnknownNameError, match=r"one of: .*slave/\w+, "):
         BagWriter(tmp_path / "bag", topics.ALL, JOINTS, parameters=parameters)
     assert not (tmp_path / "bag").exists()
 

@@ -56,7 +56,7 @@ def test_bare_key_sets_every_stage_that_has_it():
         name: {"robot": "mma"} for name in ("inverse_kinematics", "slave", "slave_sim")
     }
     assert parse_setting("seed=5") == {
-        name: {"seed": 5} for name in ("operator", "haptic_master", "slave_sim")
+        name: {"seed": 5} for name in ("operator", "haptic_master", "network", "slave_sim")
     }
 
 

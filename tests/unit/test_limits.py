@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from teleop_core.chain.mapping.limits import SENT
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, ReachForceParameters
 from teleop_core.graph.signals import STATE, TICK_NS
@@ -98,10 +99,10 @@ def test_turns_beyond_are_cut_too_and_come_back_at_once(delay):
 
 
 def test_an_answer_to_a_command_that_is_forgotten_draws_nothing_back():
-    arm = Arm(delay=600)  # longer than commands are remembered
-    for _ in range(1200):
+    arm = Arm(delay=SENT + 100)
+    for _ in range(2 * SENT):
         arm.step(1)
-    assert arm.x == pytest.approx(1200 * STEP, abs=1e-9)
+    assert arm.x == pytest.approx(2 * SENT * STEP, abs=1e-9)
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.25])

@@ -277,16 +277,30 @@ def test_pause_within_the_timeout_is_bridged():
     assert np.allclose(after - before, (0, -5 * MM, 0), rtol=0, atol=ROUNDING)
 
 
-@pytest.mark.parametrize(("late", "follows"), [(2, True), (3, False)])
-def test_slave_of_a_slow_master_may_be_two_samples_late(late, follows):
+@pytest.mark.parametrize(("silent", "follows"), [(2, True), (3, False)])
+def test_slave_of_a_slow_master_may_be_silent_for_two_samples(silent, follows):
+    desk = Desk()
+    desk.step()
+    for _ in range(
+        1 + silent + 1
+    ):  # it is heard in the first, and the last one judges those before
+        desk.step((1 * MM, 0, 0), stamp_step_ns=80_000_000, does_follow=False)
+    assert desk.state("is_following") == float(follows)
+
+
+@pytest.mark.parametrize("late", [2, 3, 40])
+def test_slave_follows_however_late_as_long_as_newer_commands_come_into_force(late):
     desk, step_ns = Desk(), 80_000_000
     desk.step()
     stamps = [int(desk.row["master_measured_cp_ns"])]
-    for _ in range(6):
+    for _ in range(late + 6):
         desk.row["slave_setpoint_cp_ns"] = stamps[max(0, len(stamps) - 1 - late)]
         desk.step((1 * MM, 0, 0), stamp_step_ns=step_ns, does_follow=False)
         stamps.append(int(desk.row["master_measured_cp_ns"]))
-    assert desk.state("is_following") == float(follows)
+    assert desk.state("is_following") == 1.0
+    for _ in range(4):
+        desk.step((1 * MM, 0, 0), stamp_step_ns=step_ns, does_follow=False)
+    assert desk.state("is_following") == 0.0
 
 
 def test_reset_starts_again_at_the_setpoint_with_the_box_off_and_the_mode_of_the_parameters():

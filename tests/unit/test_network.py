@@ -361,6 +361,22 @@ def test_the_command_never_jumps_back_to_where_a_far_slave_was(preset):
     assert steps.max() < 5e-4
 
 
+def test_a_command_holds_while_nothing_is_heard_of_a_far_slave_and_goes_on_from_there():
+    ways = {"there.least_delay": 0.3, "back.least_delay": 0.3}
+    run = session(AT_HOME, *(f"network.{name}={value}" for name, value in ways.items()))
+    parts = [run.run(8000)]
+    for loss, ticks in ((1.0, 2000), (0.0, 3000)):
+        run.stages["network"].retune(build(NetworkParameters, {**ways, "back.loss": loss}))
+        parts.append(run.run(ticks))
+    commands = np.concatenate([rows["slave_servo_cp"][:, :3] for rows in parts])
+    assert np.abs(np.diff(commands[7500:], axis=0)).max() < 5e-4
+    assert np.ptp(commands[7000:8000], axis=0).max() > 5e-3  # the hand moved meanwhile
+    following = parts[1]["teleop_state"][:, 0]
+    assert following[0] == 1.0
+    assert following[-1] == 0.0
+    assert parts[2]["teleop_state"][-1000:, 0].all()
+
+
 def test_a_slave_that_was_stopped_far_away_is_taken_up_where_it_rests():
     run = session(AT_HOME, "network.preset=iss", "slave.operation.events=[stop@6, reset@9, "
                   "enable@9.1, resume@9.2]")  # fmt: skip
