@@ -281,9 +281,7 @@ def test_pause_within_the_timeout_is_bridged():
 def test_slave_of_a_slow_master_may_be_silent_for_two_samples(silent, follows):
     desk = Desk()
     desk.step()
-    for _ in range(
-        1 + silent + 1
-    ):  # it is heard in the first, and the last one judges those before
+    for _ in range(1 + silent + 1):  # heard in the first; the last judges those before
         desk.step((1 * MM, 0, 0), stamp_step_ns=80_000_000, does_follow=False)
     assert desk.state("is_following") == float(follows)
 
