@@ -32,7 +32,7 @@ from middleware_faults import MiddlewareLossError, check_end
 from teleop_core.bags.messages import discover, layout
 from teleop_core.bags.reader import Bag
 from teleop_core.base.parameters import specs
-from teleop_core.graph.stage import STAGES
+from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.graph.topics import Topic
 from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.interrupt import Interrupt
@@ -376,7 +376,7 @@ def _composed(
     env = environment() | {"ROS_DOMAIN_ID": peer.domain}
     process = subprocess.Popen(command, env=env)
     try:
-        for name in STAGES:
+        for name in (*BUILT_IN, RECORDER_NAME):
             peer.wait_state(f"{namespace}/{name}" if namespace else name, "active")
         yield process
     finally:

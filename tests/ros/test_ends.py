@@ -13,11 +13,11 @@ from lifecycle_msgs.srv import ChangeState
 from live_process import TIMEOUT, LiveProcess, WorkingTime, are_gone, wait_until
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
-from teleop_core.graph.stage import STAGES
+from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.nodes.children import free_domain
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
-NODES = list(STAGES)
+NODES = [*BUILT_IN, RECORDER_NAME]
 HANGS = '''
 import time
 from pathlib import Path

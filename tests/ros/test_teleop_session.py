@@ -15,8 +15,8 @@ from std_srvs.srv import Trigger
 
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
+from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.graph.layers import RealTimeParameters
-from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import STREAMS
 from teleop_core.nodes.real_time import apply_options, is_priority_granted
 from teleop_core.robots import load_robot
@@ -24,7 +24,7 @@ from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
-NODES = list(STAGES)
+NODES = [*BUILT_IN, RECORDER_NAME]
 HOME = load_robot("rcrt1").home.tolist()
 MS = 1_000_000
 TIMEOUT = 90.0

@@ -292,6 +292,7 @@ def _scenarios(_: argparse.Namespace) -> int:
 
 def _parts(_: argparse.Namespace) -> int:
     from teleop_core.chain.fixtures import FIXTURES
+    from teleop_core.chain.network import NETWORKS
     from teleop_core.chain.operators import OPERATORS
     from teleop_core.evaluation import METRICS
     from teleop_core.graph.stage import STAGES
@@ -300,7 +301,9 @@ def _parts(_: argparse.Namespace) -> int:
     from teleop_core.slave.plants import PLANTS
     from teleop_core.slave.world import WORLD_OBJECTS
 
-    parts = (OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, STAGES, METRICS)
+    parts = (
+        OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, NETWORKS, STAGES, METRICS,
+    )  # fmt: skip
     for registry in parts:
         print(f"{registry.kinds:14}{', '.join(registry)}")
     return 0
