@@ -121,10 +121,13 @@ def test_delay_to_one_reader_leaves_the_others_in_time(own_parts, plain):
     assert_same_streams(block, plain[:300])
 
 
-def test_slave_whose_setpoints_come_too_late_counts_as_not_following(plain):
-    block = session("teleop.delays=[slave/setpoint_cp=0.15]", ticks=400)
-    state = block["teleop_state"][200:, STATE["is_following"]]
-    assert not state.any()
+def test_slave_whose_setpoints_come_late_follows_once_they_come_and_while_newer_ones_do(plain):
+    stopped = "slave.operation.events=[stop@0.6]"
+    block = session("teleop.delays=[slave/setpoint_cp=0.15]", stopped, ticks=1100)
+    state = block["teleop_state"][:, STATE["is_following"]]
+    assert not state[:150].any()
+    assert state[200:600].all()
+    assert not state[600 + 150 + 110 :].any()
     assert plain["teleop_state"][200:400, STATE["is_following"]].all()
 
 
