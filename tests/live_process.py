@@ -63,8 +63,8 @@ class LiveProcess:
         wait_until(written, f"{text!r} of teleop live", timeout)
 
     def wait_running(self) -> None:
-        """Wait for a line of progress: of the first second, unless the machine is busy."""
-        line = re.compile(rf"\d/{self._duration:g} s  ")
+        """Wait for a line of progress by which the slave made a hundred ticks and more."""
+        line = re.compile(rf"\d/{self._duration:g} s  .* [1-9]\d\d+ Hz")
 
         def told() -> bool:
             assert self.process.poll() is None, self.text
