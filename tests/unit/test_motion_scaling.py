@@ -286,6 +286,18 @@ def test_slave_of_a_slow_master_may_be_silent_for_two_samples(silent, follows):
     assert desk.state("is_following") == float(follows)
 
 
+def test_after_a_pause_of_the_master_the_command_is_where_the_slave_is_by_then():
+    desk = Desk()
+    for _ in range(5):
+        desk.step((1 * MM, 0, 0))
+    desk.row["slave_setpoint_cp_ns"] = desk.row["master_measured_cp_ns"] - TICK_NS
+    desk.step((1 * MM, 0, 0), does_follow=False)
+    desk.row["slave_setpoint_cp_ns"] = desk.row["master_measured_cp_ns"]
+    desk.row["slave_setpoint_cp"][:3] += (0.01, 0.0, 0.02)
+    elsewhere = desk.row["slave_setpoint_cp"][:3].copy()
+    assert np.array_equal(desk.step((1 * MM, 0, 0), stamp_step_ns=3_000_000_000), elsewhere)
+
+
 @pytest.mark.parametrize("late", [2, 3, 40])
 def test_slave_follows_however_late_as_long_as_newer_commands_come_into_force(late):
     desk, step_ns = Desk(), 80_000_000

@@ -16,8 +16,8 @@ FOLLOWING_STATE: list[Field] = [
     ("in_force_ns", "i8"), ("rose_ns", "i8"), ("lag_ns", "i8"), ("lost_ns", "i8"),
     ("felt_ns", "i8"), ("felt_at_ns", "i8"),
 ]  # fmt: skip
-"""Stamp in force, when it rose last, how old it was then, since when it does not, stamp of the
-slave's force, and when that rose last."""
+"""Stamp in force; when it rose last, and how far behind the last command it was; since when the
+slave does not follow; stamp of the slave's force, and when that rose last [ns]."""
 
 
 @inner
@@ -30,7 +30,8 @@ def hear(s: Any, row: Any) -> None:
     """
     now_ns, stamp_ns = row.master_measured_cp_ns, row.slave_setpoint_cp_ns
     if stamp_ns > s.in_force_ns > NO_COMMAND_NS:
-        s.rose_ns, s.lag_ns = now_ns, now_ns - stamp_ns
+        # Against the last command: a pause of the master is no lag of the slave.
+        s.rose_ns, s.lag_ns = now_ns, s.last_ns - stamp_ns
     if row.slave_measured_cf_ns > s.felt_ns:
         s.felt_at_ns = now_ns
     s.in_force_ns, s.felt_ns = stamp_ns, row.slave_measured_cf_ns
