@@ -42,4 +42,4 @@ class NetworkNode(TickingNode):
             return False
         before_ns, stamp_ns = self._passed[topic], int(self.row[f"{topic.field}_ns"])
         self._passed[topic] = stamp_ns
-        return stamp_ns > before_ns or topic is NETWORK_SETPOINT_CP
+        return stamp_ns != before_ns or topic is NETWORK_SETPOINT_CP
