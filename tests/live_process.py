@@ -19,7 +19,9 @@ from teleop_core.bags.reader import Bag
 from teleop_core.nodes.chances import Chances
 
 TIMEOUT = 90.0
-QUICK = ("operator.approach_time=1.0", "operator.patience=0.0")
+CALM = "operation.longest_outage=0.0"
+"""A busy machine is no outage: no slave is paused because its session stood still."""
+QUICK = ("operator.approach_time=1.0", "operator.patience=0.0", CALM)
 
 
 class LiveProcess:

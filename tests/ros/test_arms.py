@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from rcl_interfaces.srv import GetParameters
 
+from live_process import CALM
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
@@ -71,7 +72,12 @@ def test_two_arms_are_recorded_together_and_scored_one_by_one(peer, session_unti
     # Ten processes need more than two processors: an arm that hears too seldom of its hand holds.
     moving = topics.SLAVE_MEASURED_JS if is_composed else topics.MASTER_MEASURED_CP
     listeners = {arm: peer.listen(moving.of_arm(arm)) for arm in robots}
-    settings = ["teleop.arms=[right, left]", "left/robot=puma560", "operator.approach_time=1.0"]
+    settings = [
+        "teleop.arms=[right, left]",
+        "left/robot=puma560",
+        "operator.approach_time=1.0",
+        CALM,
+    ]
     configuration = configure("coarse_box", settings=[*settings, "teleop.duration=600.0"])
     enough = {topic.of_arm(arm).name: 100 for arm in robots for topic in topics.STREAMS}
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from live_process import wait_until
+from live_process import CALM, wait_until
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.console.link import box_of
@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 def live(tmp_path_factory):
     """A session behind a page, its link, and where it is recorded."""
     out = tmp_path_factory.mktemp("console") / "bag"
-    texts = ["operator=remote", "teleop.duration=3600.0", "operator.patience=0.0"]
+    texts = ["operator=remote", "teleop.duration=3600.0", "operator.patience=0.0", CALM]
     said = []
     with ConsoleSession(api.configuration(None, texts=texts), out, said.append) as session:
         link = session.link()

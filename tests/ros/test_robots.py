@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from live_process import CALM
 from teleop_core.bags.messages import layout
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import pose_from_transform, rotation, transform
@@ -15,7 +16,9 @@ from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
-SHORT = ("teleop.duration=600.0", "operator.approach_time=0.5", "operator.size=[0.02, 0.02, 0.02]")
+SHORT = (
+    "teleop.duration=600.0", "operator.approach_time=0.5", "operator.size=[0.02, 0.02, 0.02]", CALM,
+)  # fmt: skip
 KINDS = ("rcrt1", "puma560", "stewart", "scara_stewart", "three_finger_hand")
 """Robots of each kind; the others go live by ``make soak``."""
 SLAVES = [
