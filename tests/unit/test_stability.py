@@ -1,139 +1,75 @@
-"""Stability: gains that let errors grow at the control rate are refused before they are taken."""
-
-from dataclasses import replace
+"""Stability: the boundary of one axis is the published one, ours lies next to it."""
 
 import numpy as np
 import pytest
 
-from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build
-from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots import ROBOTS, load_robot
-from teleop_core.slave.controllers import CONTROLLERS, register_controller
-from teleop_core.slave.controllers.source_pid import SOURCE_PID
-from teleop_core.slave.pair import ArmParameters, SimulatedArm
-from teleop_core.slave.plants import PLANTS
+from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.one_axis import Grip, exact_boundary, found_boundary, growth
+from teleop_lab.experiments.stability import DELAYS, GRIPS, STIFFEST, chain_boundary, fastest
+
+MEDIUM = GRIPS["medium"]
+PUBLISHED = {0.0: 24_200.0, 0.02: 708.0, 0.05: 394.0, 0.1: 318.0, 0.2: 301.0}
+"""Of a hand of 0.25 kg held with 300 N/m and 12 N·s/m [N/m]."""
 
 
-def slave(**values):
-    named = {name.replace("__", "."): value for name, value in values.items()}
-    return SimulatedArm(build(ArmParameters, {"robot": "rcrt1", "starts_at_home": True} | named))
+def largest_root(grip, delay, stiffness, dt=1e-3):
+    """Growth [1/s] of the hand before a spring whose force is held for a tick, by its matrix."""
+    ticks = round(delay / dt)
+    a = np.array([[0.0, 1.0], [-grip.stiffness / grip.mass, -grip.damping / grip.mass]])
+    # Exact step of the hand under a constant force, by a Taylor series.
+    whole, term, forced = np.eye(2), np.eye(2), dt * np.eye(2)
+    for k in range(1, 12):
+        term = term @ a * dt / k
+        whole, forced = whole + term, forced + term * dt / (k + 1)
+    b = forced @ np.array([0.0, 1.0 / grip.mass])
+    size = 2 + ticks
+    step = np.zeros((size, size))
+    step[:2, :2] = whole
+    if ticks:
+        step[:2, -1] = b
+        step[2, 0] = -stiffness
+        for i in range(3, size):
+            step[i, i - 1] = 1.0
+    else:
+        step[:2, 0] -= stiffness * b
+    return np.log(np.abs(np.linalg.eigvals(step)).max()) / dt
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"viscous": (1000.0,) * 6},
-        {"controller__pid__bandwidth": (300.0,) * 6},
-        {"controller__pid__bandwidth": (60.0, 60.0, 60.0, 500.0, 80.0, 80.0)},
-    ],
-    ids=["stiff friction", "too fast", "one joint too fast"],
-)
-def test_loops_in_which_an_error_grows_are_refused(values):
-    with pytest.raises(ParameterError, match="stable at 1000 Hz"):
-        slave(**values)
+@pytest.mark.parametrize("delay", DELAYS)
+def test_the_exact_boundary_is_the_published_one(delay):
+    assert exact_boundary(MEDIUM, delay) == pytest.approx(PUBLISHED[delay], rel=5e-3)
 
 
-def test_the_joint_that_runs_away_is_named():
-    with pytest.raises(ParameterError, match="joint 4"):
-        slave(controller__pid__bandwidth=(60.0, 60.0, 60.0, 500.0, 80.0, 80.0))
+@pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
+@pytest.mark.parametrize("delay", DELAYS)
+def test_the_exact_boundary_is_where_the_roots_of_the_sampled_hand_leave_the_circle(grip, delay):
+    exact = exact_boundary(grip, delay)
+    assert largest_root(grip, delay, 0.98 * exact) < 0.0 < largest_root(grip, delay, 1.02 * exact)
 
 
-def test_friction_that_is_stiff_for_the_steps_is_one_that_the_drive_cannot_follow_with_more():
-    stiff = (0.0, 0.0, 0.0, 5.0, 0.0, 0.0)
-    with pytest.raises(ParameterError, match="stable at 1000 Hz"):
-        slave(viscous=stiff, integration_steps=1)
-    with pytest.raises(ParameterError, match=r"comes back.*joint 4"):
-        slave(viscous=stiff, integration_steps=50)
+@pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
+@pytest.mark.parametrize("delay", DELAYS[1:])
+def test_our_hand_and_mapping_swing_up_where_the_exact_axis_does(grip, delay):
+    exact = exact_boundary(grip, delay)
+    assert growth(grip, delay, 0.9 * exact) < 0.0 < growth(grip, delay, 1.1 * exact)
 
 
-def test_refused_gains_leave_the_slave_as_it_was():
-    one, other = slave(), slave()
-    bad = build(ArmParameters, {
-        "robot": "rcrt1", "starts_at_home": True, "controller.pid.bandwidth": (500.0,) * 6
-    })  # fmt: skip
-    good = build(ArmParameters, {"robot": "rcrt1", "starts_at_home": True})
-    with pytest.raises(ParameterError):
-        one.retune(bad)
-    assert one.simulated.parameters["steps"] == other.simulated.parameters["steps"]
-    one.retune(good)
-    for k in range(500):
-        for arm in (one, other):
-            row = arm.signals
-            row["now_ns"] = row["slave_servo_jp_ns"] = 10**9 + k * 10**6
-            row["slave_servo_jp"] = arm.robot.home + 1e-4 * k
-            arm.step()
-    assert np.array_equal(one.signals["slave_measured_js"], other.signals["slave_measured_js"])
+def test_the_boundary_that_is_found_lies_where_nothing_grows():
+    found = found_boundary(MEDIUM, 0.02)
+    assert abs(growth(MEDIUM, 0.02, found)) < 0.05
+    assert growth(MEDIUM, 0.02, 0.97 * found) < 0.0 < growth(MEDIUM, 0.02, 1.03 * found)
 
 
-def unbounded_integral():
-    """The source's law as it is printed: nothing bounds its integral."""
-
-    @kernel
-    def control(
-        gains: Array, memory: Array, setpoint: Array, measured: Array, feedforward: Array,
-        limit: Array, dt: float, effort: Array,
-    ) -> None:  # fmt: skip
-        for i in range(effort.shape[0]):
-            error = setpoint[i] - measured[i]
-            memory[i, 0] += gains[i, 1] * dt * error
-            change = (error - memory[i, 1]) / dt
-            memory[i, 1] = error
-            effort[i] = gains[i, 0] * error + memory[i, 0] + gains[i, 2] * change + feedforward[i]
-
-    return replace(SOURCE_PID, name="unbounded", control=control)
+def test_a_heavier_hand_stands_a_late_spring_no_better_but_a_damped_one_does():
+    heavy, damped = Grip(0.5, 300.0, 12.0), Grip(0.25, 300.0, 24.0)
+    assert exact_boundary(heavy, 0.05) < exact_boundary(MEDIUM, 0.05)
+    assert exact_boundary(damped, 0.05) > exact_boundary(MEDIUM, 0.05)
 
 
-def test_a_loop_that_runs_away_after_a_stop_from_full_speed_is_refused():
-    law = unbounded_integral()
-    register_controller(law)
-    try:
-        with pytest.raises(ParameterError, match=r"comes back.*joint 3"):
-            slave(controller__kind=law.name)
-    finally:
-        CONTROLLERS.remove(law.name)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("robot", [name for name in ROBOTS.names() if load_robot(name).drives])
-def test_every_law_comes_back_from_full_speed_on_every_robot_and_plant(robot):
-    for law in CONTROLLERS.names():
-        for plant in PLANTS.names():
-            slave(robot=robot, controller__kind=law, plant__kind=plant)
-
-
-@pytest.mark.parametrize("law", CONTROLLERS.names())
-def test_gains_that_follow_nothing_are_refused(law):
-    weak = {f"controller__{law}__bandwidth": (0.1,) * 6}
-    with pytest.raises(ParameterError, match="comes back"):
-        slave(controller__kind=law, **weak)
-
-
-@pytest.mark.parametrize(
-    ("values", "reason"),
-    [
-        ({"coulomb": (1e9,) * 6}, "effort of its drive"),
-        ({"coulomb": (0.0, 0.0, 26.0, 0.0, 0.0, 0.0)}, "below 25.6 for joint 3"),
-        ({"plant__hardware__bias": (0.0, 1e3, 0.0, 0.0, 0.0, 0.0), "plant__kind": "hardware"},
-         "joint 2"),
-    ],
-    ids=["beyond all drives", "just beyond one", "bias alone"],
-)  # fmt: skip
-def test_friction_that_no_drive_moves_is_refused(values, reason):
-    with pytest.raises(ParameterError, match=reason):
-        slave(**values)
-
-
-def test_dry_friction_too_stiff_for_the_integrator_is_refused_and_taken_with_more_steps():
-    dry = (0.0, 0.0, 0.0, 0.1, 0.0, 0.0)
-    with pytest.raises(ParameterError, match="raise integration_steps"):
-        slave(coulomb=dry, integration_steps=1)
-    slave(coulomb=dry, integration_steps=20)
-
-
-def test_a_law_that_does_not_come_back_is_taken_where_small_errors_alone_are_tried():
-    weak = {"controller__pid__bandwidth": (0.1,) * 6}
-    slave(**weak, trials="small")
-    with pytest.raises(ParameterError, match="comes back"):
-        slave(**weak)
+def test_the_chain_throws_a_hand_above_its_boundary_unless_there_is_a_tank():
+    bench = Bench()
+    found = chain_boundary(bench, MEDIUM, 0.05, "none")
+    assert 600.0 < found < 1200.0
+    assert chain_boundary(bench, MEDIUM, 0.05, "tank") == STIFFEST
+    calm, thrown = (fastest(bench, MEDIUM, 0.05, share * found, "none") for share in (0.5, 2.0))
+    assert thrown > 2.0 * calm

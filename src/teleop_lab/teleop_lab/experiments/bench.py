@@ -161,6 +161,27 @@ class Bench:
         made = configuration(settings=given)
         return ArmParameters.of(made.group("slave"), made.group("slave_sim"))
 
+    def signals(
+        self, scenario: str, seconds: float, settings: Settings | None = None
+    ) -> Mapping[str, Array]:
+        """What the stages of a session say, a row for each tick, without its score: faster.
+
+        Args:
+            scenario: One of ``teleop scenarios``.
+            seconds: How long it lasts [s].
+            settings: Parameters over the scenario and the bench's settings.
+
+        Raises:
+            TeleopError: A setting or the scenario is wrong.
+        """
+        from teleop_core.session.api import configuration
+        from teleop_core.session.virtual import VirtualTime
+
+        given = {"seed": self.seed, **self._settings, **dict(settings or {})}
+        session = VirtualTime(configuration(scenario, settings=given))
+        rows = session.run(round(seconds * 1e3))
+        return {name: rows[name] for name in rows.dtype.names or ()}
+
     def _run(
         self, scenario: str, seed: int, settings: Settings
     ) -> tuple[Score, Mapping[str, Stream]]:

@@ -1,0 +1,145 @@
+"""Stability: how stiff a thing may be that the hand feels late, by delay, grip and passivity."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, Figure
+from teleop_lab.experiments.bench import Bench, Settings
+from teleop_lab.experiments.drawing import PUBLISHED, axis, joined, line
+from teleop_lab.experiments.experiment import Experiment
+from teleop_lab.experiments.one_axis import Grip, exact_boundary, found_boundary
+from teleop_lab.experiments.outcome import Findings, Row, percent
+
+GRIPS: Mapping[str, Grip] = {
+    "loose": Grip(0.25, 100.0, 5.0),
+    "medium": Grip(0.25, 300.0, 12.0),
+    "firm": Grip(0.25, 1000.0, 25.0),
+}
+"""Hands that hold the stylus: mass with the device, stiffness and damping; assumed."""
+DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2)
+"""By which the force comes later [s]."""
+SOFTEST, STIFFEST = 20.0, 50_000.0
+"""Objects that are tried [N/m]: softer than tissue, and steel."""
+_ROUNDS = 8
+_SECONDS = 8.0  # of each session: two touches
+_TOUCH = 2000  # ticks before the tip is on its path
+_WINDOW = 20  # ticks over which a speed is taken: steps of the reading are small beside its way
+_THROWN = 2.0
+"""A hand is thrown that gets so many times as fast as the same hand without any object."""
+_COLORS = (FIRST, SECOND, FIXTURE)
+_APPARENT_MASS = 0.045
+
+
+def _settings(grip: Grip, delay: float, stiffness: float, passivity: str) -> Settings:
+    return {
+        "world.material": "own", "world.stiffness": stiffness, "world.damping": 0.0,
+        "world.friction_coefficient": 0.0, "reflection.max_force": 10.0, "feedback_timeout": 1.0,
+        "reflection.passivity": passivity, "hand.mass": grip.mass - _APPARENT_MASS,
+        "hand.stiffness": grip.stiffness, "hand.damping": grip.damping,
+        "delays": (f"slave/measured_cf@motion_scaling={delay + 1e-3}",),
+    }  # fmt: skip
+
+
+def fastest(bench: Bench, grip: Grip, delay: float, stiffness: float, passivity: str) -> float:
+    """Fastest that the hand gets [m/s] in ``palpation``, of an object without damper or friction.
+
+    Args:
+        bench: Where it runs.
+        grip: The hand.
+        delay: By which the force comes later [s].
+        stiffness: Of the object [N/m].
+        passivity: ``none`` or ``tank``.
+    """
+    rows = bench.signals("palpation", _SECONDS, _settings(grip, delay, stiffness, passivity))
+    place = rows["master_measured_cp"][_TOUCH:, :3]
+    ways = np.linalg.norm(place[_WINDOW:] - place[:-_WINDOW], axis=1)
+    return float(ways.max()) / (_WINDOW * 1e-3)
+
+
+def chain_boundary(bench: Bench, grip: Grip, delay: float, passivity: str) -> float:
+    """Stiffness [N/m] up to which the whole chain leaves the hand calm, from 20 to 50 000 N/m.
+
+    The device has its friction and its steps, the arm its lag and the reference its filter.
+    """
+    most = _THROWN * fastest(bench, grip, 0.0, SOFTEST, "none")
+
+    def is_calm(stiffness: float) -> bool:
+        return fastest(bench, grip, delay, stiffness, passivity) <= most
+
+    if is_calm(STIFFEST):
+        return STIFFEST
+    low, high = SOFTEST, STIFFEST
+    for _ in range(_ROUNDS):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if is_calm(middle) else (low, middle)
+    return low
+
+
+def _measure(bench: Bench) -> Findings:
+    rows, found = [], {}
+    total, done = len(GRIPS) * len(DELAYS), 0
+    for name, grip in GRIPS.items():
+        for delay in DELAYS:
+            told = f"force {1e3 * delay:.0f} ms later"
+            exact = exact_boundary(grip, delay)
+            rows.append(
+                Row(quantity=told, unit="N/m", published=exact,
+                    predicted=found_boundary(grip, delay), within=percent(10.0),
+                    group=f"one axis before a spring, {name} grip",
+                    note="the graph takes a tick and more by itself" if delay == 0.0 else "")
+            )  # fmt: skip
+            found[name, delay] = tuple(
+                chain_boundary(bench, grip, delay, passivity) for passivity in ("none", "tank")
+            )
+            done += 1
+            bench.progress(done, total)
+    for k, passivity in enumerate(("none", "tank")):
+        rows += [
+            Row(quantity=f"force {1e3 * delay:.0f} ms later", unit="N/m",
+                predicted=found[name, delay][k],
+                group=f"whole chain, {name} grip, passivity {passivity}",
+                note="stiffest tried" if found[name, delay][k] == STIFFEST else "")
+            for name in GRIPS for delay in DELAYS
+        ]  # fmt: skip
+    return Findings(tuple(rows), (_figure(found),), _NOTES)
+
+
+_NOTES = (
+    "One axis, published: the exact boundary of a mass on spring and damper before a spring whose "
+    "force comes late, with half a tick for its hold; predicted: our hand, device without friction "
+    "or steps, and mapping.",
+    f"Whole chain: stiffness up to which the hand in palpation gets no more than {_THROWN:g} times "
+    "as fast as without delay on the softest object. Slow swinging takes longer to grow than the "
+    f"{_SECONDS:g} s of a session, so long delays read high.",
+    "The object is a spring alone. Grips are assumed.",
+)
+
+
+def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
+    delays = 1e3 * np.array(DELAYS)
+    smooth = np.linspace(0.0, DELAYS[-1], 101)
+    traces = []
+    for (name, grip), color in zip(GRIPS.items(), _COLORS, strict=True):
+        exact = np.array([exact_boundary(grip, delay) for delay in smooth])
+        whole, tank = np.array([found[name, delay] for delay in DELAYS]).T
+        traces += [
+            {**line(1e3 * smooth, exact, f"{name}, one exact axis", color, 1.2, "N/m"),
+             "line": {"color": color, "width": 1.2, "dash": "dot"}},
+            joined(delays, whole, f"{name}, whole chain", color, "N/m"),
+        ]  # fmt: skip
+        if name == "medium":
+            traces.append(joined(delays, tank, "with a tank, stiffest tried", PUBLISHED, "N/m"))
+    layout = {"xaxis": axis("the force comes later by", "ms"),
+              "yaxis": axis("stiffness", "N/m", type="log")}  # fmt: skip
+    sentence = "Below its line a hand stays calm, above it it is thrown by what it feels late."
+    return Figure("How stiff a thing may be", sentence, traces, layout, 460)
+
+
+STABILITY = Experiment(
+    "stability",
+    "how stiff a thing may be whose force comes late, by grip, with passivity and without",
+    "exact boundary of one axis",
+    _measure,
+)
