@@ -50,7 +50,7 @@ def test_hand_and_slave_draw_the_circle_of_the_table(tmp_path):
 
 def test_own_fixture_holds_the_hand_as_the_built_in_ones_do(tmp_path):
     text = run("own_fixture", tmp_path)
-    assert re.findall(r"(\w+): slave", text) == ["box", "sphere", "cylinder"]
+    assert re.findall(r"(\w+): slave", text) == ["box", "sphere", "pill"]
     depths = numbers(r"at most ([\d.]+) mm", text)
     assert len(depths) == 3
     assert all(0.1 < depth < 4.0 for depth in depths)
@@ -215,7 +215,7 @@ def test_arms_are_led_closer_once_they_are_calibrated(tmp_path):
 
 def test_commands_take_the_parts_of_the_examples(tmp_path):
     files = [text for name in PARTS for text in ("--parts", str(EXAMPLES / f"{name}.py"))]
-    settings = ["fixture=cylinder", "controller=following", "robot=gantry",
+    settings = ["fixture=pill", "controller=following", "robot=gantry",
                 "stages=[velocity_limit, hand_damping]"]  # fmt: skip
     teleop = [sys.executable, "-m", "teleop_core.cli", *files]
     out = str(tmp_path / "bag")
@@ -226,7 +226,7 @@ def test_commands_take_the_parts_of_the_examples(tmp_path):
             [*teleop, *arguments], capture_output=True, text=True, timeout=300, check=False
         )
         assert done.returncode == 0, done.stderr
-    assert "cylinder on for" in done.stdout
+    assert "pill on for" in done.stdout
     (score,) = json.loads(Path(scores).read_text(encoding="utf-8"))
     assert "velocity_limit" in score["latency_ms"]  # of nothing in virtual time: no row says so
     assert "jerk" in done.stdout

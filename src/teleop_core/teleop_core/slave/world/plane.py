@@ -39,14 +39,23 @@ def plane_distance(offset: Array, shape: Array, normal: Array) -> float:
     return above
 
 
-def plane_outline(parameters: PlaneParameters) -> Array:
-    """A square of 100 mm around the middle, (5, 3) [m]."""
-    normal = np.array(parameters.normal) / length(parameters.normal)
+def across(normal: Array) -> tuple[Array, Array]:
+    """Two vectors (3,) of length 1 at right angles to a normal (3,) and to each other."""
     first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     first /= length(first)
-    second = np.cross(normal, first)
+    return first, np.cross(normal, first)
+
+
+def square(normal: Array) -> Array:
+    """A square of 100 mm around the middle, (5, 3) [m], across a normal (3,) of length 1."""
+    first, second = across(normal)
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
     return _DRAWN * np.array([a * first + b * second for a, b in corners])
+
+
+def plane_outline(parameters: PlaneParameters) -> Array:
+    """A square of 100 mm around the middle, (5, 3) [m]."""
+    return square(np.array(parameters.normal) / length(parameters.normal))
 
 
 PLANE = WorldObject("plane", PlaneParameters, plane_distance, plane_outline)

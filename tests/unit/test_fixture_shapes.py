@@ -1,0 +1,341 @@
+"""Shapes of fixtures: every one leads from a place to the nearest one that is allowed.
+
+What is allowed is said a second time here, in another way: in axes turned to the shape, by angles,
+or by points close together along a path.
+"""
+
+import hashlib
+import itertools
+import math
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.chain.fixtures import FIXTURES, shape_of
+from teleop_core.chain.fixtures.box import BoxParameters
+from teleop_core.chain.fixtures.cone import ConeParameters
+from teleop_core.chain.fixtures.cylinder import CylinderParameters
+from teleop_core.chain.fixtures.half_space import HalfSpaceParameters
+from teleop_core.chain.fixtures.keep_out_box import KeepOutBoxParameters
+from teleop_core.chain.fixtures.keep_out_sphere import KeepOutSphereParameters
+from teleop_core.chain.fixtures.line import LineParameters
+from teleop_core.chain.fixtures.path import PathParameters, path_depth
+from teleop_core.chain.fixtures.sphere import SphereParameters
+from teleop_core.chain.mapping.parameters import FixtureParameters
+
+# Sums and products of numbers below one.
+ROUNDING = 1e-14
+# Of angles and turned axes, in which the second description is.
+TURNED = 1e-12
+# Shallower places are not compared with points around them [m].
+SHALLOW = 1e-6
+PER_PIECE = 2001
+
+lengths = st.floats(1e-3, 0.1)
+places = st.tuples(*[st.floats(-0.1, 0.1)] * 3)
+directions = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 1e-3)
+sizes = st.tuples(lengths, lengths, lengths)
+endings = st.one_of(st.just(0.0), lengths)
+
+
+def valid(group, **values):
+    """Groups of parameters, those that do not fit together left out."""
+
+    def make(chosen):
+        try:
+            return group(**chosen)
+        except ParameterError:
+            return None
+
+    return st.fixed_dictionaries(values).map(make).filter(lambda made: made is not None)
+
+
+KINDS = {
+    "box": valid(BoxParameters, size=sizes),
+    "sphere": valid(SphereParameters, diameter=lengths),
+    "cylinder": valid(CylinderParameters, diameter=lengths, length=endings, direction=directions),
+    "half_space": valid(HalfSpaceParameters, normal=directions, room=st.floats(0.0, 0.1)),
+    "cone": st.builds(
+        lambda axis, far, half: ConeParameters(
+            axis=axis, half_angle=half, apex=tuple(-far * x / math.hypot(*axis) for x in axis)
+        ),
+        directions, lengths, st.floats(0.05, 1.5),
+    ),
+    "line": valid(
+        LineParameters, direction=directions, tolerance=st.floats(0.0, 0.02), length=endings
+    ),
+    "path": valid(
+        PathParameters, tolerance=st.floats(0.0, 0.02),
+        points=st.lists(places, min_size=1, max_size=5).map(lambda rows: sum(rows, ())),
+    ),
+    "keep_out_sphere": valid(KeepOutSphereParameters, place=places, diameter=lengths),
+    "keep_out_box": valid(KeepOutBoxParameters, place=places, size=sizes),
+}  # fmt: skip
+
+
+# What is allowed, said a second time: how far beyond it a point (..., 3) is, by some measure [m].
+
+
+def beyond_cylinder(p, points):
+    x, y, z = np.moveaxis(turned(p.direction, points), -1, 0)
+    ends = np.abs(z) - 0.5 * p.length if p.length else np.full(z.shape, -1.0)
+    return np.maximum(np.hypot(x, y) - 0.5 * p.diameter, ends)
+
+
+def beyond_half_space(p, points):
+    return -p.room - turned(p.normal, points)[..., 2]
+
+
+def beyond_cone(p, points):
+    x, y, z = np.moveaxis(turned(p.axis, points - np.array(p.apex)), -1, 0)
+    far, angle = np.hypot(np.hypot(x, y), z), np.arctan2(np.hypot(x, y), z)
+    return far * (angle - p.half_angle)
+
+
+def beyond_line(p, points):
+    x, y, z = np.moveaxis(turned(p.direction, points), -1, 0)
+    over = np.maximum(np.abs(z) - 0.5 * p.length, 0.0) if p.length else 0.0
+    return np.sqrt(x**2 + y**2 + over**2) - p.tolerance
+
+
+def beyond_path(p, points):
+    along = pieces(p).reshape(-1, 3)
+    apart = [np.linalg.norm(point - along, axis=1).min() for point in points.reshape(-1, 3)]
+    return np.reshape(apart, points.shape[:-1]) - p.tolerance
+
+
+def turned(direction, points):
+    """Points in axes at right angles whose z is a direction; no matter how the others look."""
+    axes = np.linalg.svd(np.array([direction]))[2]  # rows: the direction or against it, two others
+    z = points @ (np.array(direction) / math.hypot(*direction))
+    return np.stack((points @ axes[1], points @ axes[2], z), axis=-1)
+
+
+def pieces(p):
+    """Points close together along every piece of a path, (pieces, PER_PIECE, 3)."""
+    corners = np.vstack((np.zeros(3), np.reshape(p.points, (-1, 3))))
+    share = np.linspace(0.0, 1.0, PER_PIECE)[:, None]
+    return np.stack([a + share * (b - a) for a, b in itertools.pairwise(corners)])
+
+
+BEYOND = {
+    "box": lambda p, x: (np.abs(x) - 0.5 * np.array(p.size)).max(axis=-1),
+    "sphere": lambda p, x: np.linalg.norm(x, axis=-1) - 0.5 * p.diameter,
+    "cylinder": beyond_cylinder,
+    "half_space": beyond_half_space,
+    "cone": beyond_cone,
+    "line": beyond_line,
+    "path": beyond_path,
+    "keep_out_sphere": lambda p, x: 0.5 * p.diameter - np.linalg.norm(x - p.place, axis=-1),
+    "keep_out_box": lambda p, x: (0.5 * np.array(p.size) - np.abs(x - p.place)).min(axis=-1),
+}
+THIN = {"line", "path"}
+"""Those that may have no room at all: points around a place would miss them."""
+
+
+def a_ball_of_points():
+    """Points (N, 3) that fill a ball of radius 1, most of them near its surface."""
+    rng = np.random.default_rng(1)
+    rays = rng.normal(size=(6000, 3))
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    return rays * (1.0 - 1e-6 - np.repeat([0.0, 1e-3, 0.02, 0.2, 0.5, 0.9], 1000))[:, None]
+
+
+BALL = a_ball_of_points()
+
+
+def a_place(data, parameters):
+    """Place (3,) [m] to try: one of all, or, beside a forbidden body, one within its size."""
+    offset = np.array(data.draw(places))
+    if not hasattr(parameters, "place"):
+        return offset
+    size = getattr(parameters, "size", None) or (parameters.diameter,) * 3
+    return np.array(parameters.place) + 5.5 * offset * size  # a tenth more than it is wide
+
+
+def found(name, parameters, offset):
+    """Depth and way of a fixture at a place (3,)."""
+    out = np.full(3, math.nan)
+    depth = FIXTURES.find(name).depth(np.array(offset, dtype=float), shape_of(parameters), out)
+    return depth, out
+
+
+def test_every_fixture_there_is_is_tried_here():
+    assert set(FIXTURES.names()) == set(KINDS) == set(BEYOND)
+
+
+@pytest.mark.parametrize("name", KINDS)
+@given(st.data())
+def test_way_is_as_long_as_the_depth_and_leads_from_a_place_that_is_allowed(name, data):
+    parameters = data.draw(KINDS[name])
+    offset = a_place(data, parameters)
+    depth, way = found(name, parameters, offset)
+    assert depth >= 0.0
+    assert math.isclose(np.linalg.norm(way), depth, rel_tol=TURNED, abs_tol=ROUNDING)
+    assert found(name, parameters, offset - way)[0] <= ROUNDING
+    off = step_of(parameters) if name == "path" else TURNED
+    assert BEYOND[name](parameters, offset - way) <= off
+    if BEYOND[name](parameters, offset) <= 0.0:
+        assert depth <= TURNED
+
+
+def step_of(p):
+    """Largest distance from one of the points along a path to the next [m]."""
+    return np.linalg.norm(np.diff(pieces(p), axis=1), axis=-1).max() + TURNED
+
+
+@pytest.mark.parametrize("name", [name for name in KINDS if name not in THIN])
+@given(st.data())
+def test_no_place_that_is_allowed_is_nearer_than_the_depth(name, data):
+    parameters = data.draw(KINDS[name])
+    offset = a_place(data, parameters)
+    depth, _ = found(name, parameters, offset)
+    assume(depth > SHALLOW)
+    assert (BEYOND[name](parameters, offset + depth * BALL) > 0.0).all()
+
+
+@given(KINDS["line"], places)
+def test_depth_beside_a_line_is_the_distance_from_it_beyond_what_is_free(p, offset):
+    expected = max(float(beyond_line(p, np.array(offset))), 0.0)
+    assert math.isclose(found("line", p, offset)[0], expected, abs_tol=TURNED)
+
+
+@given(KINDS["path"], places)
+@settings(max_examples=200)
+def test_depth_beside_a_path_is_the_distance_from_the_nearest_of_its_points(p, offset):
+    apart = float(beyond_path(p, np.array(offset))) + p.tolerance
+    half = 0.5 * step_of(p)
+    depth, _ = found("path", p, offset)
+    nearest = math.sqrt(max(apart * apart - half * half, 0.0))
+    assert nearest - p.tolerance - ROUNDING <= depth <= max(apart - p.tolerance, 0.0) + ROUNDING
+
+
+@pytest.mark.parametrize("name", KINDS)
+@given(st.data())
+def test_depth_changes_by_no_more_than_one_moves(name, data):
+    parameters = data.draw(KINDS[name])
+    here, there = a_place(data, parameters), a_place(data, parameters)
+    share = data.draw(st.sampled_from([1.0, 1e-3, 1e-6]))
+    there = here + share * (there - here)
+    change = abs(found(name, parameters, here)[0] - found(name, parameters, there)[0])
+    assert change <= np.linalg.norm(there - here) + ROUNDING
+
+
+@pytest.mark.parametrize("name", KINDS)
+@given(st.data())
+def test_outline_is_drawn_where_the_wall_is(name, data):
+    part, parameters = FIXTURES.find(name), data.draw(KINDS[name])
+    points = part.outline(parameters)
+    points = points[np.isfinite(points).all(axis=1)]
+    beyond = BEYOND[name](parameters, points)
+    if name in THIN:  # the line itself, in the middle of what is free
+        beyond = beyond + parameters.tolerance
+    assert np.abs(beyond).max() <= 1e-9
+
+
+@pytest.mark.parametrize("name", KINDS)
+@given(st.data())
+def test_middle_of_a_fixture_is_allowed_whatever_its_parameters(name, data):
+    assert found(name, data.draw(KINDS[name]), np.zeros(3))[0] <= ROUNDING
+
+
+# Ends, ties and fixed directions.
+
+
+def test_a_tube_and_a_line_of_length_zero_have_no_ends():
+    far = np.array([0.0, 50.0, 0.0])
+    assert found("cylinder", CylinderParameters(length=0.0), far)[0] == 0.0
+    assert found("cylinder", CylinderParameters(length=0.1), far)[0] == 49.95
+    upright = (0.0, 1.0, 0.0)
+    assert found("line", LineParameters(direction=upright), far)[0] == 0.0
+    short = LineParameters(direction=upright, length=0.1, tolerance=0.0)
+    assert found("line", short, far)[0] == 49.95
+
+
+def test_beyond_its_tip_a_cone_leads_to_the_tip():
+    depth, way = found("cone", ConeParameters(), np.array([0.0, -0.05, 0.0]))
+    assert math.isclose(depth, 0.02)
+    assert np.allclose(way, (0.0, -0.02, 0.0), rtol=0, atol=ROUNDING)
+
+
+def test_the_earlier_of_two_pieces_leads_where_both_are_equally_near():
+    # There and back 20 mm beside it: the point is halfway.
+    p = PathParameters(points=(0.1, 0.0, 0.0, 0.1, 0.02, 0.0, 0.0, 0.02, 0.0), tolerance=0.0)
+    depth, way = found("path", p, np.array([0.05, 0.01, 0.0]))
+    assert (depth, way.tolist()) == (0.01, [0.0, 0.01, 0.0])
+
+
+def test_a_piece_of_no_length_is_a_point():
+    p = PathParameters(points=(0.0, 0.0, 0.0), tolerance=0.0)
+    assert found("path", p, np.array([0.0, 0.03, 0.0]))[0] == 0.03
+
+
+def test_the_middle_of_what_is_forbidden_has_a_way_out():
+    ball, block = KeepOutSphereParameters(), KeepOutBoxParameters(size=(0.04, 0.03, 0.02))
+    assert found("keep_out_sphere", ball, ball.place)[1].tolist() == [0.0, 0.0, -0.015]
+    assert found("keep_out_box", block, block.place)[1].tolist() == [0.0, 0.0, -0.01]
+
+
+def test_a_path_takes_64_points_and_no_more():
+    most = PathParameters(points=(0.01, 0.0, 0.0) * 64)
+    out = np.empty(3)
+    assert path_depth(np.array([0.01, 0.0, 0.0]), shape_of(most), out) == 0.0
+    with pytest.raises(ParameterError) as error:
+        PathParameters(points=(0.01, 0.0, 0.0) * 65)
+    assert error.value.name == "path.points"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("cylinder.direction", (0.0, 0.0, 0.0)),
+        ("line.direction", (0.0, 1e-200, 0.0)),
+        ("half_space.normal", (0.0, 0.0, 0.0)),
+        ("cone.axis", (0.0, 0.0, 0.0)),
+        ("cone.apex", (0.0, 0.03, 0.0)),  # the hand would be beyond the tip
+        ("cone.apex", (0.03, -0.03, 0.0)),
+        ("path.points", ()),
+        ("path.points", (0.01, 0.0)),
+        ("keep_out_sphere.place", (0.0, 0.01, 0.0)),
+        ("keep_out_box.place", (0.0, 0.01, 0.0)),
+    ],
+)
+def test_numbers_that_do_not_fit_together_are_refused_by_name(name, value):
+    with pytest.raises(ParameterError) as error:
+        build(FixtureParameters, {name: value})
+    assert (error.value.name, error.value.value) == (name, value)
+
+
+DIGEST = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from test_fixture_shapes import digest
+print(digest())
+"""
+
+
+def digest():
+    """Digest of depths and ways of all kinds at forty places."""
+    seen = hashlib.sha256()
+    for name in KINDS:
+        part = FIXTURES.find(name)
+        shape, out = shape_of(part.parameters()), np.empty(3)
+        for offset in np.random.default_rng(2).uniform(-0.06, 0.06, (40, 3)):
+            seen.update(np.float64(part.depth(offset, shape, out)).tobytes() + out.tobytes())
+    return seen.hexdigest()
+
+
+def test_depths_have_the_same_bits_compiled_and_as_plain_python():
+    plain = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", DIGEST, os.path.dirname(__file__)],
+        capture_output=True, text=True, timeout=300, check=True, env=plain,
+    )  # fmt: skip
+    assert done.stdout.strip() == digest()
