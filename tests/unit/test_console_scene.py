@@ -7,8 +7,9 @@ import pytest
 import trimesh
 
 import teleop_core as tc
+from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.console.body_nodes import ROLES
-from teleop_core.console.fixture_outlines import unit_outline
+from teleop_core.console.fixture_outlines import Look, scale_of, unit_outline
 from teleop_core.console.link import Arm, ArmView, View
 from teleop_core.console.look import GOOD, WRONG
 from teleop_core.console.recorded import RecordedLink
@@ -255,7 +256,41 @@ def test_meshes_are_closed_look_outwards_and_have_the_volume_of_their_solid(kind
     np.testing.assert_allclose(mesh.center_mass, pose[:3], atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["box", "sphere", "of another program"])
+@pytest.mark.parametrize("kind", ["box", "sphere", "cylinder", "cone", "of another program"])
 def test_outlines_are_one_long_along_each_axis(kind):
-    points = unit_outline(kind).reshape(-1, 3)
+    points = unit_outline(Look(kind)).reshape(-1, 3)
     np.testing.assert_allclose(np.ptp(points, axis=0), 1.0)
+
+
+TURNED = {
+    "cylinder": {"direction": (0.3, 0.4, -0.2), "length": 0.0},
+    "half_space": {"room": 0.02},  # flat, and not through the middle
+    "cone": {"axis": (0.1, 1.0, 0.0), "half_angle": 0.6},
+    "line": {"direction": (0.0, 0.0, 1.0), "length": 0.03},
+    "path": {"points": (0.01, 0.0, 0.0, 0.01, 0.0, 0.03)},
+    "keep_out_sphere": {"place": (0.0, 0.04, 0.01)},
+    "keep_out_box": {"size": (0.01, 0.02, 0.03)},
+}
+
+
+@pytest.mark.parametrize("kind", FIXTURES.names())
+def test_outlines_are_those_of_the_fixtures_with_their_parameters(kind):
+    part, values, gain = FIXTURES.find(kind), TURNED.get(kind, {}), 0.2
+    parameters = part.parameters(**values)
+    unit = unit_outline(Look(kind, tuple(values.items())))
+    points = (unit * scale_of(unit, gain * part.size(parameters), gain)).reshape(-1, 3)
+    outline = gain * part.outline(parameters)
+    outline = outline[np.isfinite(outline).all(axis=1)]
+    near = np.linalg.norm(points[:, None] - outline, axis=2).min(axis=1)
+    assert near.max() < 1e-12
+    np.testing.assert_allclose(np.ptp(points, axis=0), np.ptp(outline, axis=0), atol=1e-12)
+
+
+def test_the_scene_draws_a_fixture_where_its_parameters_have_it(server):
+    session = tc.run("coarse_box", duration=5.0, fixture="half_space",
+                     fixture__half_space__room=0.02)  # fmt: skip
+    scene, view = drawn(server, RecordedLink(session.bag), 4.5)
+    assert view.arms[""].state["is_fixture_on"]
+    line = scene.arms[""].master.outline.line
+    below = line.scale[1] * line.points.reshape(-1, 3)[:, 1]
+    np.testing.assert_allclose(below, -0.02, atol=1e-6)

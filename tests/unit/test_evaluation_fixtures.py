@@ -12,10 +12,10 @@ from recipes import START_NS, Recipe, state
 from teleop_core.base.errors import EvaluationError
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.fixtures import Fixture, register_fixture
+from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
 from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin
-from teleop_core.evaluation.reported_fixture import ReportedFixture
 from teleop_core.evaluation.rows import summary
 from teleop_core.evaluation.scoring import evaluate, study
 from teleop_core.graph.signals import TICK_NS

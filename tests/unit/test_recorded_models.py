@@ -16,12 +16,15 @@ import teleop_core as tc
 from teleop_core.bags.markers import Marker, Shape, marker_message
 from teleop_core.bags.transforms import TransformMessages
 from teleop_core.base.errors import ShapeError, UnknownNameError
-from teleop_core.chain.fixtures.sphere import SPHERE
+from teleop_core.base.parameters import values_of
+from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.chain.mapping.parameters import axis_map
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.session.markers import FORCE_SCALE, TAIL, ArmMarkers
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 ROUNDING = 1e-12
+SOLID = ("box", "sphere")
 
 
 def messages(path: Path, topic: str) -> list[Any]:
@@ -213,13 +216,31 @@ def test_markers_are_read_as_they_were_drawn() -> None:
 
 def test_a_fixture_is_drawn_where_the_state_says_and_red_while_it_is_touched() -> None:
     arm = ArmMarkers("left")
-    free, touched = arm.fixture(STATE, "box"), arm.fixture(STATE, SPHERE.name, force=1.0)
-    assert free.frame == "left/master_base"
+    free = arm.fixture(STATE, {})
+    touched = arm.fixture(STATE, {"fixture": "sphere", "fixture.diameter": "0.03"}, force=1.0)
+    assert free.frame == "left/slave_base"
     assert (free.pose[:3].tolist(), free.scale) == ([0.1, 0.2, 0.3], (0.02, 0.03, 0.04))
     assert (free.shape, touched.shape) == (Shape.CUBE, Shape.SPHERE)
     assert touched.color[0] > touched.color[2]
     assert free.color[0] < free.color[2]
-    assert not arm.fixture({}, "box").is_shown
+    assert not arm.fixture({}, {}).is_shown
+    assert arm.fixture(STATE, {"fixture": "of another program"}).shape == Shape.CUBE
+
+
+@pytest.mark.parametrize("kind", [name for name in FIXTURES.names() if name not in SOLID])
+def test_other_fixtures_are_drawn_along_their_edges_around_the_slave(kind: str) -> None:
+    part = FIXTURES.find(kind)
+    values = {f"fixture.{n}": repr(v) for n, v in values_of(part.parameters()).items()}
+    axes = axis_map("axes", ("+y", "-x", "+z"))
+    marker = ArmMarkers("left", axes).fixture(STATE | {"gain": 0.5}, {"fixture": kind} | values)
+    assert (marker.shape, marker.pose[:3].tolist()) == (Shape.LINE_LIST, [0.1, 0.2, 0.3])
+    outline = part.outline(part.parameters())
+    outline = outline[np.isfinite(outline).all(axis=1)]
+    places = 2.0 * marker.points @ axes  # back to the master's axes and the hand's size
+    near = np.linalg.norm(places[:, None] - outline, axis=2).min(axis=1)
+    assert near.max() < ROUNDING
+    np.testing.assert_allclose(np.ptp(places, axis=0), np.ptp(outline, axis=0), atol=ROUNDING)
+    assert len(marker.points) % 2 == 0
 
 
 def test_a_force_is_an_arrow_from_the_stylus_of_its_length() -> None:

@@ -32,6 +32,7 @@ class Shape(IntEnum):
     CUBE = 1
     SPHERE = 2
     LINE_STRIP = 4
+    LINE_LIST = 5
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,8 @@ import numpy as np
 import viser
 
 from teleop_core.base.errors import TeleopError
-from teleop_core.chain.fixtures.box import BOX
 from teleop_core.console.body_nodes import BodyNodes, extent
-from teleop_core.console.fixture_outlines import OutlineNode
+from teleop_core.console.fixture_outlines import Look, OutlineNode, scale_of, unit_outline
 from teleop_core.console.link import Arm, ArmView, box_of
 from teleop_core.console.look import MEASURED, WANTED, Color
 from teleop_core.console.master_nodes import MasterNodes
@@ -50,7 +49,7 @@ class ArmNodes:
         bodies: Bodies of its robot.
         low: Lowest corner (3,) [m] of what arm and master take, in slave_base.
         high: Highest corner (3,) [m].
-        fixture_kind: Name of the kind of its fixture.
+        fixture: What its fixture is.
         recorded_path: Where paths come from when time jumps; None where nothing is recorded.
     """
 
@@ -71,7 +70,7 @@ class ArmNodes:
         self._axes = PUBLISHED_AXES
         self._stand = stand_beside(self._own_low, self._own_high, self._axes)
         self.master = MasterNodes(server, f"{self.path}/master", self._stand)
-        self.fixture_kind = BOX.name
+        self.fixture = Look()
         self.outline = OutlineNode(server, f"{self.path}/fixture", self._stand.quaternion)
         self._poses = self.drawn.move(start)
         self._begin: Array | None = None
@@ -184,11 +183,12 @@ class ArmNodes:
             return
         center, size = box
         along = np.abs(self._axes.T) @ size  # the master's axes are the slave's, named otherwise
-        kind = self.fixture_kind
-        self.outline.draw(kind, center, along, is_touched=is_touched)
+        look, unit = self.fixture, unit_outline(self.fixture)
+        scale = scale_of(unit, along, gain)
+        self.outline.draw(look, center, scale, is_touched=is_touched)
         if hand is not None and command is not None:
             around = hand[:3] + self._axes.T @ (center - command[:3]) / gain
-            self.master.outline.draw(kind, around, along / gain, is_touched=is_touched)
+            self.master.outline.draw(look, around, scale / gain, is_touched=is_touched)
 
     def _at_limit(self, joints: Array, state: dict[str, float]) -> frozenset[int]:
         """Joints that are at the ends of their ranges, or that the session says are."""

@@ -10,6 +10,7 @@ from teleop_core.chain.mapping.parameters import axis_map
 from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.console.arm_nodes import ArmNodes, Path
 from teleop_core.console.cameras import ASPECT, FIELD, Camera, around, from_tool, microscope
+from teleop_core.console.fixture_outlines import Look
 from teleop_core.console.link import Arm, Parameters, View
 from teleop_core.console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
 from teleop_core.console.stand import PUBLISHED_AXES
@@ -86,7 +87,7 @@ class Scene:
                 if (axes := parameters.get((node, "axes"))) is not None:
                     nodes.turn_master(_map(axes.value))
                 if (kind := parameters.get((node, "fixture.kind"))) is not None:
-                    nodes.fixture_kind = str(kind.value)
+                    nodes.fixture = _look(parameters, node, str(kind.value))
                 self._show_targets(nodes, targets_of(parameters, name))
 
     def _show_targets(self, nodes: ArmNodes, points: Array) -> None:
@@ -181,6 +182,17 @@ class Scene:
         first, camera = self.work(), self._server.initial_camera
         camera.fov, camera.up = FIELD, first.up
         camera.position, camera.look_at = first.position, first.look_at
+
+
+def _look(parameters: Parameters, node: str, kind: str) -> Look:
+    """What the fixture of a node is."""
+    start = f"fixture.{kind}."
+    values = (
+        (name.removeprefix(start), info.value)
+        for (owner, name), info in parameters.items()
+        if owner == node and name.startswith(start)
+    )
+    return Look(kind, tuple(values))
 
 
 def _map(axes: object) -> Array:

@@ -64,7 +64,7 @@ def mode_text(arm: ArmView) -> str:
 
 def fixture_text(arm: ArmView) -> str:
     """Whether the fixture of an arm is on, in words; empty before it has said that."""
-    return ("box on" if arm.state["is_fixture_on"] else "no box") if arm.state else ""
+    return ("on" if arm.state["is_fixture_on"] else "off") if arm.state else ""
 
 
 def status_html(view: View, title: str, doing: str) -> str:
@@ -89,5 +89,5 @@ def _arm_lines(view: View, name: str, arm: ArmView) -> list[str]:
     lines = [f"{first}{',' if rest else ''}{html.escape(rest)}"]
     if arm.state:
         hand = "clutched" if arm.state["is_clutched"] else "follows"
-        lines.append(f"{mode_text(arm)} · {hand} · {fixture_text(arm)}")
+        lines.append(f"{mode_text(arm)} · {hand} · fixture {fixture_text(arm)}")
     return lines

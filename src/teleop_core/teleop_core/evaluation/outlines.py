@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from teleop_core.chain.fixtures.box import BOX
+from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DRAWN_FIXTURES, FIXTURE
-from teleop_core.evaluation.reported_fixture import ReportedFixture
 from teleop_core.evaluation.state_history import States
 from teleop_core.kernels.geometry import Array
 

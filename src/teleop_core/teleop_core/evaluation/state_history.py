@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from teleop_core.bags.messages import Report
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import EvaluationError
+from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.pairing import NONE, latest
-from teleop_core.evaluation.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.graph.signals import STATE, STATE_FIELDS
 from teleop_core.graph.topics import TELEOP_STATE
 from teleop_core.kernels.geometry import Array

@@ -15,6 +15,7 @@ from teleop_core.graph.topics import (
     TELEOP_STATE,
     Topic,
 )
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.model import absolute
 from teleop_core.nodes.newest import Cadence, Newest
@@ -33,11 +34,12 @@ class LiveMarkers:
     Args:
         node: Node that publishes them.
         arm: Namespace of the arm.
+        axes: Rotation (3, 3) from its master's base to its slave's axes; None for the published.
     """
 
-    def __init__(self, node: CoreNode, arm: str) -> None:
+    def __init__(self, node: CoreNode, arm: str, axes: Array | None = None) -> None:
         self._topics = {topic: topic.of_arm(arm) for topic in _READ}
-        self._drawn, self._cadence = ArmMarkers(arm), Cadence(PERIOD_NS)
+        self._drawn, self._cadence = ArmMarkers(arm, axes), Cadence(PERIOD_NS)
         self._publisher: Any = node.open_publisher(absolute(MARKERS.of_arm(arm)))
 
     def show(self, newest: Newest) -> None:
@@ -56,8 +58,7 @@ class LiveMarkers:
         data = newest.data(self._topics[TELEOP_STATE])
         texts = read_reports(data)[0].values if data else {}
         state = {name: float(texts[name]) for name in TELEOP_STATE.columns if name in texts}
-        kind = texts.get("fixture", "box")
-        markers = [self._drawn.fixture(state, kind, float(np.linalg.norm(force)))]
+        markers = [self._drawn.fixture(state, texts, float(np.linalg.norm(force)))]
         if stylus is not None:
             markers.append(self._drawn.force(stylus, force))
         for name, topic in (("measured", SLAVE_MEASURED_CP), ("commanded", SLAVE_SERVO_CP)):

@@ -15,6 +15,7 @@ from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError, SessionError, TeleopError
 from teleop_core.base.parameters import build, parameter, specs, values_of
+from teleop_core.chain.mapping.parameters import axis_map
 from teleop_core.graph.graph import RECORDER_NAME, Graph
 from teleop_core.graph.layers import SESSION, parse_text
 from teleop_core.graph.stage import Stage
@@ -147,8 +148,12 @@ class RecorderNode(CoreNode):
         topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
         self._model = self._model_of(configuration, parameters)
         self._model_topics, self._newest = ModelTopics(self, self._model.topics), Newest()
-        arms = ("/".join(filter(None, (self.arm, arm))) for arm in graph.namespaces)
-        self._shown = [kind(self, arm) for arm in arms for kind in (LiveMarkers, LiveDisplay)]
+        self._shown: list[LiveMarkers | LiveDisplay] = []
+        for name in graph.namespaces:
+            arm = "/".join(filter(None, (self.arm, name)))
+            axes = configuration.value("axes", name)
+            turn = None if axes is None else axis_map("axes", axes)
+            self._shown += [LiveMarkers(self, arm, turn), LiveDisplay(self, arm)]
         every = parameters.every_nth((*topics, *self._model.topics))
         self._recorded = [topic for topic in topics if every[topic.name]]
         self._mark_topic, self._part, self._marks = MARKS.of_arm(self.arm), 0, 0

@@ -6,7 +6,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.bags.markers import Color, Marker, Shape
+from teleop_core.chain.fixtures.box import BOX
+from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.chain.fixtures.sphere import SPHERE
+from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import length
 from teleop_core.session.model import MASTER, SLAVE
@@ -18,6 +21,8 @@ FORCE_SCALE = 0.02
 _TOUCH = 0.05  # force of a wall that somebody touches [N]
 _FREE: Color = (0.26, 0.52, 0.96, 0.25)
 _TOUCHED: Color = (0.90, 0.20, 0.15, 0.40)
+_WIDTH = 0.001  # of the lines of a fixture [m]
+_BODIES = {BOX.name: Shape.CUBE, SPHERE.name: Shape.SPHERE}
 _FORCE: Color = (0.90, 0.45, 0.10, 1.0)
 _MEASURED: Color = (0.76, 0.22, 0.04, 1.0)
 _COMMANDED: Color = (0.26, 0.52, 0.96, 1.0)
@@ -28,11 +33,16 @@ class ArmMarkers:
 
     Args:
         arm: Its namespace; empty for that of plain topics.
+        axes: Rotation (3, 3) from the master's base to the slave's axes; None for the published.
     """
 
-    def __init__(self, arm: str = "") -> None:
+    def __init__(self, arm: str = "", axes: Array | None = None) -> None:
         prefix = f"{arm}/" if arm else ""
         self._slave, self._master = f"{prefix}{SLAVE}base", f"{prefix}{MASTER}base"
+        published = MotionScalingParameters().axes
+        self._axes = axis_map("axes", published) if axes is None else axes
+        self._told: tuple[ReportedFixture, float] | None = None
+        self._segments = np.zeros((0, 3))
         self._tails = {name: deque[Array](maxlen=TAIL) for name in ("measured", "commanded")}
 
     def forget(self) -> None:
@@ -40,22 +50,40 @@ class ArmMarkers:
         for tail in self._tails.values():
             tail.clear()
 
-    def fixture(self, state: Mapping[str, float], kind: str, force: float = 0.0) -> Marker:
-        """Virtual fixture, red while it is touched; taken away when it is off.
+    def fixture(
+        self, state: Mapping[str, float], told: Mapping[str, str], force: float = 0.0
+    ) -> Marker:
+        """Virtual fixture around the slave, red while it is touched; taken away when it is off.
+
+        A box and a sphere are bodies, other shapes are lines along their edges. What is not known
+        here is the box around it.
 
         Args:
             state: Numbers of ``teleop/state`` by name; empty before the first.
-            kind: Name of the kind of fixture: a sphere is one, others are the box around them.
+            told: Names and texts of the same report, which say what the fixture is.
             force: Size of the force on the hand [N].
         """
         is_on, pose = bool(state.get("is_fixture_on")), np.array([0.0, 0, 0, 1, 0, 0, 0])
         if not is_on:
-            return Marker("fixture", self._master, Shape.CUBE, is_shown=False)
+            return Marker("fixture", self._slave, Shape.CUBE, is_shown=False)
         pose[:3] = [state[f"fixture_center_{axis}"] for axis in "xyz"]
         x, y, z = (state[f"fixture_size_{axis}"] for axis in "xyz")
-        shape = Shape.SPHERE if kind == SPHERE.name else Shape.CUBE
         color = _TOUCHED if force > _TOUCH else _FREE
-        return Marker("fixture", self._master, shape, pose, (x, y, z), color)
+        fixture = reported_fixture(told, np.array((x, y, z)))
+        if fixture.kind in _BODIES or fixture.fault:
+            shape = _BODIES.get(fixture.kind, Shape.CUBE)
+            return Marker("fixture", self._slave, shape, pose, (x, y, z), color)
+        return Marker("fixture", self._slave, Shape.LINE_LIST, pose, (_WIDTH, 0.0, 0.0),
+                      (*color[:3], 1.0), self._edges(fixture, state["gain"]))  # fmt: skip
+
+    def _edges(self, fixture: ReportedFixture, gain: float) -> Array:
+        """Ends (N, 3) [m] of segments along its edges, two by two; found anew where it changes."""
+        if self._told != (fixture, gain):
+            points = fixture.outline(gain, self._axes)
+            pairs = np.stack((points[:-1], points[1:]), axis=1)
+            self._segments = pairs[np.isfinite(pairs).all(axis=(1, 2))].reshape(-1, 3)
+            self._told = fixture, gain
+        return self._segments
 
     def force(self, stylus: Array, force: Array) -> Marker:
         """Force (3,) [N] on the hand at a stylus (7,), in master_base; no arrow for none."""

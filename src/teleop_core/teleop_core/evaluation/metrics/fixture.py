@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.chain.fixtures.box import BOX
+from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
 from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.published import BOX_OVERSHOOT_MM, Gains
-from teleop_core.evaluation.reported_fixture import ReportedFixture
 from teleop_core.evaluation.rows import MISSING, Row, row
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.evaluation.state_history import States
