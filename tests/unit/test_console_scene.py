@@ -15,6 +15,7 @@ from teleop_core.console.look import GOOD, WRONG
 from teleop_core.console.recorded import RecordedLink
 from teleop_core.console.scene import Scene
 from teleop_core.console.server import ConsoleServer
+from teleop_core.console.world_nodes import object_outline
 from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.robots.bodies import Solid
 from teleop_core.robots.bodies.meshes import mesh_of
@@ -294,3 +295,45 @@ def test_the_scene_draws_a_fixture_where_its_parameters_have_it(server):
     line = scene.arms[""].master.outline.line
     below = line.scale[1] * line.points.reshape(-1, 3)[:, 1]
     np.testing.assert_allclose(below, -0.02, atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """A block of tissue that the tip is pressed into."""
+    return tc.run("palpation", duration=9.0)
+
+
+def test_the_object_is_drawn_where_the_tip_touches_it(server, pressed):
+    scene, _ = drawn(server, RecordedLink(pressed.bag), 8.0)
+    points = scene.arms[""].world.line.points.reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    force = pressed["slave/true_cf"]
+    first = force.stamp_ns[np.argmax(force["fz"] > 0.0)]
+    tip = pressed["slave/true_cp"]
+    place = tip[["x", "y", "z"]][np.searchsorted(tip.stamp_ns, first)]
+    assert (low[:2] < place[:2]).all()
+    assert (place[:2] < high[:2]).all()
+    assert place[2] == pytest.approx(high[2], abs=1e-4)
+
+
+def test_the_push_on_the_tip_is_drawn_there_as_large_as_it_is(server, pressed):
+    force = pressed["slave/measured_cf"]
+    size = np.linalg.norm(force[["fx", "fy", "fz"]], axis=1)
+    scene, view = drawn(server, RecordedLink(pressed.bag), force.time[np.argmax(size)])
+    push = scene.arms[""].world.push
+    assert push._frame.visible
+    np.testing.assert_allclose(push._frame.position, view.arms[""].streams[TIP][:3], atol=STILL)
+    assert push._label.text == f"{size.max():.1f} N"
+    scene, _ = drawn(server, RecordedLink(pressed.bag), force.time[size == 0.0][0])
+    assert not scene.arms[""].world.push._frame.visible
+
+
+def test_without_an_object_none_is_drawn_and_one_without_a_place_lies_below_the_tip(server, link):
+    scene, _ = drawn(server, link, 3.0)
+    assert scene.arms[""].world.line is None
+    robot = link.arms[0].robot
+    below = object_outline({"kind": "sphere", "sphere.radius": 0.01, "gap": 0.02}, robot)
+    tip = robot.fk(robot.start)[:3, 3]
+    middle = 0.5 * (below.reshape(-1, 3).min(axis=0) + below.reshape(-1, 3).max(axis=0))
+    np.testing.assert_allclose(middle, tip - [0.0, 0.0, 0.03], atol=1e-6)
+    assert not len(object_outline({"kind": "not installed here"}, robot))

@@ -14,9 +14,11 @@ from teleop_core.console.look import MEASURED, WANTED, Color
 from teleop_core.console.master_nodes import MasterNodes
 from teleop_core.console.stand import DEVICE, PUBLISHED_AXES, REST, stand_beside
 from teleop_core.console.tails import LENGTH, Tail, is_jump
+from teleop_core.console.world_nodes import WorldNodes
 from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_MEASURED_JS,
     SLAVE_SERVO_CP,
@@ -47,6 +49,7 @@ class ArmNodes:
 
     Attributes:
         bodies: Bodies of its robot.
+        world: What its tip touches.
         low: Lowest corner (3,) [m] of what arm and master take, in slave_base.
         high: Highest corner (3,) [m].
         fixture: What its fixture is.
@@ -70,6 +73,7 @@ class ArmNodes:
         self._axes = PUBLISHED_AXES
         self._stand = stand_beside(self._own_low, self._own_high, self._axes)
         self.master = MasterNodes(server, f"{self.path}/master", self._stand)
+        self.world = WorldNodes(server, self.path, robot)
         self.fixture = Look()
         self.outline = OutlineNode(server, f"{self.path}/fixture", self._stand.quaternion)
         self._poses = self.drawn.move(start)
@@ -145,6 +149,8 @@ class ArmNodes:
             time, view.get(MASTER_MEASURED_CP), None if force is None else force[:3]
         )
         self._draw_fixture(view, is_touched=felt > _TOUCH)
+        push = view.get(SLAVE_MEASURED_CF)
+        self.world.draw(self._poses[-1][:3], None if push is None else push[:3])
 
     def _draw_ghost(self, view: ArmView) -> None:
         """Draw the reference posture, every third time: it tells no more than where to."""

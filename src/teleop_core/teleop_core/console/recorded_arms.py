@@ -16,6 +16,7 @@ from teleop_core.base.parameters import specs, values_of
 from teleop_core.console.link import Arm, ArmView, ParameterInfo, Setting
 from teleop_core.graph.topics import (
     OPERATION,
+    SLAVE_MEASURED_CF,
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
     STREAMS,
@@ -31,6 +32,7 @@ from teleop_core.slave.operation.report import operation_text
 MOST = 200 << 20
 """Bytes of samples that are kept; of longer recordings every second, third ... sample is."""
 _STAMP_BYTES = 16
+_KEPT = (*STREAMS, SLAVE_MEASURED_CF)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +121,8 @@ def _robot(bag: Bag, configuration: Configuration | None, arm: str) -> Robot:
 
 def _size(bag: Bag, joints: int) -> int:
     """Bytes of the samples of one arm."""
-    infos = [(topic, bag.topics.get(topic.name)) for topic in STREAMS]
-    widths = {topic.name: topic.width(joints) for topic in STREAMS}
+    infos = [(topic, bag.topics.get(topic.name)) for topic in _KEPT]
+    widths = {topic.name: topic.width(joints) for topic in _KEPT}
     return sum(
         info.count * (8 * widths[topic.name] + _STAMP_BYTES)
         for topic, info in infos
@@ -132,7 +134,7 @@ def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
     """Streams and reports of one arm by their plain names."""
     wanted = [
         topic
-        for topic in STREAMS
+        for topic in _KEPT
         if (info := bag.topics.get(topic.name)) is not None
         and info.count
         and info.type == topic.kind.ros_type

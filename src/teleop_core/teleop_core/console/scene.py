@@ -11,7 +11,7 @@ from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.console.arm_nodes import ArmNodes, Path
 from teleop_core.console.cameras import ASPECT, FIELD, Camera, around, from_tool, microscope
 from teleop_core.console.fixture_outlines import Look
-from teleop_core.console.link import Arm, Parameters, View
+from teleop_core.console.link import Arm, Parameters, Setting, View
 from teleop_core.console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
 from teleop_core.console.stand import PUBLISHED_AXES
 from teleop_core.kernels.geometry import Array
@@ -75,7 +75,7 @@ class Scene:
                     nodes.draw(view.time, seen)
 
     def retune(self, parameters: Parameters) -> None:
-        """Take what parameters of the session say of the picture: axes, fixture, targets.
+        """Take what parameters of the session say of the picture: axes, fixture, targets, object.
 
         Args:
             parameters: As :meth:`~teleop_core.console.link.Link.parameters` gives them; what they
@@ -89,6 +89,8 @@ class Scene:
                 if (kind := parameters.get((node, "fixture.kind"))) is not None:
                     nodes.fixture = _look(parameters, node, str(kind.value))
                 self._show_targets(nodes, targets_of(parameters, name))
+                plant = f"{name}/slave_sim" if name else "slave_sim"
+                nodes.world.retune(_values_below(parameters, plant, "world."))
 
     def _show_targets(self, nodes: ArmNodes, points: Array) -> None:
         """Show the points of a task in the hand's space, as balls of 2 mm."""
@@ -186,13 +188,16 @@ class Scene:
 
 def _look(parameters: Parameters, node: str, kind: str) -> Look:
     """What the fixture of a node is."""
-    start = f"fixture.{kind}."
-    values = (
-        (name.removeprefix(start), info.value)
+    return Look(kind, tuple(_values_below(parameters, node, f"fixture.{kind}.").items()))
+
+
+def _values_below(parameters: Parameters, node: str, start: str) -> dict[str, Setting]:
+    """Values of a node's parameters by what their names say after a beginning."""
+    return {
+        name.removeprefix(start): info.value
         for (owner, name), info in parameters.items()
         if owner == node and name.startswith(start)
-    )
-    return Look(kind, tuple(values))
+    }
 
 
 def _map(axes: object) -> Array:
