@@ -15,6 +15,7 @@ from teleop_core.graph.graph import Graph, Link, build_graph
 from teleop_core.graph.layers import declared_groups
 from teleop_core.graph.topics import (
     DIAGNOSTICS,
+    MASTER_FILTERED_CP,
     NETWORK_TOPICS,
     OPERATOR_BUTTONS,
     OPERATOR_SERVO_CP,
@@ -78,6 +79,9 @@ def topics_page(graph: Graph) -> str:
     with_network = build_graph(stages=["network"])
     writer = "[network](network.md), a further stage"
     rows += [topic_row(topic, writer, with_network) for topic in NETWORK_TOPICS]
+    with_filter = build_graph(stages=["tremor_filter"])
+    writer = "[tremor_filter](tremor_filters.md), a further stage"
+    rows.append(topic_row(MASTER_FILTERED_CP, writer, with_filter))
     return page([
         "# Topics",
         "CRTK names, standard messages, SI units. Streams are offered reliable with a queue of "

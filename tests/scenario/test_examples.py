@@ -69,6 +69,14 @@ def test_own_network_loses_more_the_deeper_it_fades(tmp_path):
     assert ages[0] < 2.0 < ages[2]
 
 
+def test_own_tremor_filter_is_later_than_the_built_in_ones(tmp_path):
+    text = run("own_tremor_filter", tmp_path)
+    left, late = numbers(r"(\d+) % left", text), numbers(r"left, ([\d.]+) ms", text)
+    assert len(left) == 5
+    assert all(5.0 < share < 60.0 for share in left)
+    assert late[0] > 4.0 * late[2] > 4.0 * late[4]
+
+
 def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path):
     at_once, late, later = numbers(r"([\d.]+) s to the goal", run("own_operator", tmp_path))
     # exp(-2 t) takes 29 mm to half a millimetre in 2.0 s; the device's friction makes it uneven.

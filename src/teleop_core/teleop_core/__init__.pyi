@@ -27,6 +27,10 @@ from .session.exchange import (
     export_recording as export_recording,
     import_recording as import_recording,
 )
+from .chain.filters import (
+    TremorFilter as TremorFilter,
+    register_tremor_filter as register_tremor_filter,
+)
 from .chain.fixtures import Fixture as Fixture, register_fixture as register_fixture
 from .graph.graph import Graph as Graph, build_graph as build_graph
 from .kernels import kernel as kernel

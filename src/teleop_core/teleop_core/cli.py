@@ -291,6 +291,7 @@ def _scenarios(_: argparse.Namespace) -> int:
 
 
 def _parts(_: argparse.Namespace) -> int:
+    from teleop_core.chain.filters import TREMOR_FILTERS
     from teleop_core.chain.fixtures import FIXTURES
     from teleop_core.chain.network import NETWORKS
     from teleop_core.chain.operators import OPERATORS
@@ -302,7 +303,8 @@ def _parts(_: argparse.Namespace) -> int:
     from teleop_core.slave.world import WORLD_OBJECTS
 
     parts = (
-        OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, NETWORKS, STAGES, METRICS,
+        OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, NETWORKS, TREMOR_FILTERS,
+        STAGES, METRICS,
     )  # fmt: skip
     for registry in parts:
         print(f"{registry.kinds:14}{', '.join(registry)}")

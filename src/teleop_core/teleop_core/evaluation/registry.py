@@ -97,6 +97,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "touch": f"{_FOLDER}.touch:TouchMetric",
         "network": f"{_FOLDER}.network:NetworkMetric",
         "force_sensing": f"{_FOLDER}.force_sensing:ForceSensingMetric",
+        "tremor_filter": f"{_FOLDER}.tremor_filter:TremorFilterMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",
         "latency_ms": f"{_FOLDER}.latency:LatencyMetric",
         "ticks": f"{_FOLDER}.counts:TicksMetric",

@@ -232,7 +232,7 @@ class Graph:
             for old, new in zip(stage.replaced, stage.writes, strict=False):
                 if old.name == port.name and stage is reader:
                     return found
-                if old.name == port.name:
+                if old.name == port.name and reader.name not in stage.spares:
                     found = (stage, new)
         return found
 

@@ -95,6 +95,8 @@ class Stage:
             of its own, which makes one step per tick.
         replaces: Topic whose other readers read ``writes[0]`` in its place, as for a limit or a
             filter between two stages; or several, for ``writes`` in their order.
+        spares: Names of stages that read what is replaced all the same, such as an operator who
+            holds the stylus itself.
         notes: Further fields of its record, which nobody reads.
         node: ``module:class`` of its node, if a general one does not do.
         needs: Topics without which the node answers nothing.
@@ -113,6 +115,7 @@ class Stage:
     late: tuple[Topic, ...] = ()
     trigger: Topic | None = None
     replaces: Topic | tuple[Topic, ...] | None = None
+    spares: tuple[str, ...] = ()
     notes: tuple[Field, ...] = ()
     node: str = ""
     needs: tuple[Topic, ...] = ()
@@ -358,6 +361,7 @@ STAGES: Registry[Stage] = Registry(
     {
         "operator": "teleop_core.chain.master.operator:OPERATOR",
         "haptic_master": "teleop_core.chain.master.haptic_master:HAPTIC_MASTER",
+        "tremor_filter": "teleop_core.chain.filters.tremor_filter:TREMOR_FILTER",
         "motion_scaling": "teleop_core.chain.mapping.motion_scaling:MOTION_SCALING",
         "network": "teleop_core.chain.network.network:NETWORK",
         "inverse_kinematics": "teleop_core.chain.mapping.inverse_kinematics:INVERSE_KINEMATICS",

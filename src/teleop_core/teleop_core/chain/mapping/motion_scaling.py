@@ -31,6 +31,7 @@ from teleop_core.chain.mapping.plausibility import (
     PLAUSIBILITY_STATE,
     has_lost_buttons,
     is_plausible,
+    take_hand,
 )
 from teleop_core.chain.mapping.reflection import (
     REFLECTION_PARAMETERS,
@@ -342,10 +343,8 @@ class MotionScaling(RunningStage):
         p["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
         p["pause_ns"] = round(parameters.longest_pause * 1e9)
         p["rotation_gain"] = parameters.rotation_gain
-        hand = parameters.plausible
-        p["hand_speed"], p["hand_acceleration"] = hand.speed, hand.acceleration
-        p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
-        p["silence_ns"] = round(hand.button_silence * 1e9)
+        take_hand(p, parameters.plausible)
+        p["silence_ns"] = round(parameters.plausible.button_silence * 1e9)
         self._take_reach_force(parameters.reach_force)
         p["reflected"] = parameters.reflection.force_gain
         p["reflected_most"] = parameters.reflection.max_force

@@ -15,7 +15,7 @@ from teleop_core.kernels.geometry import Array
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlausibilityParameters:
+class HandParameters:
     """What a hand on the master can do."""
 
     speed: float = parameter(
@@ -34,6 +34,12 @@ class PlausibilityParameters:
         2.0, unit="m", lower=0.01, upper=100.0, doc="farthest stylus from the master's base",
         source="assumed: longer than an arm",
     )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlausibilityParameters(HandParameters):
+    """What a hand on the master can do, and how long its buttons may be silent."""
+
     button_silence: float = parameter(
         0.5, unit="s", lower=0.0, upper=60.0,
         doc="a stream of buttons that fell silent for longer counts as a pressed clutch; 0: never",
@@ -52,6 +58,12 @@ PLAUSIBILITY_STATE = [
 _SHORTEST = 1e-3
 # So many messages no farther apart than this are a stream [ns].
 _STREAM, _STREAM_NS = 20, 100_000_000
+
+
+def take_hand(p: Any, hand: HandParameters) -> None:
+    """Write what a hand can do into a record with :data:`PLAUSIBILITY_PARAMETERS`."""
+    p["hand_speed"], p["hand_acceleration"] = hand.speed, hand.acceleration
+    p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
 
 
 @inner

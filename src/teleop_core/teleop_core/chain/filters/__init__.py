@@ -1,0 +1,108 @@
+"""Tremor filters: what takes the tremor out of the hand's position, one file per kind.
+
+A kind filters one coordinate. When it begins, what happens after a pause or a jump, and which
+samples it gets are the same for all (:mod:`teleop_core.chain.filters.tremor_filter`).
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from teleop_core.base.errors import PartError
+from teleop_core.base.registry import Registry, part_check
+from teleop_core.kernels import pointer
+from teleop_core.kernels.geometry import Array
+from teleop_core.slave.trials import fenced, is_whole
+from teleop_core.slave.world import shape_of
+
+__all__ = ["LONGEST_NS", "MEMORY", "TREMOR_FILTERS", "TremorFilter", "register_tremor_filter"]
+
+_ROW = types.float64[::1]
+FILTER = types.float64(_ROW, _ROW, types.float64, types.float64)
+"""Signature of a filter kernel, so that one compiled stage serves every kind."""
+MEMORY = 32
+"""Numbers that a filter remembers of each coordinate."""
+LONGEST_NS = 10_000_000
+"""Longest period that a filter is given; a longer one is split [ns]."""
+
+
+@dataclass(frozen=True)
+class TremorFilter:
+    """A kind of tremor filter.
+
+    Attributes:
+        name: What ``--set tremor_filter.kind=`` calls it.
+        parameters: Its parameter group.
+        filter: ``filter(numbers, memory, value, period)``, a kernel or a plain function, called
+            for every sample of each coordinate but the one with which it begins. ``numbers`` are
+            those of the parameters; ``memory`` (32,) is kept from sample to sample, and zero where
+            the filter begins; ``value`` is the way from the place where it began [m]; ``period`` is
+            the time since the sample before [s], 10 ms at most. Returns the filtered value [m]; as
+            long as all values are 0 it returns 0.
+        numbers: ``numbers(parameters)`` gives what ``filter`` takes; None for the numbers of the
+            parameters in their order.
+    """
+
+    name: str
+    parameters: type
+    filter: Callable[[Array, Array, float, float], float]
+    numbers: Callable[[Any], Array] | None = None
+
+    @cached_property
+    def filter_pointer(self) -> Any:
+        """The filter as an argument for kernels."""
+        return pointer(self.filter, FILTER)
+
+    def numbers_of(self, parameters: object) -> Array:
+        """Numbers of a parameter group, as the filter takes them."""
+        return shape_of(parameters) if self.numbers is None else self.numbers(parameters)
+
+
+def _try(part: TremorFilter) -> None:
+    """Filter some values, so that what cannot work is told before anything runs."""
+    try:
+        numbers = part.numbers_of(part.parameters())
+        memory, fence = fenced(np.zeros(MEMORY))
+        rest = float(part.filter(numbers, memory, 0.0, 1e-3))
+        for i in range(64):
+            filtered = float(part.filter(numbers, memory, 1e-3 * math.sin(0.1 * i), 1e-3))
+            if not (math.isfinite(filtered) and is_whole(fence)):
+                text = f"one whose filter is finite and remembers {MEMORY} numbers"
+                raise PartError("tremor filter", part.name, f"{text}; it is {filtered!r}")
+    except PartError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise PartError(
+            "tremor filter", part.name,
+            "one with filter(numbers, memory, value, period) -> float and parameters that all have "
+            f"defaults; it raises {type(error).__name__}: {reason}",
+        ) from error  # fmt: skip
+    if rest != 0.0:
+        text = f"one whose filter gives 0 for 0, so that a resting hand rests; it is {rest!r}"
+        raise PartError("tremor filter", part.name, text)
+
+
+TREMOR_FILTERS: Registry[TremorFilter] = Registry(
+    "tremor filter",
+    "tremor_filters",
+    {
+        "notch": "teleop_core.chain.filters.notch:NOTCH",
+        "band_stop": "teleop_core.chain.filters.band_stop:BAND_STOP",
+        "kalman": "teleop_core.chain.filters.kalman:KALMAN",
+        "wflc": "teleop_core.chain.filters.wflc:WFLC",
+    },
+    part_check("tremor filter", TremorFilter, "filter"),
+    _try,
+)
+"""All kinds by name."""
+
+
+def register_tremor_filter(part: TremorFilter, *, replace: bool = False) -> TremorFilter:
+    """Add a kind under its own name for the rest of the program; see :meth:`Registry.add`."""
+    return TREMOR_FILTERS.add(part.name, part, replace=replace)

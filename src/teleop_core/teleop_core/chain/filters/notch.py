@@ -1,0 +1,42 @@
+"""Notch: takes out one frequency and, the lower its quality, what is beside it."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.chain.filters import TremorFilter
+from teleop_core.chain.filters.sections import advance_section
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class NotchParameters:
+    """Where the notch is, and how narrow."""
+
+    frequency: float = parameter(
+        10.0, unit="Hz", lower=3.0, upper=25.0, doc="frequency that is taken out"
+    )
+    quality: float = parameter(
+        1.0, lower=0.3, upper=30.0,
+        doc="frequency over the width in which more than 3 dB are taken out; slow motion is late "
+        "by 1/(2π frequency quality)",
+    )  # fmt: skip
+
+
+@kernel
+def notch_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
+    """Value without what is near the notch's frequency.
+
+    The width is as wanted after the bilinear transform too: its tangent is taken, not its value.
+
+    Source:
+        Orfanidis 1996 (Introduction to Signal Processing), eqs. 11.3.4-11.3.6.
+    """
+    angle = 2.0 * math.pi * numbers[0] * period
+    damping = 2.0 * math.tan(0.5 * angle / numbers[1]) / math.sin(angle)
+    advance_section(memory, 0, value, math.tan(0.5 * angle), damping)
+    return value - damping * memory[0]
+
+
+NOTCH = TremorFilter("notch", NotchParameters, notch_filter)

@@ -1,0 +1,29 @@
+"""Sections: filters of second order from which notch, band stop and high-pass are made."""
+
+from teleop_core.kernels import inner
+from teleop_core.kernels.geometry import Array
+
+WIDTH = 3
+"""Numbers that a section remembers: band-pass, low-pass, and its input."""
+
+
+@inner
+def advance_section(memory: Array, at: int, value: float, slope: float, damping: float) -> None:
+    """Bring the band-pass and the low-pass of a section to the next sample.
+
+    With the input u, band-pass b and low-pass l obey ``db/dt = w (u - l - damping b)`` and
+    ``dl/dt = w b``. They are integrated by the trapezoidal rule, which is the bilinear transform
+    where the period stays the same and never diverges where it changes. The high-pass of the
+    section is ``u - damping b - l``, its notch ``u - damping b``.
+
+    Args:
+        memory: What is remembered; written.
+        at: Where the section's :data:`WIDTH` numbers begin in it.
+        value: Input.
+        slope: ``tan(w period / 2)`` of the section's frequency w.
+        damping: 2 for critical damping, the inverse of the quality.
+    """
+    band, low, before = memory[at], memory[at + 1], memory[at + 2]
+    stiff = slope * (damping + slope)
+    new = ((1.0 - stiff) * band + slope * (before + value - 2.0 * low)) / (1.0 + stiff)
+    memory[at], memory[at + 1], memory[at + 2] = new, low + slope * (band + new), value

@@ -1,0 +1,151 @@
+"""Tremor filter: how much tremor it leaves, and how late and how large what is meant comes out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.metrics.motion import approach_end_ns
+from teleop_core.evaluation.motion_measures import (
+    RATE,
+    SHORTEST,
+    SPECTRUM_SAMPLES,
+    stretches,
+    velocities,
+)
+from teleop_core.evaluation.motion_samples import MotionSamples
+from teleop_core.evaluation.rows import Row, row
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.topics import MASTER_FILTERED_CP, MASTER_MEASURED_CP
+from teleop_core.kernels.geometry import Array
+
+GROUP = "tremor filter"
+MEANT = 2.0
+"""Motion below this frequency is meant [Hz]."""
+
+
+@dataclass(frozen=True)
+class TremorFilterScore:
+    """What a tremor filter did; None without one, or where the recording is too slow or short."""
+
+    before_um: float | None = figure(
+        "um", "RMS of the stylus's motion in 8 to 12 Hz over three axes; null below 60 Hz"
+    )
+    after_um: float | None = figure("um", "the same of the filtered stylus")
+    left_share: float | None = figure("1", "tremor after the filter over tremor before it")
+    delay_ms: float | None = figure(
+        "ms",
+        "by how much motion below 2 Hz comes out later: slope of the phase of the cross-spectrum "
+        "of both velocities, weighted with its magnitude; negative where it is ahead",
+    )
+    gain: float | None = figure(
+        "1", "how large motion below 2 Hz comes out: in phase with it, over all of it"
+    )
+
+
+def passage(before: Array, after: Array) -> tuple[float, float] | None:
+    """Delay [s] and gain of motion below :data:`MEANT` from one motion to another.
+
+    Segments of :data:`SPECTRUM_SAMPLES`, half overlapping and Hann-windowed, give the
+    cross-spectrum S of both velocities, summed over the axes. The delay is the one whose phase
+    ``-2πf delay`` fits best: ``-Σ|S| 2πf arg S / Σ|S| (2πf)²``. The gain is
+    ``|Σ S exp(2πjf delay)|`` over the power of the first motion.
+
+    Args:
+        before: Velocities (N, 3) at :data:`RATE`.
+        after: The same of the other.
+
+    Returns:
+        None where there is no motion, or less than a second.
+    """
+    size = min(SPECTRUM_SAMPLES, len(before))
+    if size < max(SHORTEST, RATE):
+        return None
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
+    frequency = np.fft.rfftfreq(size, 1.0 / RATE)
+    is_meant = (frequency > 0.0) & (frequency <= MEANT)
+    cross, power = np.zeros(int(is_meant.sum()), np.complex128), 0.0
+    for begin in range(0, len(before) - size + 1, size - size // 2):
+        first, second = (
+            np.fft.rfft(
+                (motion[begin : begin + size] - motion[begin : begin + size].mean(axis=0))
+                * window[:, None],
+                axis=0,
+            )[is_meant]
+            for motion in (before, after)
+        )
+        cross += (np.conj(first) * second).sum(axis=1)
+        power += float((np.abs(first) ** 2).sum())
+    if not power > 0.0:
+        return None
+    rate, weight = 2.0 * np.pi * frequency[is_meant], np.abs(cross)
+    if not weight.any():
+        return None
+    delay = -float((weight * rate * np.angle(cross)).sum() / (weight * rate * rate).sum())
+    gain = float(np.abs((cross * np.exp(1j * rate * delay)).sum()) / power)
+    return delay, gain
+
+
+class TremorFilterMetric(Metric):
+    """Tremor before and after a filter, and what became of the meant motion; after the approach."""
+
+    name = "tremor_filter"
+    keys = keys_of("tremor_filter", TremorFilterScore)
+    topics = (MASTER_MEASURED_CP, MASTER_FILTERED_CP)
+
+    def __init__(self, context: Context) -> None:
+        begin_ns = approach_end_ns(context) if context.span is None else context.span.first_ns
+        self._start_ns = context.bag.start_ns
+        self._begin_s = (begin_ns - self._start_ns) * 1e-9
+        self._before, self._after = MotionSamples(), MotionSamples()
+
+    def add(self, window: Window) -> None:
+        """Take one window: the readings that have an answer, by their stamps."""
+        answers = window.samples(MASTER_FILTERED_CP)
+        readings = window.around(MASTER_MEASURED_CP)
+        if not (len(answers) and len(readings)):
+            return
+        stamps, first, second = np.intersect1d(
+            readings.stamp_ns, answers.stamp_ns, return_indices=True
+        )
+        times = np.asarray((stamps - self._start_ns) * 1e-9, np.float64)
+        self._before.add(times, readings.values[first, :7])
+        self._after.add(times, answers.values[second, :7])
+
+    def values(self) -> TremorFilterScore:
+        """Score of everything so far."""
+        spans = [(self._begin_s, np.inf)]
+        squares = (samples.tremor.between(spans)[0] for samples in (self._before, self._after))
+        before, after = (None if s is None else 1e6 * float(np.sqrt(s)) for s in squares)
+        left = None if before is None or after is None or before == 0.0 else after / before
+        found = self._passage()
+        delay, gain = (None, None) if found is None else (1e3 * found[0], found[1])
+        return TremorFilterScore(before, after, left, delay, gain)
+
+    def _passage(self) -> tuple[float, float] | None:
+        """Delay and gain over the longest stretch without a gap."""
+        (times, before), (others, after) = self._before.rows(), self._after.rows()
+        times, common, other = np.intersect1d(times, others, return_indices=True)
+        counts = times >= self._begin_s
+        times, before, after = times[counts], before[common][counts], after[other][counts]
+        parts = stretches(times, 1.5 / RATE)
+        if not parts:
+            return None
+        longest = max(parts, key=lambda part: part.stop - part.start)
+        return passage(*(velocities(motion[longest, :3]) for motion in (before, after)))
+
+    def rows(self) -> list[Row]:
+        """Tremor before and after, delay and gain; nothing without a filter."""
+        score = self.values()
+        if score.after_um is None and score.delay_ms is None:
+            return []
+        left = None if score.left_share is None else 100.0 * score.left_share
+        gain = None if score.gain is None else 100.0 * score.gain
+        return [
+            row(GROUP, "tremor before", "µm", score.before_um),
+            row(GROUP, "tremor after", "µm", score.after_um),
+            row(GROUP, "tremor left", "%", left),
+            row(GROUP, "delay below 2 Hz", "ms", score.delay_ms),
+            row(GROUP, "gain below 2 Hz", "%", gain),
+        ]

@@ -1,0 +1,492 @@
+"""Tremor filters: what trembles goes, what is meant stays, and nothing jumps, rings or is lost."""
+
+import hashlib
+import math
+import os
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import solve_discrete_are
+from scipy.signal import butter, freqz, iirnotch, sosfreqz
+
+import teleop_core as tc
+from forgotten_parts import own_parts  # noqa: F401
+from teleop_core.base.errors import ParameterError, PartError
+from teleop_core.base.parameters import NoParameters, build
+from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
+from teleop_core.chain.filters.tremor_filter import (
+    TREMOR_FILTER,
+    RunningTremorFilter,
+    TremorFilterParameters,
+)
+from teleop_core.chain.filters.wflc import RATE
+from teleop_core.evaluation.metrics.tremor_filter import passage
+from teleop_core.evaluation.motion_measures import RATE as SAMPLED
+from teleop_core.evaluation.motion_measures import tremor_power, velocities
+from teleop_core.graph.graph import build_graph
+from teleop_core.kernels import kernel
+from teleop_core.session.configuration import configure
+from teleop_core.session.virtual import VirtualTime
+
+MS = 1_000_000
+KINDS = ("notch", "band_stop", "kalman", "wflc")
+periods = st.sampled_from([5e-4, 1e-3, 2e-3, 1 / 300, 0.01])
+
+
+def numbers_of(kind, **given):
+    part = TREMOR_FILTERS.find(kind)
+    return part.numbers_of(build(part.parameters, given))
+
+
+def filtered(kind, values, period=1e-3, **given):
+    """A coordinate behind a filter that begins at its first value, and what it remembers then."""
+    part, memory = TREMOR_FILTERS.find(kind), np.zeros(MEMORY)
+    numbers = numbers_of(kind, **given)
+    out = [part.filter(numbers, memory, float(v - values[0]), period) for v in values[1:]]
+    return np.append(0.0, out) + values[0], memory
+
+
+def response(kind, count, period, **given):
+    """Answer (count,) to one sample of 1 after a sample of 0."""
+    values = np.zeros(count + 1)
+    values[1] = 1.0
+    return filtered(kind, values, period, **given)[0][1:]
+
+
+def amplitude_and_delay(values, times, frequency):
+    """Of the line of a frequency [Hz] in a signal: its length, and its delay to a sine [s]."""
+    wave = 2.0 * np.exp(-2j * np.pi * frequency * times)
+    line = (values * wave).mean()
+    return abs(line), -np.angle(line * 1j) / (2.0 * np.pi * frequency)
+
+
+# -- the filters -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=20, deadline=None)
+@given(place=st.floats(-1.0, 1.0), period=periods)
+def test_a_hand_that_rests_passes_to_the_bit(kind, place, period):
+    out, _ = filtered(kind, np.full(200, place), period)
+    assert (out == place).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_step_is_followed_to_its_end(kind):
+    values = np.full(8000, 0.05)
+    values[0] = 0.0
+    out, _ = filtered(kind, values)
+    assert out[-1] == pytest.approx(0.05, abs=1e-10)
+
+
+def exact(kind, given, frequencies, period):
+    """What scipy says of a filter at some frequencies [Hz]."""
+    rate = 1.0 / period
+    if kind == "notch":
+        design = iirnotch(given["frequency"], given["quality"], rate)
+        return freqz(*design, frequencies, fs=rate)[1]
+    edges = given["low"], given["high"]
+    return sosfreqz(butter(2, edges, "bandstop", output="sos", fs=rate), frequencies, fs=rate)[1]
+
+
+def measured(kind, given, frequencies, period):
+    """The same of ours, from its answer to a single sample."""
+    answer = response(kind, round(6.0 / period), period, **given)
+    times = period * np.arange(len(answer))
+    return np.exp(-2j * np.pi * np.outer(frequencies, times)) @ answer
+
+
+@pytest.mark.parametrize("period", [1e-3, 1 / 300, 0.01])
+@pytest.mark.parametrize(
+    ("kind", "given"),
+    [
+        ("notch", {"frequency": 10.0, "quality": 1.0}),
+        ("notch", {"frequency": 8.5, "quality": 3.0}),
+        ("band_stop", {"low": 8.0, "high": 12.0}),
+        ("band_stop", {"low": 5.0, "high": 15.0}),
+    ],
+)
+def test_the_frequency_response_is_that_of_scipy(kind, given, period):
+    frequencies = np.array([0.1, 0.5, 1.0, 2.0, 5.0, 7.9, 9.8, 10.0, 12.5, 20.0, 40.0])
+    expected = exact(kind, given, frequencies, period)
+    np.testing.assert_allclose(measured(kind, given, frequencies, period), expected, atol=1e-9)
+
+
+def steady_gain(numbers, period):
+    """Gain (2,) of the filter that is optimal for ever, by scipy."""
+    q, r = numbers[0] ** 2, numbers[1] ** 2 / period
+    transition, seen = np.array([[1.0, period], [0.0, 1.0]]), np.array([[1.0, 0.0]])
+    noise = q * np.array([[period**3 / 3, period**2 / 2], [period**2 / 2, period]])
+    # In units in which place and speed are of one size.
+    unit = np.diag([1e5, 1e3])
+    covariance = solve_discrete_are(
+        np.linalg.inv(unit) @ transition.T @ unit, np.linalg.inv(unit) @ seen.T,
+        unit @ noise @ unit, np.array([[r]]),
+    )  # fmt: skip
+    predicted = np.linalg.inv(unit) @ covariance @ np.linalg.inv(unit)
+    return predicted[:, 0] / (predicted[0, 0] + r)
+
+
+@pytest.mark.parametrize("period", [1e-3, 0.01])
+@pytest.mark.parametrize("given", [{}, {"acceleration_noise": 1.0, "reading_noise": 1e-4}])
+def test_the_gain_of_the_kalman_filter_becomes_that_of_the_riccati_equation(given, period):
+    numbers = numbers_of("kalman", **given)
+    values = np.zeros(round(8.0 / period))
+    _, memory = filtered("kalman", values, period, **given)
+    part = TREMOR_FILTERS.find("kalman")
+    before = memory[:2].copy()
+    part.filter(numbers, memory, 1.0, period)
+    np.testing.assert_allclose(memory[:2] - before, steady_gain(numbers, period), rtol=1e-6)
+
+
+def test_the_kalman_filter_follows_a_hand_that_begins_at_speed_at_once():
+    times = np.arange(500) * 1e-3
+    out, _ = filtered("kalman", 0.2 * times)
+    assert np.abs(out - 0.2 * times).max() < 2e-4
+    assert np.abs(out - 0.2 * times)[100:].max() < 1e-6
+
+
+def cosine_filter(kind):
+    """Response of a filter at some frequencies [Hz]: measured, for the one that learns too."""
+    times = 1e-3 * np.arange(40_000)
+
+    def at(frequency, size):
+        out, _ = filtered(kind, size * np.sin(2.0 * np.pi * frequency * times))
+        return amplitude_and_delay(out[20_000:], times[20_000:], frequency)
+
+    return at
+
+
+LEFT = {"notch": 0.01, "band_stop": 0.02, "kalman": 0.52, "wflc": 0.01}
+"""Most that is left of 10 Hz."""
+DELAY_MS = {"notch": 15.9, "band_stop": 9.4, "kalman": 1.1, "wflc": 0.3}
+"""Delay of 0.5 Hz."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_tremor_of_10_hz_is_taken_out_as_far_as_stated(kind):
+    left, _ = cosine_filter(kind)(10.0, 1e-4)
+    assert left <= 1e-4 * LEFT[kind]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_slow_motion_passes_as_large_as_it_is_with_the_delay_stated(kind):
+    size, delay = cosine_filter(kind)(0.5, 0.02)
+    assert size == pytest.approx(0.02, rel=0.02)
+    assert 1e3 * delay == pytest.approx(DELAY_MS[kind], abs=0.3)
+
+
+@pytest.mark.parametrize("frequency", [7.0, 8.0, 10.0, 12.0, 13.0])
+@pytest.mark.parametrize("period", [1e-3, 0.005])
+def test_the_learning_filter_finds_a_tremor_of_any_frequency_and_subtracts_it(frequency, period):
+    times = period * np.arange(round(20.0 / period))
+    out, memory = filtered("wflc", 1e-4 * np.sin(2.0 * np.pi * frequency * times), period)
+    assert 10.0 + memory[RATE] / (2.0 * np.pi) == pytest.approx(frequency, abs=0.05)
+    assert np.abs(out[-round(2.0 / period) :]).max() < 2e-6
+
+
+def test_the_learning_filter_subtracts_a_tremor_whose_frequency_changes():
+    times = 1e-3 * np.arange(30_000)
+    phase = 2.0 * np.pi * (9.0 * times + 0.5 * 0.1 * times**2)  # from 9 to 12 Hz
+    out, _ = filtered("wflc", 1e-4 * np.sin(phase))
+    kept, _ = filtered("wflc", 1e-4 * np.sin(phase), frequency_rate=0.0, frequency=9.0)
+    assert out[-5000:].std() < 0.5 * kept[-5000:].std()
+    assert out[10_000:].std() < 0.2 * 1e-4 * math.sqrt(0.5)
+
+
+def bits():
+    """Digest of what all filters and the stage make of a hand that pauses and is thrown about."""
+    digest, places = hashlib.sha256(), hand(800)
+    places[500:] += 0.1
+    for kind in KINDS:
+        runner = stage(kind)
+        digest.update(through(runner, places[:300]).tobytes())
+        digest.update(through(runner, places[300:], 12 * MS, 330 * MS).tobytes())
+    return digest.hexdigest()
+
+
+def test_kernels_have_the_same_bits_as_plain_python():
+    text = "import test_tremor_filters as t; print(t.bits())"
+    here = Path(__file__).parent
+    found = subprocess.run(
+        [sys.executable, "-c", text], capture_output=True, text=True, check=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1",
+             "PYTHONPATH": os.pathsep.join([str(here), str(here.parent), *sys.path])},
+    )  # fmt: skip
+    assert found.stdout.strip() == bits()
+
+
+# -- the stage -------------------------------------------------------------------------------------
+
+
+def stage(kind="band_stop", **given):
+    """The stage at work; double underscores in names stand for dots."""
+    named = {name.replace("__", "."): value for name, value in given.items()}
+    return RunningTremorFilter(build(TremorFilterParameters, {"kind": kind, **named}))
+
+
+def through(runner, places, period_ns=MS, first_ns=MS):
+    """Filtered places (N, 3) of a master that is at places (N, 3), sample by sample."""
+    row, found = runner.signals, []
+    for i, place in enumerate(places):
+        row["master_measured_cp"][:3] = place
+        row["master_measured_cp_ns"] = first_ns + i * period_ns
+        runner.step()
+        found.append(row["master_filtered_cp"][:3].copy())
+    return np.array(found)
+
+
+def hand(count, period=1e-3, seed=1):
+    """Places (count, 3) [m] of a hand that moves and trembles."""
+    times, rng = period * np.arange(count), np.random.default_rng(seed)
+    phases = rng.uniform(0.0, 6.0, (2, 3))
+    meant = 0.02 * np.sin(2.0 * np.pi * 0.6 * times[:, None] + phases[0])
+    return meant + 1e-4 * np.sin(2.0 * np.pi * 9.7 * times[:, None] + phases[1])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_coordinate_is_filtered_by_itself_from_its_first_reading_on(kind):
+    places = hand(2000)
+    out = through(stage(kind), places)
+    for axis in range(3):
+        alone, _ = filtered(kind, places[:, axis])
+        np.testing.assert_allclose(out[:, axis], alone, atol=1e-12)
+    assert (out[0] == places[0]).all()
+    moved = through(stage(kind), places + 0.3)
+    np.testing.assert_allclose(moved, out + 0.3, atol=1e-9)
+
+
+def test_the_orientation_passes():
+    runner = stage()
+    row, rng = runner.signals, np.random.default_rng(3)
+    for tick in range(1, 50):
+        turn = np.array([1.0, *rng.normal(0.0, 1e-3, 3)])
+        row["master_measured_cp"][3:] = turn / math.sqrt((turn * turn).sum())
+        row["master_measured_cp_ns"] = tick * MS
+        runner.step()
+        assert (row["master_filtered_cp"][3:] == row["master_measured_cp"][3:]).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_samples_of_any_period_are_filtered_alike(kind):
+    often, seldom = hand(6000), hand(1200, 0.005)
+    fine, coarse = through(stage(kind), often), through(stage(kind), seldom, 5 * MS)
+    assert np.abs(coarse - fine[::5])[600:].max() < 5e-5
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_longer_period_is_split_on_a_straight_line(kind):
+    assert LONGEST_NS == 10 * MS
+    places = hand(100, 0.04)
+    split = [places[0]]
+    for before, after in pairwise(places):
+        split += [before + (after - before) * k / 4 for k in range(1, 5)]
+    out = through(stage(kind), places, 40 * MS)
+    np.testing.assert_allclose(out, through(stage(kind), split, 10 * MS)[::4], atol=1e-12)
+    assert np.isfinite(out).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_pause_begins_anew_at_the_reading_and_a_shorter_one_does_not(kind):
+    places, runner = hand(2000), stage(kind)
+    through(runner, places)
+    after = through(runner, places[:500] + 0.01, first_ns=2301 * MS)
+    fresh = through(stage(kind), places[:500] + 0.01)
+    np.testing.assert_array_equal(after, fresh)
+    assert runner.state["begun"] == 2
+    through(runner, places[500:510] + 0.01, first_ns=(2301 + 499 + 200) * MS)
+    assert runner.state["begun"] == 2
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=15, deadline=None)
+@given(far=st.floats(0.004, 0.5), ticks=st.integers(1, 40))
+def test_a_teleport_passes_as_it_is_and_nothing_rings_after_it(kind, far, ticks):
+    """There and back: each jump is that of the readings, and each beginning a fresh one."""
+    places = np.zeros((300, 3))
+    places[100 : 100 + ticks, 1] = far
+    runner = stage(kind)
+    out = through(runner, places)
+    np.testing.assert_array_equal(out, places)
+    assert runner.state["begun"] == 3 if ticks > 1 else runner.state["begun"] >= 3
+    assert runner.concerns() == [f"began anew at {int(runner.state['implausible'])} samples of the "
+                                 "master that no hand can make"]  # fmt: skip
+    assert runner.concerns() == []
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_first_reading(kind):
+    places, runner = hand(1500), stage(kind)
+    places[700:] += 0.2
+    out = through(runner, places)
+    np.testing.assert_array_equal(out[700:], through(stage(kind), places[700:]))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_never_comes_out_and_changes_nothing(kind, bad):
+    places = hand(600)
+    broken = places.copy()
+    broken[300, 1] = bad
+    broken[400:403] = bad
+    out, clean = through(stage(kind), broken), through(stage(kind), places)
+    assert np.isfinite(out).all()
+    assert (out[300] == out[299]).all()
+    assert (out[:300] == clean[:300]).all()
+    assert np.abs(out - clean)[301:].max() < 3e-4
+    first = through(stage(kind), np.array([[bad, 0, 0], [0.1, 0.2, 0.3]]))
+    assert first.tolist() == [[0, 0, 0], [0.1, 0.2, 0.3]]
+
+
+def test_a_reading_of_the_same_stamp_changes_nothing_and_an_older_one_begins_anew():
+    runner, places = stage(), hand(500)
+    before = through(runner, places)[-1]
+    again = through(runner, places[-1:] + 1e-3, first_ns=500 * MS)
+    assert (again[0] == before).all()
+    back = through(runner, places[:1], first_ns=100 * MS)
+    assert (back[0] == places[0]).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_reset_and_a_second_run_give_the_same_bits(kind):
+    places, runner = hand(800), stage(kind)
+    first = through(runner, places)
+    runner.reset()
+    assert (runner.signals["master_filtered_cp"] == [0, 0, 0, 1, 0, 0, 0]).all()
+    np.testing.assert_array_equal(through(runner, places), first)
+
+
+@pytest.mark.parametrize("other", [{"kind": "notch", "notch.quality": 3.0}, {"kind": "kalman"}])
+def test_new_parameters_take_over_without_a_jump_and_then_act_alone(other):
+    runner, places = stage("notch"), hand(4000)
+    out = [through(runner, places[:1000])]
+    runner.retune(build(TremorFilterParameters, other))
+    out.append(through(runner, places[1000:], first_ns=1001 * MS))
+    joined = np.concatenate(out)
+    assert np.abs(np.diff(joined, axis=0)).max() < 1.5e-4
+    fresh = RunningTremorFilter(build(TremorFilterParameters, other))
+    np.testing.assert_allclose(joined[3000:], through(fresh, places)[3000:], atol=2e-6)
+
+
+def test_the_same_parameters_again_change_no_bit():
+    runner, places = stage(), hand(1000)
+    out = [through(runner, places[:500])]
+    runner.retune(build(TremorFilterParameters, {"kind": "band_stop"}))
+    out.append(through(runner, places[500:], first_ns=501 * MS))
+    np.testing.assert_array_equal(np.concatenate(out), through(stage(), places))
+
+
+def test_edges_that_enclose_no_band_are_refused():
+    with pytest.raises(ParameterError, match="> low") as caught:
+        stage("band_stop", band_stop__low=12.0, band_stop__high=9.0)
+    assert caught.value.name == "high"
+
+
+# -- in a session ----------------------------------------------------------------------------------
+
+
+def test_the_mapping_reads_the_filtered_stylus_and_the_operator_the_stylus_itself():
+    graph = build_graph(stages=["tremor_filter"])
+    at_port = {link.reader.name: link.topic.name for link in graph.links
+               if link.port.name == "master/measured_cp"}  # fmt: skip
+    assert at_port == {
+        "operator": "master/measured_cp", "tremor_filter": "master/measured_cp",
+        "motion_scaling": "master/filtered_cp",
+    }  # fmt: skip
+    assert not graph.notes
+    way = [name for name, _ in graph.chain()]
+    assert way[:3] == ["haptic_master", "tremor_filter", "motion_scaling"]
+
+
+def session(*given, scenario="human"):
+    return VirtualTime(configure(scenario, settings=["teleop.stages=[tremor_filter]", *given]))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_slave_trembles_less_and_a_second_run_has_the_same_bits(kind):
+    first, second = (session(f"tremor_filter.kind={kind}").run(13_000) for _ in range(2))
+    for name in first.dtype.names:
+        np.testing.assert_array_equal(first[name], second[name])
+    assert (first["master_filtered_cp_ns"] == first["master_measured_cp_ns"]).all()
+    trembling, calm = (tremor_power(first[f"master_{name}_cp"][8000::5, :3], 200.0)
+                       for name in ("measured", "filtered"))  # fmt: skip
+    assert calm < 0.4 * trembling
+
+
+def test_a_filter_of_ones_own_is_one_call_and_a_wrong_one_is_refused(own_parts):  # noqa: F811
+    @kernel
+    def half(numbers, memory, value, period):
+        memory[0] += 0.5 * (value - memory[0])
+        return memory[0]
+
+    tc.register_tremor_filter(tc.TremorFilter("half", NoParameters, half))
+    out = through(stage("half"), np.array([[0, 0, 0], [1e-4, 0, 0], [1e-4, 0, 0]]))
+    np.testing.assert_allclose(out[:, 0], [0.0, 0.5e-4, 0.75e-4])
+    wrong = {
+        "not finite": lambda n, m, v, t: math.nan if v else 0.0,
+        "not at rest": lambda n, m, v, t: v + 1.0,
+        "raises": lambda n, m, v, t: {}["none"],
+        "writes": lambda n, m, v, t: m[40],
+    }
+    for name, broken in wrong.items():
+        with pytest.raises(PartError):
+            tc.register_tremor_filter(tc.TremorFilter(name.replace(" ", "_"), NoParameters, broken))
+
+
+def test_a_filter_of_ones_own_that_runs_away_begins_anew(own_parts):  # noqa: F811
+    def runs_away(numbers, memory, value, period):
+        memory[0] += 1.0
+        return math.inf if memory[0] > 100.0 else value
+
+    tc.register_tremor_filter(tc.TremorFilter("runs_away", NoParameters, runs_away))
+    places = hand(400)
+    np.testing.assert_allclose(through(stage("runs_away"), places), places, atol=1e-15)
+
+
+# -- the score -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("delay", [-0.02, 0.0, 0.0123, 0.08])
+@pytest.mark.parametrize("gain", [0.9, 1.0, 1.1])
+def test_the_score_finds_a_delay_and_a_gain(delay, gain):
+    rng = np.random.default_rng(6)
+    rates, phases = rng.uniform(0.5, 12.0, 40), rng.uniform(0.0, 6.0, (40, 3))
+    times = np.arange(2000) / SAMPLED
+
+    def at(moments):
+        return np.sin(moments[:, None, None] * rates[:, None] + phases).sum(axis=1)
+
+    found = passage(velocities(at(times)), gain * velocities(at(times - delay)))
+    assert found == pytest.approx((delay, gain), abs=1e-3)
+
+
+def test_without_motion_there_is_no_delay():
+    assert passage(np.zeros((600, 3)), np.zeros((600, 3))) is None
+    assert passage(np.ones((20, 3)), np.ones((20, 3))) is None
+
+
+def test_the_score_says_what_the_stage_did_and_nothing_without_it():
+    score = tc.run("human", duration=20.0, stages="tremor_filter").score()
+    assert 40.0 < score.value("tremor_filter.before_um") < 80.0
+    assert 0.2 < score.value("tremor_filter.left_share") < 0.5
+    after = score.value("tremor_filter.before_um") * score.value("tremor_filter.left_share")
+    assert score.value("tremor_filter.after_um") == pytest.approx(after)
+    assert score.value("tremor_filter.delay_ms") == pytest.approx(9.5, abs=0.5)
+    assert score.value("tremor_filter.gain") == pytest.approx(1.0, abs=0.01)
+    rows = {row.label for result in score.results for row in result.rows
+            if row.group == "tremor filter"}  # fmt: skip
+    assert rows == {"tremor before", "tremor after", "tremor left", "delay below 2 Hz",
+                    "gain below 2 Hz"}  # fmt: skip
+    plain = tc.run("human", duration=3.0).score()
+    assert plain.value("tremor_filter.left_share") is None
+    assert plain.value("tremor_filter.delay_ms") is None
+
+
+def test_the_stage_is_not_part_of_a_session_unless_asked_for():
+    assert TREMOR_FILTER.name not in {stage.name for stage in build_graph().stages}
