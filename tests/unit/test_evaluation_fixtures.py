@@ -289,6 +289,32 @@ def test_outline_stands_around_the_slave_in_every_picture(recipe, path, describe
     assert f"the {kind} (" in shown["Path in space"].sentence
 
 
+OPEN = {
+    "half_space": ({"normal": (0.0, 1.0, 0.0), "room": 0.01}, [(2, -10.0)]),
+    "keep_out_box": ({"place": (0.0, 0.0, 0.025), "size": (0.03, 0.03, 0.03)}, [(0, -10.0)]),
+    "line": ({"direction": (1.0, 0.0, 0.0), "tolerance": 0.002, "length": 0.0},
+             [(0, -2.0), (0, 2.0), (2, -2.0), (2, 2.0)]),
+}  # fmt: skip
+"""Shapes that are open on a side, and their walls [mm] on the slave's axes."""
+
+
+@pytest.mark.parametrize("kind", OPEN)
+@pytest.mark.parametrize("gain", [1.0, 0.1])
+def test_walls_are_drawn_where_there_are_some_and_nowhere_else(recipe, path, kind, gain):
+    values, walls = OPEN[kind]
+    told = {"fixture": kind} | {f"fixture.{name}": repr(value) for name, value in values.items()}
+    recipe.singles = [fixture_on(told, gain, at=200)]
+    shown = figures(recipe.write(path))
+    found = {(s["yref"], s["y0"]) for s in shown["Position against time"].layout["shapes"]}
+    expected = [(f"y{axis + 1}" if axis else "y", 1e3 * CENTER[axis] + gain * place)
+                for axis, place in walls]  # fmt: skip
+    assert [axis for axis, _ in sorted(found)] == [axis for axis, _ in sorted(expected)]
+    np.testing.assert_allclose(
+        [place for _, place in sorted(found)], [p for _, p in sorted(expected)], atol=1e-3
+    )
+    assert f"leaves the {kind} by" in shown["Path in space"].sentence
+
+
 def test_page_speaks_of_the_kind_and_of_no_box(recipe, path, tmp_path):
     recipe.singles = [fixture_on(SPHERE)]
     recipe.write(path)

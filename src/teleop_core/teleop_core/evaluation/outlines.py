@@ -1,5 +1,6 @@
 """Outlines: virtual fixtures as a page draws them, in space, per plane and against time."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,9 @@ from teleop_core.evaluation.state_history import States
 from teleop_core.kernels.geometry import Array
 
 _SECOND_NS = 1e9
+# Walls are looked for up to here at the hand [m], in so many places, closer in every round. Less
+# than a nanometre beyond is rounding.
+_FAR, _STEPS, _ROUNDS, _GRAZED = 1.0, 1001, 3, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,22 +29,25 @@ class Outline:
         end_s: When it went, [s].
         kind: Name of its kind.
         points: One line along its edges in the slave's base, shape (N, 3), [mm]; NaN lifts the pen.
+        walls: Places on each axis (3, 2) [mm] where one who goes straight from the middle down and
+            up that axis meets a wall; NaN where there is none.
     """
 
     begin_s: float
     end_s: float
     kind: str
     points: Array
-
-    def walls(self, axis: int) -> tuple[float, float]:
-        """Places of its two ends along an axis, [mm]."""
-        places = self.points[:, axis]
-        return float(np.nanmin(places)), float(np.nanmax(places))
+    walls: Array
 
     @property
     def size(self) -> list[float]:
-        """From end to end along the three axes, [mm]."""
-        return [high - low for low, high in map(self.walls, range(3))]
+        """From end to end along the three axes, [mm]; empty for what is open on a side."""
+        if not np.isfinite(self.walls).all():
+            return []
+        extent: list[float] = (
+            np.nanmax(self.points, axis=0) - np.nanmin(self.points, axis=0)
+        ).tolist()
+        return extent
 
     @property
     def place(self) -> tuple[str, bytes]:
@@ -48,14 +55,15 @@ class Outline:
         return self.kind, np.round(self.points, 6).tobytes()
 
     def wall_lines(self, axis: int, suffix: str) -> list[dict[str, Any]]:
-        """Shapes of its two ends along an axis, against time."""
+        """Lines of its walls on an axis, against time."""
         return [
             {
                 "type": "line", "xref": "x", "yref": f"y{suffix}", "x0": self.begin_s,
                 "x1": self.end_s, "y0": wall, "y1": wall,
                 "line": {"color": FIXTURE, "width": 1.5, "dash": "dash"},
             }
-            for wall in self.walls(axis)
+            for wall in self.walls[axis].tolist()
+            if math.isfinite(wall)
         ]  # fmt: skip
 
 
@@ -75,16 +83,41 @@ def outlines_of(context: Context) -> list[Outline]:
         if is_on[row]:
             fixture = states.fixtures[int(states.fixture[row])]
             begin = max(0.0, (int(history.stamp_ns[row]) - start_ns) / _SECOND_NS)
-            points = 1e3 * (states.center[row] + _around(fixture, states, row, context))
-            out.append(Outline(begin, (end_ns - start_ns) / _SECOND_NS, fixture.kind, points))
+            drawn = fixture
+            if fixture.fault:
+                drawn = ReportedFixture(BOX.name, size=tuple(states.size[row].tolist()))
+            points, walls = _around(drawn, float(states.column("gain")[row]), context.origin.axes)
+            middle, end = states.center[row], (end_ns - start_ns) / _SECOND_NS
+            points, walls = 1e3 * (middle + points), 1e3 * (middle[:, None] + walls)
+            out.append(Outline(begin, end, fixture.kind, points, walls))
     return out
 
 
-def _around(fixture: ReportedFixture, states: States, row: int, context: Context) -> Array:
-    """Points (N, 3) [m] around the middle of the fixture of a row."""
-    if fixture.fault:
-        fixture = ReportedFixture(BOX.name, size=tuple(states.size[row].tolist()))
-    return fixture.outline(float(states.column("gain")[row]), context.origin.axes)
+def _around(fixture: ReportedFixture, gain: float, axes: Array) -> tuple[Array, Array]:
+    """Points (N, 3) [m] of its edges around its middle, and of its walls (3, 2) on the axes."""
+    points = fixture.outline(gain, axes)
+    if fixture.size:  # a box, told by its size alone
+        return points, np.stack((points.min(axis=0), points.max(axis=0)), axis=1)
+    walls = np.full((3, 2), np.nan)
+    for axis in range(3):
+        for side, sign in enumerate((-1.0, 1.0)):
+            way = sign * np.eye(3)[axis]
+            walls[axis, side] = sign * _first_wall(fixture, way, gain, axes)
+    return points, walls
+
+
+def _first_wall(fixture: ReportedFixture, way: Array, gain: float, axes: Array) -> float:
+    """Distance [m] from the middle to the first wall along a way (3,) of length 1; NaN: none."""
+    low, high = 0.0, _FAR * gain
+    for _ in range(_ROUNDS):
+        places = np.linspace(low, high, _STEPS)
+        depths = fixture.depths(places[:, None] * way, np.full(_STEPS, gain), axes)
+        outside = depths > _GRAZED * gain
+        if not outside.any():
+            return math.nan
+        first = max(int(outside.argmax()), 1)
+        low, high = float(places[first - 1]), float(places[first])
+    return high
 
 
 def largest(outlines: Sequence[Outline]) -> list[Outline]:

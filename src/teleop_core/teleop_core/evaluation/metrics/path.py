@@ -110,10 +110,11 @@ class PathMetric(Metric):
         shown, score = largest(outlines), self._fixture.values()
         if not shown:
             return text + "; no fixture was on."
-        kinds, sizes = kinds_of(outlines), " and ".join(map(_size, shown))
+        kinds, sizes = kinds_of(outlines), " and ".join(filter(None, map(_size, shown)))
         outside_mm = number(score.penetration_max_mm)
         if score.unscored is None:
-            text += f" and leaves the {kinds} ({sizes} mm) by at most {outside_mm} mm."
+            text += f" and leaves the {kinds}{f' ({sizes} mm)' if sizes else ''} by at most "
+            text += f"{outside_mm} mm."
         else:
             text += f". Drawn as a box and not scored: {score.unscored}."
         return f"{text} Only the time with the {kinds} on is drawn."
@@ -140,7 +141,9 @@ class PathMetric(Metric):
             f"within {number(self._error.values().max)} mm of the reference."
         )
         if outlines:
-            sentence += f" Dashed: where the {kinds_of(outlines)} ends."
+            sentence += (
+                f" Dashed: where the {kinds_of(outlines)} ends, from its middle along each axis."
+            )
         sentence += " Drag to zoom, all plots follow; double-click to see the whole recording."
         return Figure("Position against time", sentence, traces, layout, 640)
 
