@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from teleop_core.base.parameters import Choice, choice, parameter
 from teleop_core.chain.filters import TREMOR_FILTERS
-from teleop_core.chain.mapping.plausibility import HandParameters
+from teleop_core.chain.mapping.plausibility import HandLimits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,4 +16,4 @@ class TremorFilterParameters:
         0.3, unit="s", lower=0.002, upper=5.0,
         doc="after a longer pause of the master the filter begins anew at the reading",
     )  # fmt: skip
-    plausible: HandParameters = field(default_factory=HandParameters)
+    plausible: HandLimits = field(default_factory=HandLimits)

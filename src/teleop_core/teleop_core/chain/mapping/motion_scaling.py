@@ -219,7 +219,7 @@ def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
 
 
 @inner
-def _doubt(p: Any, s: Any, sent: Any, is_following: bool, is_doubtful: bool, row: Any) -> None:
+def _refuse(p: Any, s: Any, sent: Any, is_following: bool, is_doubtful: bool, row: Any) -> None:
     """Answer a sample that no hand can have made: hold, push with nothing, begin anew after it."""
     s.must_latch = 1
     remember(s, sent, row.master_measured_cp_ns)
@@ -263,7 +263,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     is_doubtful = is_in_doubt(p, s, is_following, row)
     draw_back(s, sent, p.gain[s.is_fine], row)
     if not is_plausible(p, s, pose, row.master_measured_cp_ns):
-        _doubt(p, s, sent, is_following, is_doubtful, row)
+        _refuse(p, s, sent, is_following, is_doubtful, row)
         return
     clutch = 1.0 if has_lost_buttons(p, s, row) else buttons[0]
     _toggle_mode(s, buttons)

@@ -15,7 +15,7 @@ from teleop_core.kernels.geometry import Array
 
 
 @dataclass(frozen=True, kw_only=True)
-class HandParameters:
+class HandLimits:
     """What a hand on the master can do."""
 
     speed: float = parameter(
@@ -37,7 +37,7 @@ class HandParameters:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlausibilityParameters(HandParameters):
+class PlausibilityParameters(HandLimits):
     """What a hand on the master can do, and how long its buttons may be silent."""
 
     button_silence: float = parameter(
@@ -60,7 +60,7 @@ _SHORTEST = 1e-3
 _STREAM, _STREAM_NS = 20, 100_000_000
 
 
-def take_hand(p: Any, hand: HandParameters) -> None:
+def take_hand(p: Any, hand: HandLimits) -> None:
     """Write what a hand can do into a record with :data:`PLAUSIBILITY_PARAMETERS`."""
     p["hand_speed"], p["hand_acceleration"] = hand.speed, hand.acceleration
     p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
