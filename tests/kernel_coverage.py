@@ -26,6 +26,7 @@ TESTS = (
     "four_bar", "scara", "planar_3r", "five_axis", "puma560", "mma", "mma_models", "mma_balance",
     "mma_ik", "three_finger_hand", "scara_stewart", "dh", "dh_arms", "robots", "fixture_parts",
     "controller_parts", "limits", "interpolation", "source_pid", "rigid_body", "motion_estimates",
+    "fixture_shapes",
 )  # fmt: skip
 # Seconds of simulated time or thousands of poses, on lines that others reach too.
 SLOW = (

@@ -259,6 +259,13 @@ def test_a_tube_and_a_line_of_length_zero_have_no_ends():
     assert found("line", short, far)[0] == 49.95
 
 
+def test_below_a_floor_the_way_out_is_down_from_the_plane():
+    floor = HalfSpaceParameters(room=0.01)
+    depth, way = found("half_space", floor, np.array([0.02, -0.03, 0.0]))
+    assert math.isclose(depth, 0.02)
+    assert np.allclose(way, (0.0, -0.02, 0.0), rtol=0, atol=ROUNDING)
+
+
 def test_beyond_its_tip_a_cone_leads_to_the_tip():
     depth, way = found("cone", ConeParameters(), np.array([0.0, -0.05, 0.0]))
     assert math.isclose(depth, 0.02)
