@@ -225,6 +225,7 @@ BAD_STAGES = {
     "passes on a stamp it does not get": (
         {"writes": (Topic("test/x", Kind.POSE, passed_on("slave/servo_cp")),)}, "slave/servo_cp",
     ),
+    "spares a text": ({"spares": "operator"}, "spares as a tuple of names"),
     "has no step": ({"step": None}, "with a step"),
     "has a step of three arguments": ({"step": lambda p, s, row: None}, "four arguments"),
     "has a step and a maker": ({"make": lambda p, dt: None}, "with a step"),

@@ -26,6 +26,8 @@ from teleop_core.chain.filters.tremor_filter import (
     TremorFilterParameters,
 )
 from teleop_core.chain.filters.wflc import RATE
+from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.evaluation.metrics.tremor_filter import passage
 from teleop_core.evaluation.motion_measures import RATE as SAMPLED
 from teleop_core.evaluation.motion_measures import tremor_power, velocities
@@ -326,6 +328,55 @@ def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_firs
     places[700:] += 0.2
     out = through(runner, places)
     np.testing.assert_array_equal(out[700:], through(stage(kind), places[700:]))
+
+
+def commands(runner, places):
+    """What the mapping commands (N, 3) behind a filter, with a slave that is where it is led."""
+    scaling = MOTION_SCALING.run(MotionScalingParameters())
+    row, found = scaling.signals, []
+    row["slave_setpoint_cp"] = [0.3, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0]
+    for i, place in enumerate(places):
+        now_ns = (1000 + i) * MS
+        row["master_measured_cp"][:3] = through(runner, [place], first_ns=now_ns)[0]
+        for name in ("now_ns", "master_measured_cp_ns", "master_buttons_ns"):
+            row[name] = now_ns
+        scaling.step()
+        row["slave_setpoint_cp"] = row["slave_servo_cp"]
+        row["slave_setpoint_cp_ns"] = now_ns
+        found.append(row["slave_servo_cp"][:3].copy())
+    return np.array(found)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=10, deadline=None)
+@given(far=st.floats(0.01, 0.5), ticks=st.integers(1, 40))
+def test_a_teleport_of_a_resting_hand_moves_no_command(kind, far, ticks):
+    places = np.tile([0.0, -0.1, 0.1], (300, 1))
+    places[100 : 100 + ticks, 0] += far
+    found = commands(stage(kind), places)
+    np.testing.assert_allclose(found, np.tile(found[0], (300, 1)), rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_teleport_of_a_hand_that_moves_shifts_the_command_by_no_more_than_its_lag(kind):
+    """The slave goes on as if nothing had been, from where it is."""
+    places = hand(2000)
+    thrown = places.copy()
+    thrown[1000:] += [0.2, 0.0, 0.1]
+    calm, found = commands(stage(kind), places), commands(stage(kind), thrown)
+    assert np.abs(np.diff(found, axis=0)).max() < 1e-4
+    assert np.abs(found - calm).max() < 2e-3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=30, deadline=None)
+@given(places=st.lists(st.tuples(*[st.floats()] * 3), min_size=1, max_size=20),
+       period_ns=st.sampled_from([0, -MS, MS, 40 * MS, 2**40]))  # fmt: skip
+def test_wild_samples_at_any_times_leave_numbers_and_no_trace(kind, places, period_ns):
+    runner = stage(kind)
+    assert np.isfinite(through(runner, places, period_ns, 2**50)).all()
+    runner.reset()
+    np.testing.assert_array_equal(through(runner, hand(50)), through(stage(kind), hand(50)))
 
 
 @pytest.mark.parametrize("kind", KINDS)

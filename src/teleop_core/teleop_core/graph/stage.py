@@ -130,6 +130,8 @@ class Stage:
                 f"with {word} as a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
             )
             self._insist(is_right, text)
+        is_right = isinstance(self.spares, tuple) and all(isinstance(n, str) for n in self.spares)
+        self._insist(is_right, f"with spares as a tuple of names, not {self.spares!r}")
         known = {topic.name for topic in self.reads}
         for word, topics in (("late", self.late), ("needs", self.needs)):
             for topic in topics:
