@@ -34,6 +34,7 @@ from teleop_core.evaluation.motion_measures import tremor_power, velocities
 from teleop_core.graph.graph import build_graph
 from teleop_core.kernels import kernel
 from teleop_core.session.configuration import configure
+from teleop_core.session.notes import notes_of
 from teleop_core.session.virtual import VirtualTime
 
 MS = 1_000_000
@@ -410,7 +411,8 @@ def test_a_reset_and_a_second_run_give_the_same_bits(kind):
     first = through(runner, places)
     runner.reset()
     assert (runner.signals["master_filtered_cp"] == [0, 0, 0, 1, 0, 0, 0]).all()
-    np.testing.assert_array_equal(through(runner, places), first)
+    np.testing.assert_array_equal(through(runner, places, first_ns=801 * MS), first)
+    assert runner.state["begun"] == 1
 
 
 @pytest.mark.parametrize("other", [{"kind": "notch", "notch.quality": 3.0}, {"kind": "kalman"}])
@@ -453,6 +455,18 @@ def test_the_mapping_reads_the_filtered_stylus_and_the_operator_the_stylus_itsel
     assert not graph.notes
     way = [name for name, _ in graph.chain()]
     assert way[:3] == ["haptic_master", "tremor_filter", "motion_scaling"]
+
+
+def test_a_wall_behind_a_filter_is_noted_unless_it_cannot_push():
+    given = ["teleop.stages=[tremor_filter]"]
+    said = "wall goes by the filtered stylus"
+    others = [*given, "operator=remote"], [*given, "buttons.fixture=[3.0]"]
+    for scenario, more in (("fine_box", given), *(("human", other) for other in others)):
+        notes = notes_of(configure(scenario, settings=more))
+        assert [said in note for note in notes].count(True) == 1
+    weak = [*given, "motion_scaling.fixture.max_force=0"]
+    for scenario, more in (("fine_box", weak), ("human", given), ("fine_box", [])):
+        assert not any(said in note for note in notes_of(configure(scenario, settings=more)))
 
 
 def session(*given, scenario="human"):

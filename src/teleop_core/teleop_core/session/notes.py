@@ -4,12 +4,14 @@ from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalin
 from teleop_core.chain.mapping.walls import WALLS, passive_stiffness
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.chain.master.haptic_master import HapticMasterParameters
+from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
 from teleop_core.session.configuration import Configuration
 
 _MASTER, _MAPPING = BUILT_IN[1:3]
+_FILTER = "tremor_filter"
 
 
 def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
@@ -21,8 +23,9 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
             delays [s].
     """
     found = list(configuration.graph.notes)
+    is_filtered = any(s.name == _FILTER for s in configuration.graph.stages)
     for arm in configuration.graph.namespaces:
-        master, mapping = (configuration.group(name, arm) for name in (_MASTER, _MAPPING))
+        operator, master, mapping = (configuration.group(name, arm) for name in BUILT_IN[:3])
         if isinstance(master, HapticMasterParameters) and isinstance(
             mapping, MotionScalingParameters
         ):
@@ -30,6 +33,7 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
             told = (
                 rendered_note(master.device, mapping.fixture),
                 passive_note(master.device, mapping.fixture, delay),
+                filtered_note(mapping.fixture) if is_filtered and _may_press(operator) else "",
             )
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
     return found
@@ -70,6 +74,23 @@ def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: fl
     return (
         f"the {fixture.wall} wall of {stiffness:.0f} N/m may give back more energy than it took: "
         f"{until}"
+    )
+
+
+def _may_press(operator: object) -> bool:
+    """Whether this operator is known to switch the fixture on, or is a person who may."""
+    if not isinstance(operator, OperatorParameters):
+        return True
+    return bool(operator.buttons.fixture) or operator.kind.kind == "remote"
+
+
+def filtered_note(fixture: FixtureParameters) -> str:
+    """What becomes of a wall behind a tremor filter; empty where it cannot push."""
+    if fixture.max_force == 0.0 or fixture.stiffness == 0.0:
+        return ""
+    return (
+        f"the {fixture.wall} wall goes by the filtered stylus, late as that is: it may give back "
+        "more energy than it took"
     )
 
 
