@@ -40,8 +40,8 @@ def kalman_filter(numbers: Array, memory: Array, value: float, period: float) ->
     at once.
 
     Source:
-        Kalman 1960, theorem 3; Bar-Shalom, Li and Kirubarajan 2001, eqs. 6.2.2-12 (noise of the
-        acceleration) and 5.2.3-12 to 15 (gain and covariance).
+        Kalman 1960, theorem 3; Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2 (white noise
+        of the acceleration) and 5.2.3 (gain and covariance).
     """
     push = numbers[0] * numbers[0] * period
     spread = numbers[1] * numbers[1] / period

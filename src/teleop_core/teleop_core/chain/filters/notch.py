@@ -31,7 +31,7 @@ def notch_filter(numbers: Array, memory: Array, value: float, period: float) -> 
     The width is as wanted after the bilinear transform too: its tangent is taken, not its value.
 
     Source:
-        Orfanidis 1996 (Introduction to Signal Processing), eqs. 11.3.4-11.3.6.
+        Orfanidis 1996 (Introduction to Signal Processing), section 11.3.
     """
     angle = 2.0 * math.pi * numbers[0] * period
     damping = 2.0 * math.tan(0.5 * angle / numbers[1]) / math.sin(angle)
