@@ -27,7 +27,7 @@ def pill_depth(offset: Array, shape: Array, depth: Array) -> float:
     outside = max(distance - shape[0], 0.0)
     share = outside / max(distance, 1e-9)
     depth[0], depth[1], depth[2] = share * offset[0], share * y, share * offset[2]
-    return outside
+    return float(outside)
 
 
 def pill_outline(p: PillParameters) -> Array:

@@ -24,7 +24,7 @@ def low_pass(numbers: Array, memory: Array, value: float, period: float) -> floa
     share = 1.0 - math.exp(-2.0 * math.pi * numbers[0] * period)
     memory[0] += share * (value - memory[0])
     memory[1] += share * (memory[0] - memory[1])
-    return memory[1]
+    return float(memory[1])
 
 
 tc.register_tremor_filter(tc.TremorFilter("low_pass", LowPassParameters, low_pass))
