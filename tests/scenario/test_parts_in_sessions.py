@@ -95,6 +95,7 @@ def test_file_of_parts_takes_what_stands_beside_it_before_and_after_the_command(
     ):
         listed = teleop(*arguments).stdout.split()
         assert {"own", "still"} <= {name.strip(",") for name in listed}
+        assert {"tremor_filters", "world_objects", "metrics"} <= set(listed)
 
 
 @pytest.mark.parametrize(

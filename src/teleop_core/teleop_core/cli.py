@@ -307,7 +307,7 @@ def _parts(_: argparse.Namespace) -> int:
         STAGES, METRICS,
     )  # fmt: skip
     for registry in parts:
-        print(f"{registry.kinds:14}{', '.join(registry)}")
+        print(f"{registry.kinds:16}{', '.join(registry)}")
     return 0
 
 
