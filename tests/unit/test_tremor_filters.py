@@ -469,6 +469,28 @@ def test_a_wall_behind_a_filter_is_noted_unless_it_cannot_push():
         assert not any(said in note for note in notes_of(configure(scenario, settings=more)))
 
 
+def test_a_tank_behind_a_filter_is_noted_where_a_force_is_felt():
+    said = "the tank goes by the filtered stylus"
+    given = ["teleop.stages=[tremor_filter]"]
+    tank = "reflection.passivity=tank"
+    (note,) = (n for n in notes_of(configure("palpation", settings=[*given, tank])) if "tank" in n)
+    assert said in note
+    for scenario, more in (("palpation", given), ("palpation", [tank]), ("human", [*given, tank])):
+        assert not any(said in note for note in notes_of(configure(scenario, settings=more)))
+
+
+@pytest.mark.parametrize("period", [1e-3, 6e-3, 8e-3, 0.01])
+@pytest.mark.parametrize("frequency", [3.0, 15.0, 25.0])
+def test_the_widest_notch_that_is_taken_comes_to_rest_at_any_period(frequency, period):
+    least = max(0.3, frequency * 1e-9 * LONGEST_NS / 0.45)
+    with pytest.raises(ParameterError, match="quality"):
+        build(TREMOR_FILTERS.find("notch").parameters,
+              {"frequency": frequency, "quality": 0.99 * least})  # fmt: skip
+    answer = response("notch", 4000, period, frequency=frequency, quality=1.0001 * least)
+    assert np.abs(answer).max() < 3.0
+    assert np.abs(answer[-100:]).max() < 1e-9
+
+
 def session(*given, scenario="human"):
     return VirtualTime(configure(scenario, settings=["teleop.stages=[tremor_filter]", *given]))
 

@@ -1,15 +1,15 @@
 """Outlines: virtual fixtures on the page, around the hand and around the slave."""
 
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import viser
 
-from teleop_core.base.errors import TeleopError
 from teleop_core.base.parameters import build
-from teleop_core.chain.fixtures import FIXTURES
+from teleop_core.chain.fixtures import FIXTURES, Fixture
 from teleop_core.chain.fixtures.box import BOX
 from teleop_core.console.link import Setting
 from teleop_core.console.look import GOOD, WRONG
@@ -32,18 +32,20 @@ class Look:
     values: tuple[tuple[str, Setting], ...] = ()
 
 
-@cache
+@lru_cache(maxsize=64)
 def unit_outline(look: Look) -> Array:
     """Segments (N, 2, 3) of a fixture along the master's axes, one long along each.
 
     Along an axis on which it has no length they are in metres. A fixture that is not known here is
     drawn as the box around it.
     """
-    try:
-        fixture = FIXTURES.find(look.kind)
-        parameters: Any = build(fixture.parameters, dict(look.values))
-    except TeleopError:
-        fixture, parameters = BOX, BOX.parameters()
+    fixture: Fixture = BOX
+    parameters: Any = BOX.parameters()
+    with suppress(Exception):  # of another's kind anything may fail, and the page goes on
+        found = FIXTURES.find(look.kind)
+        given: Any = build(found.parameters, dict(look.values))
+        found.size(given)
+        fixture, parameters = found, given
     points = np.asarray(fixture.outline(parameters), np.float64)
     extent = fixture.size(parameters)
     points = points / np.where(extent > _FLAT, extent, 1.0)

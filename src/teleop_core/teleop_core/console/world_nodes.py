@@ -6,7 +6,6 @@ from contextlib import suppress
 import numpy as np
 import viser
 
-from teleop_core.base.errors import TeleopError
 from teleop_core.base.parameters import build
 from teleop_core.console.link import Setting
 from teleop_core.console.look import TARGET
@@ -24,9 +23,11 @@ def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
         values: Parameters of the world by name, without what is in front of them.
         robot: The slave, below whose start an object without a place lies.
     """
-    nothing = np.empty((0, 2, 3))
-    with suppress(TeleopError):
-        world = build(WorldParameters, values)
+    nothing, kind = np.empty((0, 2, 3)), values.get("kind", "empty")
+    own = {name: value for name, value in values.items()
+           if name in {"kind", "place", "gap"} or name.startswith(f"{kind}.")}  # fmt: skip
+    with suppress(Exception):  # of another's kind anything may fail, and the page goes on
+        world = build(WorldParameters, own)
         if world.kind.kind == "empty":
             return nothing
         center = np.array(world.place or world.below(robot.fk(robot.start)[:3, 3]))

@@ -1,6 +1,10 @@
 """Notes: what runs but may not be meant, of a configuration before its session begins."""
 
-from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
+from teleop_core.chain.mapping.parameters import (
+    FixtureParameters,
+    MotionScalingParameters,
+    ReflectionParameters,
+)
 from teleop_core.chain.mapping.walls import WALLS, passive_stiffness
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.chain.master.haptic_master import HapticMasterParameters
@@ -34,6 +38,7 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
                 rendered_note(master.device, mapping.fixture),
                 passive_note(master.device, mapping.fixture, delay),
                 filtered_note(mapping.fixture) if is_filtered and _may_press(operator) else "",
+                filtered_tank_note(mapping.reflection) if is_filtered else "",
             )
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
     return found
@@ -92,6 +97,13 @@ def filtered_note(fixture: FixtureParameters) -> str:
         f"the {fixture.wall} wall goes by the filtered stylus, late as that is: it may give back "
         "more energy than it took"
     )
+
+
+def filtered_tank_note(reflection: ReflectionParameters) -> str:
+    """What becomes of a tank behind a tremor filter; empty where nothing is felt or none is on."""
+    if reflection.force_gain == 0.0 or reflection.passivity != "tank":
+        return ""
+    return "the tank goes by the filtered stylus: touches may give back more energy than they took"
 
 
 def rendered_note(device: DeviceParameters, fixture: FixtureParameters) -> str:

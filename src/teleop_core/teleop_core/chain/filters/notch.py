@@ -3,11 +3,15 @@
 import math
 from dataclasses import dataclass
 
+from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import parameter
-from teleop_core.chain.filters import TremorFilter
+from teleop_core.chain.filters import LONGEST_NS, TremorFilter
 from teleop_core.chain.filters.sections import advance_section
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
+
+_WIDEST = 0.45
+"""Width of a notch times the period of samples, below the pole of its tangent at a half."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +26,13 @@ class NotchParameters:
         doc="frequency over the width in which more than 3 dB are taken out; slow motion is late "
         "by 1/(2π frequency quality)",
     )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Refuse a notch so wide that slow samples cannot show it."""
+        least = self.frequency * 1e-9 * LONGEST_NS / _WIDEST
+        if self.quality < least:
+            text = f">= {least:.3g} at {self.frequency:g} Hz, or samples of 100 Hz cannot show it"
+            raise ParameterError("quality", self.quality, text)
 
 
 @kernel

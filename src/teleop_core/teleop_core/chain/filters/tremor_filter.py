@@ -29,7 +29,7 @@ _STATE = [
     ("shift", "f8", (3,)), ("begun", "i8"), ("is_retuned", "i8"), ("is_other", "i8"),
 ]  # fmt: skip
 _FADE = 0.2
-"""Time in which the difference between old and new parameters goes away [s]."""
+"""Time constant with which the difference between old and new parameters goes away [s]."""
 
 
 class Part(NamedTuple):
