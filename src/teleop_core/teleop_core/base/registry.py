@@ -11,6 +11,7 @@ A program adds them with :meth:`Registry.add`. Nothing is imported before it is 
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import is_dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -165,3 +166,26 @@ def part_check(kind: str, form: type[Part], *calls: str) -> Callable[[str, objec
         return part
 
     return check
+
+
+@contextmanager
+def tried(kind: str, name: str, needs: str) -> Iterator[None]:
+    """Tell what a part raises that is tried inside of this ``with``.
+
+    Args:
+        kind: As the registry's.
+        name: Of the part.
+        needs: What it must be: "one with ...".
+
+    Raises:
+        PartError: Whatever it raises, in one line; a PartError passes as it is.
+    """
+    try:
+        yield
+    except PartError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise PartError(
+            kind, name, f"{needs}; it raises {type(error).__name__}: {reason}"
+        ) from error

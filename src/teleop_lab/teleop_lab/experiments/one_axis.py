@@ -5,6 +5,7 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
@@ -57,15 +58,12 @@ def exact_boundary(grip: Grip, delay: float, period: float = DT) -> float:
     signs = np.sign([residue(w) for w in speeds])
     found = []
     for i in np.flatnonzero(signs[1:] != signs[:-1]):
-        low, high = float(speeds[i]), float(speeds[i + 1])
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if residue(middle) * signs[i] > 0.0 else (low, middle)
-        sine, cosine = math.sin(low * late), math.cos(low * late)
+        speed = float(brentq(residue, speeds[i], speeds[i + 1]))
+        sine, cosine = math.sin(speed * late), math.cos(speed * late)
         if abs(sine) > abs(cosine):
-            found.append(grip.damping * low / sine)
+            found.append(grip.damping * speed / sine)
         else:
-            found.append((grip.mass * low * low - grip.stiffness) / cosine)
+            found.append((grip.mass * speed * speed - grip.stiffness) / cosine)
     return min(stiffness for stiffness in found if stiffness > 0.0)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, Figure
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.drawing import PUBLISHED, axis, joined, line
@@ -29,7 +30,7 @@ _WINDOW = 20  # ticks over which a speed is taken: steps of the reading are smal
 _THROWN = 2.0
 """A hand is thrown that gets so many times as fast as the same hand without any object."""
 _COLORS = (FIRST, SECOND, FIXTURE)
-_APPARENT_MASS = 0.045
+_APPARENT_MASS = DeviceParameters().apparent_mass
 
 
 def _settings(grip: Grip, delay: float, stiffness: float, passivity: str) -> Settings:

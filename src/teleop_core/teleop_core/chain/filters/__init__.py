@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check
+from teleop_core.base.registry import Registry, part_check, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.trials import fenced, is_whole
@@ -65,7 +65,11 @@ class TremorFilter:
 
 def _try(part: TremorFilter) -> None:
     """Filter some values, so that what cannot work is told before anything runs."""
-    try:
+    needs = (
+        "one with filter(numbers, memory, value, period) -> float and parameters that all have "
+        "defaults"
+    )
+    with tried("tremor filter", part.name, needs):
         numbers = part.numbers_of(part.parameters())
         memory, fence = fenced(np.zeros(MEMORY))
         rest = float(part.filter(numbers, memory, 0.0, 1e-3))
@@ -74,15 +78,6 @@ def _try(part: TremorFilter) -> None:
             if not (math.isfinite(filtered) and is_whole(fence)):
                 text = f"one whose filter is finite and remembers {MEMORY} numbers"
                 raise PartError("tremor filter", part.name, f"{text}; it is {filtered!r}")
-    except PartError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        raise PartError(
-            "tremor filter", part.name,
-            "one with filter(numbers, memory, value, period) -> float and parameters that all have "
-            f"defaults; it raises {type(error).__name__}: {reason}",
-        ) from error  # fmt: skip
     if rest != 0.0:
         text = f"one whose filter gives 0 for 0, so that a resting hand rests; it is {rest!r}"
         raise PartError("tremor filter", part.name, text)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from teleop_core.base.errors import PartError
-from teleop_core.base.registry import Registry, part_check
+from teleop_core.base.registry import Registry, part_check, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.trials import fenced, is_whole
@@ -64,7 +64,11 @@ class Network:
 
 def _try(part: Network) -> None:
     """Draw for some packets, so that what cannot work is told before anything runs."""
-    try:
+    needs = (
+        "one with draw(numbers, memory, chances, now) -> float and parameters that all have "
+        "defaults"
+    )
+    with tried("network", part.name, needs):
         numbers = part.numbers_of(part.parameters())
         memory, fence = fenced(np.zeros(MEMORY))
         for i, chance in enumerate(np.linspace(0.0, 0.999, 32)):
@@ -72,15 +76,6 @@ def _try(part: Network) -> None:
             if not (math.isfinite(drawn) and is_whole(fence)):
                 text = f"one whose draw is finite and remembers {MEMORY} numbers; it is {drawn!r}"
                 raise PartError("network", part.name, text)
-    except PartError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        raise PartError(
-            "network", part.name,
-            "one with draw(numbers, memory, chances, now) -> float and parameters that all have "
-            f"defaults; it raises {type(error).__name__}: {reason}",
-        ) from error  # fmt: skip
 
 
 NETWORKS: Registry[Network] = Registry(

@@ -16,7 +16,7 @@ from numba import types
 
 from teleop_core.base.errors import PartError
 from teleop_core.base.parameters import values_of
-from teleop_core.base.registry import Registry, part_check
+from teleop_core.base.registry import Registry, part_check, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.trials import fenced, is_whole
@@ -71,20 +71,15 @@ _TRIED = np.array([(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37),
 
 def _try(part: WorldObject) -> None:
     """Try it at some places, so that what cannot work is told before anything runs."""
-    try:
+    needs = (
+        "one with distance(offset, shape, normal) -> float, outline(parameters) -> (N, 3) and "
+        "parameters that all have defaults"
+    )
+    with tried("world object", part.name, needs):
         parameters = part.parameters()
         np.asarray(part.outline(parameters), np.float64).reshape(-1, 3)
         for offset in _TRIED:
             _try_at(part, shape_of(parameters), offset)
-    except PartError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        raise PartError(
-            "world object", part.name,
-            "one with distance(offset, shape, normal) -> float, outline(parameters) -> (N, 3) and "
-            f"parameters that all have defaults; it raises {type(error).__name__}: {reason}",
-        ) from error  # fmt: skip
 
 
 def _try_at(part: WorldObject, numbers: Array, offset: Array) -> None:
