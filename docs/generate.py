@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from teleop_core.base.parameters import specs
+from teleop_core.chain.filters.tremor_filter import TREMOR_FILTER
 from teleop_core.evaluation import key_table
 from teleop_core.graph.graph import Graph, Link, build_graph
 from teleop_core.graph.layers import declared_groups
 from teleop_core.graph.topics import (
     DIAGNOSTICS,
-    MASTER_FILTERED_CP,
     NETWORK_TOPICS,
     OPERATOR_BUTTONS,
     OPERATOR_SERVO_CP,
@@ -81,7 +81,7 @@ def topics_page(graph: Graph) -> str:
     rows += [topic_row(topic, writer, with_network) for topic in NETWORK_TOPICS]
     with_filter = build_graph(stages=["tremor_filter"])
     writer = "[tremor_filter](tremor_filters.md), a further stage"
-    rows.append(topic_row(MASTER_FILTERED_CP, writer, with_filter))
+    rows += [topic_row(topic, writer, with_filter) for topic in TREMOR_FILTER.writes]
     return page([
         "# Topics",
         "CRTK names, standard messages, SI units. Streams are offered reliable with a queue of "

@@ -87,6 +87,30 @@ class Desk:
         return state[start : start + 3].copy(), state[size : size + 3].copy()
 
 
+def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of_it():
+    desk = Desk(fixture=FixtureParameters(wall="soft"))
+    desk.step()
+    out, force = desk.row["master_filtered_out"], desk.row["master_servo_cf"]
+    size = desk.scaling.parameters["size"][0]
+    out[:] = [size, 0.0, 0.0]
+    desk.step()
+    desk.press("fixture")
+    before = desk.row["slave_servo_cp"][:3].copy()
+    assert not force.any()  # the box stands around the stylus, not around what is left of it
+    out[0] = 1.5 * size + 1.0 * MM  # the tip trembles out of the box
+    desk.step()
+    assert force[0] < 0.0
+    np.testing.assert_array_equal(desk.row["slave_servo_cp"][:3], before)
+    out[0] = size
+    desk.step()
+    assert not force.any()
+    desk.hold("clutch")
+    for share in np.linspace(1.0, 5.0, 20):  # what is left comes late while the box is carried
+        out[0] = share * size
+        desk.step()
+        assert not force.any()
+
+
 def mapped(stylus, tool_roll):
     scaling = MotionScaling(MotionScalingParameters(tool_roll=tool_roll))
     quaternion, tool, out = np.empty(4), np.empty(4), np.empty((3, 3))

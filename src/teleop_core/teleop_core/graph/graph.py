@@ -154,8 +154,9 @@ class Graph:
                     raise PartError("stage", stage.name, text)
                 writers[topic.name] = stage
         for stage in self.stages:
+            optional = {topic.name for topic in stage.optional}
             for topic in stage.reads:
-                if topic.name not in writers and not self._adding(topic):
+                if topic.name not in {*writers, *optional} and not self._adding(topic):
                     have = ", ".join(sorted(writers)) or "nothing"
                     text = f"given {topic.name}, which no stage writes; there is {have}"
                     raise PartError("stage", stage.name, text)

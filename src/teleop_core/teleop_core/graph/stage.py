@@ -91,6 +91,7 @@ class Stage:
             length of a tick [s].
         late: Those of ``reads`` that are taken as they were at the end of the last tick. A cycle
             of stages needs one.
+        optional: Those of ``reads`` that no stage has to write; zeros where none does.
         trigger: The topic whose messages it answers, one step each; None for a stage with a clock
             of its own, which makes one step per tick.
         replaces: Topic whose other readers read ``writes[0]`` in its place, as for a limit or a
@@ -113,6 +114,7 @@ class Stage:
     state: tuple[Field, ...] = ()
     make: Callable[[Any, float], Runner] | None = None
     late: tuple[Topic, ...] = ()
+    optional: tuple[Topic, ...] = ()
     trigger: Topic | None = None
     replaces: Topic | tuple[Topic, ...] | None = None
     spares: tuple[str, ...] = ()
@@ -123,7 +125,7 @@ class Stage:
     def __post_init__(self) -> None:
         """Refuse what could never run."""
         self._insist(self.name.isidentifier(), "a name of letters, digits and _")
-        for word in ("reads", "writes", "late", "needs"):
+        for word in ("reads", "writes", "late", "optional", "needs"):
             found = getattr(self, word)
             is_right = isinstance(found, tuple) and all(isinstance(t, Topic) for t in found)
             text = (
@@ -133,8 +135,8 @@ class Stage:
         is_right = isinstance(self.spares, tuple) and all(isinstance(n, str) for n in self.spares)
         self._insist(is_right, f"with spares as a tuple of names, not {self.spares!r}")
         known = {topic.name for topic in self.reads}
-        for word, topics in (("late", self.late), ("needs", self.needs)):
-            for topic in topics:
+        for word in ("late", "optional", "needs"):
+            for topic in getattr(self, word):
                 self._insist(topic.name in known, f"with {topic.name} ({word}) among its reads")
         if self.trigger is not None:
             text = f"with its trigger {self.trigger.name} among its reads"

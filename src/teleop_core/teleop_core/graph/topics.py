@@ -234,6 +234,14 @@ MASTER_FILTERED_CP = Topic(
     "master/filtered_cp", Kind.POSE, passed_on("master/measured_cp"), "master_base"
 )
 """The stylus without tremor, of a session with a tremor filter."""
+MASTER_FILTERED_OUT = Topic(
+    "master/filtered_out",
+    Kind.NUMBERS,
+    passed_on("master/measured_cp"),
+    "master_base",
+    columns=("x", "y", "z"),
+)
+"""What a tremor filter took away [m]: the stylus is at filtered_cp and this much further."""
 MASTER_MEASURED_CV = Topic("master/measured_cv", Kind.TWIST, SAMPLED, "master_base")
 MASTER_MEASURED_CF = Topic("master/measured_cf", Kind.WRENCH, SAMPLED, "master_base")
 MASTER_BUTTONS = Topic("master/buttons", Kind.BUTTONS, SAMPLED, "master_base")
@@ -353,4 +361,6 @@ ALL = (
     *STREAMS, HAND_BUTTONS, HAND_TREMOR,
     SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS,
 )  # fmt: skip
-BY_NAME = {topic.name: topic for topic in (*ALL, *NETWORK_TOPICS, MASTER_FILTERED_CP)}
+BY_NAME = {
+    topic.name: topic for topic in (*ALL, *NETWORK_TOPICS, MASTER_FILTERED_CP, MASTER_FILTERED_OUT)
+}

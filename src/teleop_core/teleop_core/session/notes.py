@@ -3,19 +3,16 @@
 from teleop_core.chain.mapping.parameters import (
     FixtureParameters,
     MotionScalingParameters,
-    ReflectionParameters,
 )
 from teleop_core.chain.mapping.walls import WALLS, passive_stiffness
 from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.chain.master.haptic_master import HapticMasterParameters
-from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
 from teleop_core.session.configuration import Configuration
 
 _MASTER, _MAPPING = BUILT_IN[1:3]
-_FILTER = "tremor_filter"
 
 
 def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
@@ -27,9 +24,8 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
             delays [s].
     """
     found = list(configuration.graph.notes)
-    is_filtered = any(s.name == _FILTER for s in configuration.graph.stages)
     for arm in configuration.graph.namespaces:
-        operator, master, mapping = (configuration.group(name, arm) for name in BUILT_IN[:3])
+        master, mapping = (configuration.group(name, arm) for name in BUILT_IN[1:3])
         if isinstance(master, HapticMasterParameters) and isinstance(
             mapping, MotionScalingParameters
         ):
@@ -37,8 +33,6 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
             told = (
                 rendered_note(master.device, mapping.fixture),
                 passive_note(master.device, mapping.fixture, delay),
-                filtered_note(mapping.fixture) if is_filtered and _may_press(operator) else "",
-                filtered_tank_note(mapping.reflection) if is_filtered else "",
             )
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
     return found
@@ -80,30 +74,6 @@ def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: fl
         f"the {fixture.wall} wall of {stiffness:.0f} N/m may give back more energy than it took: "
         f"{until}"
     )
-
-
-def _may_press(operator: object) -> bool:
-    """Whether this operator is known to switch the fixture on, or is a person who may."""
-    if not isinstance(operator, OperatorParameters):
-        return True
-    return bool(operator.buttons.fixture) or operator.kind.kind == "remote"
-
-
-def filtered_note(fixture: FixtureParameters) -> str:
-    """What becomes of a wall behind a tremor filter; empty where it cannot push."""
-    if fixture.max_force == 0.0 or fixture.stiffness == 0.0:
-        return ""
-    return (
-        f"the {fixture.wall} wall goes by the filtered stylus, late as that is: it may give back "
-        "more energy than it took"
-    )
-
-
-def filtered_tank_note(reflection: ReflectionParameters) -> str:
-    """What becomes of a tank behind a tremor filter; empty where nothing is felt or none is on."""
-    if reflection.force_gain == 0.0 or reflection.passivity != "tank":
-        return ""
-    return "the tank goes by the filtered stylus: touches may give back more energy than they took"
 
 
 def rendered_note(device: DeviceParameters, fixture: FixtureParameters) -> str:

@@ -1,7 +1,8 @@
 """Tremor filter: a stage between the master and the mapping, which takes tremor out of the hand.
 
 The slave is led by the filtered stylus. An operator sees and feels the stylus itself, and so does
-everyone who reads ``master/measured_cp`` from outside.
+everyone who reads ``master/measured_cp`` from outside. What pushes the hand goes by the stylus
+itself too: a push that is late gives back more energy than it took.
 """
 
 import math
@@ -19,7 +20,7 @@ from teleop_core.chain.mapping.plausibility import (
 )
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.graph.topics import MASTER_FILTERED_CP, MASTER_MEASURED_CP
+from teleop_core.graph.topics import MASTER_FILTERED_CP, MASTER_FILTERED_OUT, MASTER_MEASURED_CP
 from teleop_core.kernels import inner, kernel, records
 from teleop_core.kernels.geometry import Array
 
@@ -96,7 +97,7 @@ def _follow(s: Any, part: Any, pose: Array, elapsed_ns: int, filtered: Array) ->
 
 @kernel
 def tremor_filter_step(p: Any, s: Any, part: Any, row: Any, dt: float) -> None:
-    """One master sample: write master_filtered_cp.
+    """One master sample: write master_filtered_cp and master_filtered_out.
 
     The position is filtered coordinate by coordinate, over the time between stamps; the orientation
     passes. A reading that is not finite, or of the same stamp as the last one, changes nothing:
@@ -125,6 +126,7 @@ def tremor_filter_step(p: Any, s: Any, part: Any, row: Any, dt: float) -> None:
         _begin(s, part.memory, pose, filtered)
     for i in range(3):
         s.told[i] = filtered[i]
+        row.master_filtered_out[i] = pose[i] - filtered[i]
 
 
 class RunningTremorFilter(RunningStage):
@@ -174,7 +176,7 @@ TREMOR_FILTER = Stage(
     "tremor_filter",
     TremorFilterParameters,
     reads=(MASTER_MEASURED_CP,),
-    writes=(MASTER_FILTERED_CP,),
+    writes=(MASTER_FILTERED_CP, MASTER_FILTERED_OUT),
     trigger=MASTER_MEASURED_CP,
     replaces=MASTER_MEASURED_CP,
     spares=("operator",),

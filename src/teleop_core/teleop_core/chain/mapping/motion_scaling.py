@@ -50,6 +50,7 @@ from teleop_core.graph.signals import DT, STATE, assign, copy
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
+    MASTER_FILTERED_OUT,
     MASTER_MEASURED_CP,
     MASTER_SERVO_CF,
     SLAVE_MEASURED_CF,
@@ -76,7 +77,7 @@ _PARAMETERS = [
 _STATE = [
     ("buttons", "f8", (3,)), ("is_fine", "i8"), ("is_engaged", "i8"), ("must_latch", "i8"),
     ("is_fixture_on", "i8"), ("last_ns", "i8"),
-    ("center", "f8", (3,)), ("master", "f8", (3,)), ("command", "f8", (7,)),
+    ("center", "f8", (3,)), ("master", "f8", (3,)), ("stylus", "f8", (3,)), ("command", "f8", (7,)),
     ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
     *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"), *REFLECTION_STATE, *FOLLOWING_STATE,
 ]  # fmt: skip
@@ -136,14 +137,14 @@ def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
 
 
 @inner
-def _latch(s: Any, position: Array) -> None:
+def _latch(s: Any, stylus: Array) -> None:
     """Hold the command and measure further motion from here: no step, whatever happened before.
 
     The fixture goes with the hand, so that it stays where it is around the slave.
     """
     if s.is_engaged:
         for i in range(3):
-            s.center[i] += position[i] - s.master[i]
+            s.center[i] += stylus[i] - s.stylus[i]
     align(s)
     forget_limits(s)
 
@@ -172,20 +173,20 @@ def _move(p: Any, s: Any, gain: float, position: Array, turn: Array) -> None:
 
 
 @inner
-def _wall(p: Any, s: Any, fixture: Any, period: float, pose: Array, force: Array) -> None:
+def _wall(p: Any, s: Any, fixture: Any, period: float, stylus: Array, force: Array) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
     length = 0.0
     if s.is_fixture_on:
         for i in range(3):
-            fixture.offset[i] = pose[i] - s.center[i]
+            fixture.offset[i] = stylus[i] - s.center[i]
         length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
     if p.is_damped == 0:
         wall_force(fixture.out, length, p.stiffness, p.max_force, force)
         return
     if period <= 0.0 or period > 1e-9 * p.pause_ns:
-        forget_wall(s, pose)
+        forget_wall(s, stylus)
         period = _LONG
-    damped_wall(p, s, pose, fixture.out, length, period, force)
+    damped_wall(p, s, stylus, fixture.out, length, period, force)
 
 
 @inner
@@ -219,15 +220,17 @@ def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
 
 
 @inner
-def _refuse(p: Any, s: Any, sent: Any, is_following: bool, is_doubtful: bool, row: Any) -> None:
+def _refuse(
+    p: Any, s: Any, sent: Any, is_following: bool, is_doubtful: bool, stylus: Array, row: Any
+) -> None:
     """Answer a sample that no hand can have made: hold, push with nothing, begin anew after it."""
     s.must_latch = 1
     remember(s, sent, row.master_measured_cp_ns)
-    forget_wall(s, row.master_measured_cp)
+    forget_wall(s, stylus)
     for i in range(6):
         row.master_servo_cf[i] = 0.0
     for i in range(3):
-        s.push[i], s.pushed_at[i] = 0.0, row.master_measured_cp[i]
+        s.push[i], s.pushed_at[i] = 0.0, stylus[i]
     if not (is_doubtful or (is_following and s.is_engaged)):
         copy(row.slave_setpoint_cp, s.command)
     copy(s.command, row.slave_servo_cp)
@@ -251,19 +254,22 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     orientation follows the stylus absolutely, up to an alignment that is latched whenever the
     slave is engaged anew. While clutched the command is held; while the slave does not follow it
     is the slave's own setpoint. What the arm cannot reach is cut off, and motion goes on from
-    there: see :mod:`teleop_core.chain.mapping.limits`.
+    there: see :mod:`teleop_core.chain.mapping.limits`. The slave is led by the pose, which a tremor
+    filter may have made late; what pushes the hand goes by the stylus, tremor and all.
 
     Source:
         Vongbunyong 2008, sections 6.2-6.3.
     """
-    pose, buttons = row.master_measured_cp, row.master_buttons
+    pose, buttons, stylus = row.master_measured_cp, row.master_buttons, np.empty(3)
+    for i in range(3):
+        stylus[i] = pose[i] + row.master_filtered_out[i]
     period = 1e-9 * (row.master_measured_cp_ns - s.last_ns)
     hear(s, row)
     is_following = follows(p, s, row)
     is_doubtful = is_in_doubt(p, s, is_following, row)
     draw_back(s, sent, p.gain[s.is_fine], row)
     if not is_plausible(p, s, pose, row.master_measured_cp_ns):
-        _refuse(p, s, sent, is_following, is_doubtful, row)
+        _refuse(p, s, sent, is_following, is_doubtful, stylus, row)
         return
     clutch = 1.0 if has_lost_buttons(p, s, row) else buttons[0]
     _toggle_mode(s, buttons)
@@ -278,20 +284,20 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     if s.must_latch and s.is_engaged and s.last_ns != 0:
         s.aligned += 1
     if s.must_latch or clutch > 0.0 or s.buttons[0] > 0.0:
-        _latch(s, pose)
+        _latch(s, stylus)
     else:
         _move(p, s, gain, pose, turn)
         measure_depth(s, p.reach_depth, row.master_measured_cp_ns)
-    _toggle_fixture(s, buttons, pose)
+    _toggle_fixture(s, buttons, stylus)
     s.is_engaged, s.must_latch = 1, 0
     for i in range(3):
-        s.master[i], s.buttons[i] = pose[i], buttons[i]
+        s.master[i], s.stylus[i], s.buttons[i] = pose[i], stylus[i], buttons[i]
     s.buttons[0] = clutch
     s.last_ns = row.master_measured_cp_ns
     remember(s, sent, s.last_ns)
-    _wall(p, s, fixture, period, pose, row.master_servo_cf)
+    _wall(p, s, fixture, period, stylus, row.master_servo_cf)
     _push_back(p, s, row.master_servo_cf)
-    reflect(p, s, period, pose, row)
+    reflect(p, s, period, stylus, row)
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
     _report(p, s, gain, is_following, row)
@@ -409,9 +415,17 @@ class MotionScaling(RunningStage):
 MOTION_SCALING = Stage(
     "motion_scaling",
     MotionScalingParameters,
-    reads=(MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF),
+    reads=(
+        MASTER_MEASURED_CP,
+        MASTER_BUTTONS,
+        SLAVE_SETPOINT_CP,
+        SLAVE_REACH,
+        SLAVE_MEASURED_CF,
+        MASTER_FILTERED_OUT,
+    ),
     writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE),
     late=(SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF),
+    optional=(MASTER_FILTERED_OUT,),
     trigger=MASTER_MEASURED_CP,
     needs=(SLAVE_SETPOINT_CP,),
     make=MotionScaling,

@@ -24,7 +24,7 @@ _SPARE, _READING = 0.005, 0.06e-3
 
 
 @inner
-def reflect(p: Any, s: Any, period: float, pose: Array, row: Any) -> None:
+def reflect(p: Any, s: Any, period: float, stylus: Array, row: Any) -> None:
     """Add what the slave touches to the hand's force (3,) [N]; what falls silent fades.
 
     Source:
@@ -42,7 +42,7 @@ def reflect(p: Any, s: Any, period: float, pose: Array, row: Any) -> None:
         square += felt[i] * felt[i]
     asked = p.reflected * math.sqrt(square)
     share = p.reflected * (p.reflected_most / asked if asked > p.reflected_most else 1.0)
-    _fill_tank(s, pose)
+    _fill_tank(s, stylus)
     for i in range(3):
         s.push[p.axis[i]] = p.sign[i] * s.heard * share * felt[i]
     if p.has_tank:
@@ -52,14 +52,14 @@ def reflect(p: Any, s: Any, period: float, pose: Array, row: Any) -> None:
 
 
 @inner
-def _fill_tank(s: Any, pose: Array) -> None:
+def _fill_tank(s: Any, stylus: Array) -> None:
     """Take from the tank what the last push gave the hand, which moved to a place since then."""
     s.pushed_way = 0.0
     for i in range(3):
-        way = pose[i] - s.pushed_at[i]
+        way = stylus[i] - s.pushed_at[i]
         s.tank -= s.push[i] * way
         s.pushed_way += abs(way)
-        s.pushed_at[i] = pose[i]
+        s.pushed_at[i] = stylus[i]
 
 
 @inner
