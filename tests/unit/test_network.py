@@ -289,7 +289,7 @@ def test_ages_of_live_arrivals_grow_between_them():
         ages.add(logs[known], stamps[known], after, until)
     looks = np.arange(int(logs[0]), int(logs[-1]), MS // 10)
     expected = (looks - stamps[np.searchsorted(logs, looks, side="right") - 1]) / MS
-    score = ages.score(0.0)
+    score = ages.score(0.0, None)
     assert score.age_mean_ms == pytest.approx(expected.mean(), rel=0.02)
     assert score.age_p99_ms == pytest.approx(np.percentile(expected, 99), rel=0.02)
 
@@ -299,6 +299,72 @@ def test_packets_go_no_faster_than_their_rate():
     _, stamps = through(network, walk(1000))
     assert len(np.unique(stamps)) == pytest.approx(100, abs=1)
     assert (np.diff(np.unique(stamps)[1:]) == 10 * MS).all()
+
+
+@settings(max_examples=30, deadline=None)
+@given(place=st.sampled_from([1e-4, 1e-3]), pause=st.sampled_from([1, 7, 50]))
+def test_behind_a_deadband_a_command_is_off_by_no_more_than_that_nor_silent_for_long(place, pause):
+    places = walk(800)
+    network = link(
+        deadband__is_on=True, deadband__place=place, deadband__longest_pause=pause * 1e-3
+    )
+    came, stamps = through(network, places)
+    assert np.linalg.norm(came[1:] - places[1:], axis=1).max() <= place
+    assert (np.arange(2, 802)[1:] - stamps[1:] / MS).max() <= pause - 1
+    sent = len(np.unique(stamps[1:]))
+    assert (sent == 799) if pause == 1 else (sent >= 799 // pause)
+    if pause == 50:  # walk() goes 0.17 mm in a step
+        assert sent < 40 if place == 1e-3 else 799
+
+
+def test_a_hand_that_rests_behind_a_deadband_sends_a_packet_in_each_longest_pause():
+    resting = np.zeros((1000, 3))
+    _, stamps = through(link(deadband__is_on=True, deadband__longest_pause=0.05), resting)
+    assert len(np.unique(stamps)) == pytest.approx(20, abs=1)
+    _, stamps = through(link(), resting)
+    assert len(np.unique(stamps)) == 1000  # without a deadband one goes whenever it may
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_turn_counts_by_its_angle_whatever_the_sign_of_its_quaternion(sign):
+    network, told = link(deadband__is_on=True, deadband__turn=0.1, deadband__longest_pause=1.0), []
+    row = network.signals
+    for tick in range(1, 400):
+        angle = 1e-3 * tick
+        row["now_ns"] = row["slave_servo_cp_ns"] = (tick + 1) * MS
+        turn = np.array([math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
+        row["slave_servo_cp"][3:] = turn if tick % 2 else sign * turn
+        row["slave_setpoint_cp_ns"] = max(int(row["network_servo_cp_ns"]), 1)
+        network.step()
+        told.append(int(row["network_servo_cp_ns"]))
+    sent = np.unique(told)[1:]
+    np.testing.assert_allclose(np.diff(sent) / MS, 101.0, atol=1.0)
+
+
+def test_a_force_behind_a_deadband_is_off_by_no_more_than_its_share():
+    given = ["reflection.force_gain=1", *(f"network.deadband.{text}" for text in
+             ("is_on=true", "place=1e-3", "turn=0.05"))]  # fmt: skip
+    run = session(*given, scenario="palpation")
+    rows = run.run(run.lead + 10_000)
+    own, there = (rows[f"{name}_measured_cf"][:, :3] for name in ("slave", "network"))
+    known = rows["network_measured_cf_ns"] > 0
+    # What came at a tick is what the slave said a tick ago.
+    off = np.linalg.norm(own[:-1] - there[1:], axis=1)[known[1:]]
+    most = np.maximum(0.1 * np.linalg.norm(there[1:], axis=1), 0.02)[known[1:]]
+    assert np.linalg.norm(own, axis=1).max() > 0.5
+    assert (off <= most + 1e-12).all()
+    assert off.max() > 0.03  # a larger force may be off by more
+    sent = rows["network_state"][-1][3]
+    assert sent < 0.35 * len(rows)
+
+
+def test_increments_behind_a_deadband_lose_no_motion():
+    places = walk(2000)
+    network = link(commands="incremental", deadband__is_on=True, deadband__place=1e-3)
+    row = network.signals
+    came, _ = through(network, places)
+    assert row["network_state"][0] < 400
+    assert np.linalg.norm(came[-1] - came[1] - (places[-1] - places[1])) <= 2e-3
 
 
 def test_a_network_that_loses_everything_says_so():
@@ -445,3 +511,4 @@ def test_the_score_tells_the_age_at_the_reader_and_the_losses(tmp_path):
     assert score.value("network.there.age_p99_ms") == pytest.approx(np.percentile(age, 99), abs=1.0)
     assert score.value("network.there.lost_share") == pytest.approx(0.506, abs=0.05)
     assert score.value("network.back.lost_share") == 0.0
+    assert score.value("network.there.packet_rate_hz") == pytest.approx(1000.0, rel=0.01)

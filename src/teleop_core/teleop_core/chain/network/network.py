@@ -10,6 +10,13 @@ from typing import Any
 import numpy as np
 
 from teleop_core.chain.network import CHANCES, NETWORKS
+from teleop_core.chain.network.deadband import (
+    DEADBAND_PARAMETERS,
+    DEADBAND_STATE,
+    is_worth_telling,
+    remember_told,
+    take_deadband,
+)
 from teleop_core.chain.network.link import (
     BLOCK,
     LINK_PARAMETERS,
@@ -41,8 +48,8 @@ from teleop_core.kernels import inner, kernel, records
 from teleop_core.kernels.geometry import Array
 
 THERE, BACK = 0, 1
-_PARAMETERS = [*LINK_PARAMETERS, ("is_incremental", "i8")]
-_STATE = [*LINK_STATE, ("sent_ns", "i8"), ("sent_at", "f8", (3,)), ("base", "f8", (3,))]
+_PARAMETERS = [*LINK_PARAMETERS, *DEADBAND_PARAMETERS, ("is_incremental", "i8")]
+_STATE = [*LINK_STATE, *DEADBAND_STATE, ("sent_ns", "i8"), ("base", "f8", (3,))]
 _TOLD = 20
 """Ticks from one report to the next."""
 _FOLLOWS_NS = 100_000_000
@@ -70,10 +77,13 @@ def _send_there(p: Any, s: Any, there: Any, row: Any, dt: float) -> None:
     is_new = row.slave_servo_cp_ns not in (0, s.sent_ns)
     if not (is_new and s.newest[BACK] > 0 and may_send(p, s, THERE)):
         return
+    none = row.slave_measured_cf[:0]
+    if not is_worth_telling(p, s, THERE, row.slave_servo_cp, none):
+        return
     for i in range(3):
         if s.sent_ns != 0:
-            there.moved[0, i] = row.slave_servo_cp[i] - s.sent_at[i]
-        s.sent_at[i] = row.slave_servo_cp[i]
+            there.moved[0, i] = row.slave_servo_cp[i] - s.told_pose[THERE, i]
+    remember_told(s, THERE, row.slave_servo_cp, none)
     s.sent_ns = row.slave_servo_cp_ns
     _pack(row.slave_servo_cp, there.packet, 0)
     there.packet_ns[0] = row.slave_servo_cp_ns
@@ -85,6 +95,10 @@ def _send_back(p: Any, s: Any, back: Any, row: Any, dt: float) -> None:
     """Send what the slave says of itself, once it has said anything."""
     if row.slave_setpoint_cp_ns == 0 or not may_send(p, s, BACK):
         return
+    force = row.slave_measured_cf[:3]
+    if not is_worth_telling(p, s, BACK, row.slave_measured_cp, force):
+        return
+    remember_told(s, BACK, row.slave_measured_cp, force)
     _pack(row.slave_setpoint_cp, back.packet, _SETPOINT)
     _pack(row.slave_measured_cp, back.packet, _POSE)
     _pack(row.slave_measured_cf, back.packet, _FORCE)
@@ -189,6 +203,7 @@ class NetworkLink(RunningStage):
         """Take another network from the next packet on; what is on its way arrives as it would."""
         p = self.parameters
         p["is_incremental"] = parameters.commands == "incremental"
+        take_deadband(p, parameters.deadband, self.dt)
         for k, given in enumerate(parameters.ways):
             p["least_delay"][k], p["loss"][k] = given.least_delay, given.loss
             p["keeps_order"][k] = given.packet_order == "kept"

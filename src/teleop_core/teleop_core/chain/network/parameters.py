@@ -6,6 +6,7 @@ from typing import Any
 
 from teleop_core.base.parameters import Choice, build, choice, parameter
 from teleop_core.chain.network import NETWORKS
+from teleop_core.chain.network.deadband import DeadbandParameters
 
 _QOS = "UVA-DSA telesurgery QoS analysis 2026"
 
@@ -92,6 +93,7 @@ class NetworkParameters:
         doc="what a packet to the slave says: where the tip shall be, or by how much it moves, so "
         "that a lost packet is lost motion",
     )  # fmt: skip
+    deadband: DeadbandParameters = field(default_factory=DeadbandParameters)
     there: WayParameters = field(default_factory=WayParameters)
     back: WayParameters = field(default_factory=WayParameters)
 

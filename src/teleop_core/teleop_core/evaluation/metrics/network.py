@@ -32,6 +32,7 @@ class WayScore:
     age_mean_ms: float | None = figure("ms", "mean age of the newest packet that its reader has")
     age_p99_ms: float | None = figure("ms", "the age that is exceeded for 1 % of the time")
     lost_share: float | None = figure("1", "share of the packets that were lost")
+    packet_rate_hz: float | None = figure("Hz", "packets that were sent in a second")
 
 
 @dataclass(frozen=True)
@@ -68,11 +69,11 @@ class _Ages:
         found: Integers = begins - stamps
         return found
 
-    def score(self, lost: float | None) -> WayScore:
-        """Mean and 99th percentile, with the losses."""
+    def score(self, lost: float | None, rate: float | None) -> WayScore:
+        """Mean and 99th percentile, with losses and rate of packets."""
         if not self.count:
-            return WayScore(None, None, lost)
-        return WayScore(1e-6 * self.sum_ns / self.count, self.ages.delay().p99, lost)
+            return WayScore(None, None, lost, rate)
+        return WayScore(1e-6 * self.sum_ns / self.count, self.ages.delay().p99, lost, rate)
 
 
 class NetworkMetric(Metric):
@@ -109,18 +110,21 @@ class NetworkMetric(Metric):
             trace.add(np.maximum(logs, window.after_ns), shown)
         told = window.samples(NETWORK_STATE).values
         if len(told):
-            self._first = self._first or told[0].tolist()
-            self._last = told[-1].tolist()
+            stamps = window.samples(NETWORK_STATE).stamp_ns
+            self._first = self._first or [int(stamps[0]), *told[0].tolist()]
+            self._last = [int(stamps[-1]), *told[-1].tolist()]
 
-    def _lost(self, k: int) -> float | None:
+    def _packets(self, k: int) -> tuple[float | None, float | None]:
+        """Share that was lost, and packets sent in a second; None where nothing is known."""
         if self._first is None:
-            return None
-        sent, lost = (self._last[3 * k + i] - self._first[3 * k + i] for i in range(2))
-        return lost / sent if sent else None
+            return None, None
+        ns = self._last[0] - self._first[0]
+        sent, lost = (self._last[3 * k + i] - self._first[3 * k + i] for i in (1, 2))
+        return lost / sent if sent else None, 1e9 * sent / ns if ns else None
 
     def values(self) -> NetworkScore:
         """Score of everything so far."""
-        there, back = (ages.score(self._lost(k)) for k, ages in enumerate(self._ways))
+        there, back = (ages.score(*self._packets(k)) for k, ages in enumerate(self._ways))
         return NetworkScore(there, back)
 
     def rows(self) -> list[Row]:
@@ -133,6 +137,7 @@ class NetworkMetric(Metric):
                 row(GROUP, f"age {name}, mean", "ms", way.age_mean_ms),
                 row(GROUP, f"age {name}, 99 %", "ms", way.age_p99_ms),
                 row(GROUP, f"lost {name}", "%", 100.0 * way.lost_share),
+                row(GROUP, f"packets {name}", "Hz", way.packet_rate_hz),
             ]
         return found
 
