@@ -13,8 +13,8 @@ drives, and let the arm be tested::
 
 import signal
 import sys
+import threading
 import time
-from contextlib import suppress
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -77,11 +77,13 @@ class Drives(Node):
 
 def main() -> int:
     """Be an arm until it is told to end."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
+    ended = threading.Event()  # asked between two turns: an exception would come anywhere
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     drives = Drives()
-    with suppress(KeyboardInterrupt):
-        rclpy.spin(drives)
+    while not ended.is_set():
+        rclpy.spin_once(drives, timeout_sec=0.1)
     return 0
 
 
