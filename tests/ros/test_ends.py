@@ -225,3 +225,18 @@ def test_a_session_that_a_shell_started_in_the_background_ends_like_any(start, c
     assert session.wait(120) == 0, session.text
     assert time.monotonic() - begun < 25.0  # one unheeded signal alone costs 30 s
     session.recorded()
+
+
+def test_no_socket_is_lost_where_many_ask_for_a_free_domain_at_once():
+    program = (
+        "import sys\n"
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        "from teleop_core.nodes.children import free_domain\n"
+        "sys.setswitchinterval(1e-6)\n"
+        "with ThreadPoolExecutor(8) as pool:\n"
+        "    print(len(list(pool.map(lambda _: free_domain(), range(2000)))))\n"
+    )
+    command = [sys.executable, "-W", "always::ResourceWarning", "-c", program]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert ended.stdout.split() == ["2000"]
+    assert "ResourceWarning" not in ended.stderr

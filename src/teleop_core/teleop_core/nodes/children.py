@@ -36,7 +36,9 @@ def environment() -> dict[str, str]:
     return dict(os.environ) | {"ROS_DOMAIN_ID": os.environ.get("ROS_DOMAIN_ID") or free_domain()}
 
 
-_reserved: deque[socket.socket] = deque(maxlen=8)
+_reserved: deque[socket.socket] = deque()
+_KEPT = 8
+"""So many sockets keep domains reserved; a deque of bounded length would drop them unclosed."""
 
 
 @atexit.register
@@ -61,9 +63,9 @@ def free_domain() -> str:
         except OSError:
             mark.close()
             continue
-        if len(_reserved) == _reserved.maxlen:
-            _reserved.popleft().close()
         _reserved.append(mark)
+        while len(_reserved) > _KEPT:
+            _reserved.popleft().close()
         return str(domain)
     raise SessionError("all ROS domains of this machine are in use; set ROS_DOMAIN_ID")
 
