@@ -134,7 +134,11 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """Time from the first to the last message [s]."""
+        """Time from the first to the last message [s].
+
+        The slave moves to its start first, so it is longer than the ``duration`` of
+        :func:`teleop_core.run`, which counts from when the hand may begin.
+        """
         return (self._bag.end_ns - self._bag.start_ns) * 1e-9
 
     def __getitem__(self, topic: str) -> Stream:
