@@ -93,8 +93,8 @@ def topics_page(graph: Graph) -> str:
         "*Late*: the reader takes what was there at the end of the last tick. *In force*: the "
         "stamp of the command that the slave follows; 0 before the first one.",
         "`fixture_center_*` and `fixture_size_*` of `teleop/state` say in `slave_base` [m] where "
-        "the fixture holds the slave; all are 0 without one. `gain` is metres of the slave for a metre "
-        "of the hand.",
+        "the fixture holds the slave; all are 0 without one. `gain` is metres of the slave for a "
+        "metre of the hand.",
         "[How a sample travels](how_a_sample_travels.md) shows them as a picture.",
     ])  # fmt: skip
 
