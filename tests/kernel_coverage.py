@@ -36,7 +36,7 @@ SLOW = (
     "led_out_of_reach", "in_the_graph", "no_other_attitude", "slave_resumes", "speed_follows",
     "old_stamps", "largest_step", "wanted_path", "from_the_future", "lost", "closed_paths",
     "readings", "kicks", "gives_way", "held_to_a_count", "same_bits", "to_the_bit", "retuning",
-    "overshoots", "returns_when", "leaves_its_stop", "low_pass_of_5_ms",
+    "overshoots", "returns_when", "leaves_its_stop", "low_pass_of_5_ms", "is_forgotten",
 )  # fmt: skip
 
 # What moves hand and arm; the kernels of recording and scoring have no part in that.
