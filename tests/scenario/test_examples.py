@@ -56,6 +56,12 @@ def test_own_fixture_holds_the_hand_as_the_built_in_ones_do(tmp_path):
     assert all(0.1 < depth < 4.0 for depth in depths)
 
 
+def test_an_arm_known_by_its_urdf_alone_follows_the_hand(tmp_path):
+    text = run("any_arm", tmp_path)
+    assert numbers(r"([\d.]+) % of 1000", text)[0] >= 99.5
+    assert numbers(r"([\d.]+) mm RMS", text)[0] < 0.5
+
+
 def test_own_object_is_touched_as_the_built_in_ones_are(tmp_path):
     text = run("own_world_object", tmp_path)
     assert re.findall(r"(\w+): pushed", text) == ["box", "sphere", "ring"]

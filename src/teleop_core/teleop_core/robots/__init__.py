@@ -106,11 +106,13 @@ def load_robot(name: str, **geometry: float | str) -> Robot:
     """Robot by name.
 
     Args:
-        name: One of :func:`list_robots`, or the path of a Denavit-Hartenberg table, which ends in
-            ``.yaml`` or ``.yml``.
+        name: One of :func:`list_robots`, or the path of a URDF, which ends in ``.urdf``, or of a
+            Denavit-Hartenberg table, which ends in ``.yaml`` or ``.yml``.
         **geometry: Lengths and angles in place of the published ones [m, rad], by the symbols of
             the robot's file; a robot may take named options too, such as ``heading="carried"``.
-            Tables and robots that were registered ready-made take none.
+            A URDF takes ``tip="tool0"`` and ``task="x y z"``
+            (:func:`teleop_core.robots.from_urdf.load_urdf`). Tables and robots that were
+            registered ready-made take none.
 
     Returns:
         The robot.

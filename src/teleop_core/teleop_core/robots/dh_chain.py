@@ -1,6 +1,6 @@
 """Denavit-Hartenberg chains as values: rows in one convention, and the robot they make."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from teleop_core.kernels.geometry import Array, checked_array, rotation, transfo
 from teleop_core.kernels.portable import product
 from teleop_core.robots import dh_kernels
 from teleop_core.robots.dh_drives import drives_of
+from teleop_core.robots.drives import Drives
 from teleop_core.robots.kinematics import DIRECTIONS, Kernels
 from teleop_core.robots.robot import Robot
 
@@ -100,33 +101,19 @@ class DhTable:
 
     def robot(self) -> Robot:
         """The chain as a robot with numeric inverse kinematics, which can be a slave."""
-        drives = drives_of(self.kinds, self.drives or ({},) * len(self.joints))
-        return Robot(
+        kinds, fixed, reach = self._frames()
+        return chain_robot(
             name=self.name,
-            joint_names=tuple(joint.name for joint in self.joints),
-            lower=np.array([joint.lower for joint in self.joints]),
-            upper=np.array([joint.upper for joint in self.joints]),
-            home=np.array([joint.home for joint in self.joints]),
-            start=self._start(),
-            geometry=self._geometry(),
-            kernels=Kernels(
-                fk=dh_kernels.fk,
-                jacobian=dh_kernels.jacobian,
-                ik=dh_kernels.ik,
-                ik_all=dh_kernels.ik_all,
-            ),
-            drives=drives,
-            task_mask=tuple(direction in self.task for direction in DIRECTIONS),
+            joints=self.joints,
+            kinds=kinds,
+            fixed=fixed,
+            reach=reach,
+            task=self.task,
+            drives=drives_of(self.kinds, self.drives or ({},) * len(self.joints)),
         )
 
-    def _start(self) -> Array | None:
-        """Start posture, if any joint states its own."""
-        if all(joint.start is None for joint in self.joints):
-            return None
-        return np.array([j.home if j.start is None else j.start for j in self.joints])
-
-    def _geometry(self) -> dict[str, float]:
-        """Row of :mod:`teleop_core.robots.dh_kernels`, every number with a name."""
+    def _frames(self) -> tuple[list[float], list[Array], float]:
+        """Kind of each joint, constant transforms between them, reach [m], for chain_robot."""
         kinds, reach, fixed = [], 0.0, [np.eye(4)]
         for row in self.rows:
             for kind, axis, symbol in CONVENTIONS[self.convention]:
@@ -138,15 +125,59 @@ class DhTable:
                     fixed.append(np.eye(4))
                     if kind == "slide":
                         reach += max(abs(row.joint.lower), abs(row.joint.upper))
-        names = {f"kind{i + 1}": kind for i, kind in enumerate(kinds)}
-        weights = {f"controls_{name}": float(name in self.task) for name in DIRECTIONS}
-        numbers = {
-            f"fixed{i}_{r}{c}": float(matrix[r, c])
-            for i, matrix in enumerate(fixed)
-            for r in range(3)
-            for c in range(4)
-        }
-        return {**names, "reach": reach if reach > 0.0 else 1.0, **weights, **numbers}
+        return kinds, fixed, reach
+
+
+def chain_robot(
+    *,
+    name: str,
+    joints: Sequence[DhJoint],
+    kinds: Sequence[float],
+    fixed: Sequence[Array],
+    reach: float,
+    task: Sequence[str],
+    drives: Drives,
+) -> Robot:
+    """Robot whose joints move about or along z, with constant transforms between them.
+
+    Args:
+        name: Name of the robot.
+        joints: From the base to the tip; names, limits, home and start count.
+        kinds: For each 1 for a turn, 2 for a slide; negative against its axis.
+        fixed: Transforms (4, 4) before, between and after the joints, one more than joints.
+        reach: Length [m] by which distances count against angles; 1 m where it is 0.
+        task: Directions that the arm is to control, of :data:`DIRECTIONS`.
+        drives: Drive table.
+    """
+    numbers = {
+        f"fixed{i}_{r}{c}": float(matrix[r, c])
+        for i, matrix in enumerate(fixed)
+        for r in range(3)
+        for c in range(4)
+    }
+    starts = [joint.home if joint.start is None else joint.start for joint in joints]
+    return Robot(
+        name=name,
+        joint_names=tuple(joint.name for joint in joints),
+        lower=np.array([joint.lower for joint in joints]),
+        upper=np.array([joint.upper for joint in joints]),
+        home=np.array([joint.home for joint in joints]),
+        start=None if all(joint.start is None for joint in joints) else np.array(starts),
+        geometry={
+            **{f"kind{i + 1}": kind for i, kind in enumerate(kinds)},
+            "reach": reach if reach > 0.0 else 1.0,
+            **{f"controls_{direction}": float(direction in task) for direction in DIRECTIONS},
+            **numbers,
+        },
+        kernels=Kernels(
+            fk=dh_kernels.fk,
+            jacobian=dh_kernels.jacobian,
+            ik=dh_kernels.ik,
+            ik_all=dh_kernels.ik_all,
+        ),
+        drives=drives,
+        task_mask=tuple(direction in task for direction in DIRECTIONS),
+    )
 
 
 def elementary(kind: str, axis: str, amount: float) -> Array:

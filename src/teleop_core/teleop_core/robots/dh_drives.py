@@ -49,6 +49,18 @@ def drives_of(kinds: Sequence[str], stated: Sequence[Mapping[str, float]]) -> Dr
     return Drives(**columns, assumed=assumed)
 
 
+def least_inertia(kind: str, viscous: float, coulomb: float) -> float:
+    """Inertia [kg·m² or kg] that a drive needs so that its friction is not too stiff.
+
+    Args:
+        kind: "turn" or "slide".
+        viscous: Viscous friction [N·m·s/rad or N·s/m].
+        coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``.
+    """
+    # A little more, for the check of the rate divides by it again.
+    return 1.001 * (viscous + coulomb / _SPEEDS[kind]["friction_speed"]) / _STIFFEST
+
+
 def parse_drives(
     content: Any, names: Sequence[str], kinds: Sequence[str], unit: float
 ) -> tuple[dict[str, float], ...]:

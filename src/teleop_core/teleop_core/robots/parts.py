@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Protocol, TypeAlias, TypeVar, runtime_checkable
 
@@ -55,7 +56,14 @@ def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Ro
 
 
 def from_file(path: str, geometry: Mapping[str, float | str]) -> Robot | None:
-    """Robot of a Denavit-Hartenberg table; None for what is no name of such a file."""
+    """Robot of a URDF or of a Denavit-Hartenberg table; None for what is no name of a file."""
+    if path.endswith(".urdf"):
+        from teleop_core.robots.from_urdf import load_urdf
+
+        return built(path, partial(load_urdf, Path(path).expanduser()), geometry)
+    if path.endswith(".xacro"):
+        needed = "a .urdf; `xacro arm.xacro > arm.urdf` writes it"
+        raise ParameterError("robot", path, needed)
     if not path.endswith(_TABLE_ENDINGS):
         return None
     from teleop_core.robots.dh import load_table

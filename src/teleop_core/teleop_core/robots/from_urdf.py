@@ -1,0 +1,369 @@
+"""Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
+
+What moves the tip are the joints between root and tip; all others stay at zero, and weigh. The
+kinematics are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.dh_kernels`). Effort and
+velocity limits, damping and friction are the drives' where they stand in the file and are above
+zero. The inertia of a drive is that of the links at home; that of its motor is in no URDF. Whatever
+is left out is assumed as for tables (:mod:`teleop_core.robots.dh_drives`), and
+``Robot.drives.assumed`` names it. Meshes are not read.
+
+Source:
+    The XML specification of URDF, pages joint and link.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kernels.portable import dot, length, product
+from teleop_core.robots.dh_chain import DhJoint, chain_robot
+from teleop_core.robots.dh_drives import drives_of, least_inertia, parse_drives
+from teleop_core.robots.drives import ENTRIES, Drives
+from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.robots.robot import Robot
+
+_KINDS = {"revolute": "turn", "continuous": "turn", "prismatic": "slide"}
+_ROUNDS = 2.0 * math.pi
+"""Limit [rad] of a continuous joint to either side, assumed."""
+_ROUNDING = 1e-6  # of an inertia, over its trace: files are written with few digits
+_Links = Mapping[str, Xml.Element]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Joint:
+    """A joint of the file; ``axis`` a unit vector (3,) in its own frame, None if it is fixed."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Array
+    axis: Array | None
+    element: Xml.Element
+
+
+class _NoDoctype(Xml.TreeBuilder):
+    """Tree of an XML file without a document type, so that nothing in it can grow."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Refuse the declaration before anything it declares is used."""
+        raise ParameterError("<!DOCTYPE>", name, "left out: a URDF declares no entities")
+
+
+def load_urdf(path: Path | str, *, tip: str = "", task: str = "") -> Robot:
+    """Robot whose joints are those between the root of a URDF and a tip.
+
+    Args:
+        path: The file. Of xacro, write one first: ``xacro arm.xacro > arm.urdf``.
+        tip: Link whose frame is the tip; empty for the only link without a child.
+        task: Directions that the arm is to control, of :data:`DIRECTIONS`, with blanks or commas
+            between them; empty for all. An arm of fewer than six joints controls fewer.
+
+    Returns:
+        The robot, its base the root link, with numeric inverse kinematics. Home is zero, or the
+        middle of limits without zero; continuous joints turn two rounds (assumed: ±2π).
+
+    Raises:
+        RecordingError: The file cannot be read, or is not XML.
+        ParameterError: An element that is missing or not possible; the message names it.
+        UnknownNameError: A tip, direction, link or type of joint that does not exist.
+    """
+    with damage_told(Path(path)):
+        builder = Xml.XMLParser(target=_NoDoctype())
+        builder.feed(Path(path).read_bytes())
+        root: Xml.Element = builder.close()
+    if root.tag != "robot":
+        raise ParameterError(str(path), f"<{root.tag}>", "a <robot>")
+    links = _named(root, "link")
+    joints = [_joint(name, element, links) for name, element in _named(root, "joint").items()]
+    by_child = _by_child(joints)
+    base = _root_link(links, by_child)
+    chain = _chain(_tip(tip, links, joints), by_child)
+    moving = [joint for joint in chain if joint.axis is not None]
+    if not moving:
+        raise ParameterError(
+            "tip", tip or chain, "a link that some joint between it and the root moves"
+        )
+    limits = [_limits(joint) for joint in moving]
+    fixed, kinds = _frames(chain)
+    slides = zip(moving, limits, strict=True)
+    reach = sum(float(length(joint.origin[:3, 3])) for joint in chain)
+    reach += sum(max(abs(dh.lower), abs(dh.upper)) for j, dh in slides if j.kind == "prismatic")
+    home = {joint.name: limit.home for joint, limit in zip(moving, limits, strict=True)}
+    return chain_robot(
+        name=root.get("name") or Path(path).stem,
+        joints=limits,
+        kinds=kinds,
+        fixed=fixed,
+        reach=reach,
+        task=_task(task),
+        drives=_drives(moving, _inertias(moving, home, base, links, joints)),
+    )
+
+
+def _named(root: Xml.Element, tag: str) -> dict[str, Xml.Element]:
+    """Elements of a kind by their names."""
+    found: dict[str, Xml.Element] = {}
+    for element in root.findall(tag):
+        name = element.get("name", "")
+        if not name or name in found:
+            raise ParameterError(f"{tag} name", name, f"a name that no other {tag} has")
+        found[name] = element
+    if not found:
+        raise ParameterError(tag, 0, f"at least one <{tag}>")
+    return found
+
+
+def _joint(name: str, element: Xml.Element, links: _Links) -> _Joint:
+    kind, axis = element.get("type", ""), None
+    if kind not in (*_KINDS, "fixed"):
+        raise UnknownNameError(f"type of joint {name}", kind, (*_KINDS, "fixed"))
+    ends = []
+    for end in ("parent", "child"):
+        found = element.find(end)
+        link = "" if found is None else found.get("link", "")
+        if link not in links:
+            raise UnknownNameError(f"{end} of joint {name}", link, links)
+        ends.append(link)
+    if kind != "fixed":
+        given = _numbers(f"joint {name}", element.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        norm = float(length(given))
+        if norm < 1e-9:
+            raise ParameterError(f"axis of joint {name}", given.tolist(), "longer than 0")
+        axis = given / norm
+    origin = _origin(f"joint {name}", element)
+    return _Joint(
+        name=name,
+        kind=kind,
+        parent=ends[0],
+        child=ends[1],
+        origin=origin,
+        axis=axis,
+        element=element,
+    )
+
+
+def _by_child(joints: list[_Joint]) -> dict[str, _Joint]:
+    """The one joint that carries each link but the root."""
+    found: dict[str, _Joint] = {}
+    for joint in joints:
+        if joint.child in found:
+            both = [found[joint.child].name, joint.name]
+            raise ParameterError(f"link {joint.child}", both, "the child of one joint")
+        found[joint.child] = joint
+    return found
+
+
+def _root_link(links: _Links, by_child: Mapping[str, _Joint]) -> str:
+    roots = [name for name in links if name not in by_child]
+    if len(roots) != 1:
+        raise ParameterError("links that are no child", roots, "one, the base")
+    for link in links:
+        _chain(link, by_child)
+    return roots[0]
+
+
+def _tip(tip: str, links: _Links, joints: list[_Joint]) -> str:
+    if tip:
+        if tip not in links:
+            raise UnknownNameError("tip", tip, links)
+        return tip
+    parents = {joint.parent for joint in joints}
+    ends = [name for name in links if name not in parents]
+    if len(ends) != 1:
+        raise ParameterError("tip", "", f"one of {', '.join(ends)}, or another link")
+    return ends[0]
+
+
+def _chain(tip: str, by_child: Mapping[str, _Joint]) -> list[_Joint]:
+    """Joints from the root to a link."""
+    found: list[_Joint] = []
+    link = tip
+    while link in by_child:
+        found.append(by_child[link])
+        link = found[-1].parent
+        if len(found) > len(by_child):
+            raise ParameterError(f"joint {found[-1].name}", link, "a parent that it does not carry")
+    return found[::-1]
+
+
+def _task(task: str) -> tuple[str, ...]:
+    names = tuple(str(task).replace(",", " ").split())
+    for name in names:
+        if name not in DIRECTIONS:
+            raise UnknownNameError("task", name, DIRECTIONS)
+    return names or DIRECTIONS
+
+
+def _limits(joint: _Joint) -> DhJoint:
+    where, limit = f"joint {joint.name}", joint.element.find("limit")
+    if joint.element.find("mimic") is not None:
+        raise ParameterError(where, "mimic", "a joint of its own: it lies between root and tip")
+    if joint.kind == "continuous":
+        lower, upper = -_ROUNDS, _ROUNDS
+    else:
+        lower = float(_numbers(where, limit, "lower", (0.0,))[0])
+        upper = float(_numbers(where, limit, "upper", (0.0,))[0])
+    if not lower < upper:
+        raise ParameterError(f"limits of {where}", (lower, upper), "lower < upper")
+    home = 0.0 if lower <= 0.0 <= upper else 0.5 * (lower + upper)
+    return DhJoint(name=joint.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
+
+
+def _frames(chain: list[_Joint]) -> tuple[list[Array], list[float]]:
+    """Constant transforms between the joints, whose axes become z, and the kind of each joint."""
+    fixed, kinds, last = [], [], np.eye(4)
+    for joint in chain:
+        last = product(last, joint.origin)
+        if joint.axis is not None:
+            sign = -1.0 if joint.axis[2] < 0.0 else 1.0
+            align = transform(_turned_z(sign * joint.axis), np.zeros(3))
+            fixed.append(product(last, align))
+            kinds.append(sign * (1.0 if _KINDS[joint.kind] == "turn" else 2.0))
+            last = np.ascontiguousarray(align.T)
+    return [*fixed, last], kinds
+
+
+def _turned_z(axis: Array) -> Array:
+    """Shortest rotation (3, 3) that turns z into a unit vector (3,) with z >= 0."""
+    x, y, z = axis.tolist()
+    share = 1.0 / (1.0 + z)
+    return np.array(
+        [
+            [1.0 - x * x * share, -x * y * share, x],
+            [-x * y * share, 1.0 - y * y * share, y],
+            [-x, -y, z],
+        ]
+    )
+
+
+def _drives(moving: list[_Joint], inertias: list[float]) -> Drives:
+    kinds, stated = [_KINDS[joint.kind] for joint in moving], {}
+    for joint, kind, inertia in zip(moving, kinds, inertias, strict=True):
+        where, own = f"joint {joint.name}", {}
+        for tag, key, entry in (
+            ("limit", "effort", "effort_limit"), ("limit", "velocity", "speed_limit"),
+            ("dynamics", "damping", "viscous"), ("dynamics", "friction", "coulomb"),
+        ):  # fmt: skip
+            value = float(_numbers(where, joint.element.find(tag), key, (0.0,))[0])
+            if value < 0.0:
+                raise ParameterError(f"{key} of {where}", value, ">= 0")
+            if value > 0.0:  # a limit of 0 is what files say that do not know it
+                own[entry] = value
+        least = least_inertia(kind, own.get("viscous", 0.0), own.get("coulomb", 0.0))
+        if max(inertia, least) > 0.0:
+            own["inertia"] = max(inertia, least)
+        stated[joint.name] = own
+    drives = drives_of(kinds, parse_drives(stated, list(stated), kinds, 1.0))
+    assumed = tuple(name for name in ENTRIES if name in ("inertia", *drives.assumed))
+    return replace(drives, assumed=assumed)
+
+
+def _inertias(
+    moving: list[_Joint], home: Mapping[str, float], base: str, links: _Links, joints: list[_Joint]
+) -> list[float]:
+    """Inertia [kg·m² or kg] at home of all that each joint moves, about or along its axis."""
+    carried: dict[str, list[_Joint]] = {}
+    for joint in joints:
+        carried.setdefault(joint.parent, []).append(joint)
+    sums = dict.fromkeys((joint.name for joint in moving), 0.0)
+    stack: list[tuple[str, Array, tuple[tuple[_Joint, Array], ...]]] = [(base, np.eye(4), ())]
+    while stack:
+        link, T, above = stack.pop()
+        mass, inertia, place = _mass(link, links[link])
+        centre = product(T, place)
+        turned = product(product(centre[:3, :3], inertia), centre[:3, :3].T)
+        for joint, frame in above:
+            if joint.name in sums and joint.axis is not None:
+                axis = product(frame[:3, :3], joint.axis)
+                arm = np.cross(axis, centre[:3, 3] - frame[:3, 3])
+                turning = float(dot(axis, product(turned, axis)) + mass * dot(arm, arm))
+                sums[joint.name] += mass if joint.kind == "prismatic" else turning
+        for joint in carried.get(link, ()):
+            frame = product(T, joint.origin)
+            moved = product(frame, _motion(joint, home.get(joint.name, 0.0)))
+            stack.append((joint.child, moved, (*above, (joint, frame))))
+    return list(sums.values())
+
+
+def _motion(joint: _Joint, value: float) -> Array:
+    """Transform (4, 4) of a joint at a value [rad, m]."""
+    if joint.axis is None or value == 0.0:
+        return np.eye(4)
+    if joint.kind == "prismatic":
+        return transform(np.eye(3), value * joint.axis)
+    sign = -1.0 if joint.axis[2] < 0.0 else 1.0
+    align = _turned_z(sign * joint.axis)
+    return transform(product(product(align, rotation("z", sign * value)), align.T), np.zeros(3))
+
+
+def _mass(name: str, link: Xml.Element) -> tuple[float, Array, Array]:
+    """Mass [kg], inertia (3, 3) [kg·m²] at its centre, and where that is in the link (4, 4)."""
+    element, where = link.find("inertial"), f"link {name}"
+    if element is None:
+        return 0.0, np.zeros((3, 3)), np.eye(4)
+    mass = float(_numbers(where, element.find("mass"), "value", (0.0,))[0])
+    tensor = element.find("inertia")
+    xx, xy, xz, yy, yz, zz = (
+        float(_numbers(where, tensor, key, (0.0,))[0])
+        for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    )
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if mass < 0.0 or not _is_possible(inertia):
+        raise ParameterError(f"inertial of {where}", (mass, inertia.tolist()), "that of a body")
+    return mass, inertia, _origin(where, element)
+
+
+def _is_possible(inertia: Array) -> bool:
+    """Whether some body has this inertia: no principal moment exceeds the sum of the others.
+
+    That is so where half the trace less the inertia has no negative eigenvalue, and so no negative
+    principal minor.
+    """
+    spread = 0.5 * float(np.trace(inertia))
+    if spread == 0.0:
+        return not inertia.any()
+    M = (np.eye(3) * spread - inertia) / abs(spread)
+    minors = [M[i, i] for i in range(3)]
+    minors += [M[i, i] * M[j, j] - M[i, j] ** 2 for i, j in combinations(range(3), 2)]
+    minors.append(float(dot(M[0], np.cross(M[1], M[2]))))
+    return spread > 0.0 and min(minors) >= -_ROUNDING
+
+
+def _origin(where: str, element: Xml.Element) -> Array:
+    found = element.find("origin")
+    roll, pitch, yaw = _numbers(where, found, "rpy", (0.0, 0.0, 0.0)).tolist()
+    turn = product(product(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll))
+    return transform(turn, _numbers(where, found, "xyz", (0.0, 0.0, 0.0)))
+
+
+def _numbers(
+    where: str, element: Xml.Element | None, key: str, default: tuple[float, ...]
+) -> Array:
+    """Numbers of an attribute, or the default where element or attribute is missing."""
+    text = None if element is None else element.get(key)
+    if text is None:
+        return np.array(default)
+    found = list(_finite(text))
+    if len(found) != len(default):
+        wanted = f"{len(default)} finite numbers" if len(default) > 1 else "a finite number"
+        raise ParameterError(f"{key} of {where}", text, wanted)
+    return np.array(found)
+
+
+def _finite(text: str) -> Iterator[float]:
+    for word in text.split():
+        try:
+            value = float(word)
+        except ValueError:
+            continue
+        if math.isfinite(value):
+            yield value

@@ -1,0 +1,213 @@
+"""Robots from URDF: what pinocchio reads from the same file, and every mistake by its element."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pinocchio
+import pytest
+
+from teleop_core.base.errors import ParameterError, RecordingError, TeleopError, UnknownNameError
+from teleop_core.robots import load_robot
+from teleop_core.robots.kinematics import IkStatus
+from teleop_core.session.api import run
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "any_arm.urdf"
+TEXT = EXAMPLE.read_text()
+KINDS = ("revolute", "continuous", "prismatic", "fixed")
+REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
+
+
+def row(values):
+    return " ".join(f"{value:.17g}" for value in values)
+
+
+def random_urdf(seed, n):
+    """Chain of n moving joints and some fixed ones, every link with a branch that weighs."""
+    rng, lines, link, moving = np.random.default_rng(seed), ['<link name="l0"/>'], 0, 0
+    while moving < n:
+        kind = rng.choice(KINDS)
+        moving += kind != "fixed"
+        link += 1
+        for name, parent in ((f"l{link}", f"l{link - 1}"), (f"b{link}", f"l{link}")):
+            side = rng.uniform(0.02, 0.3, 3) ** 2
+            tensor = np.diag(side.sum() - side)
+            turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            I = turn @ tensor @ turn.T  # noqa: E741
+            keys = (
+                ("xx", 0, 0),
+                ("xy", 0, 1),
+                ("xz", 0, 2),
+                ("yy", 1, 1),
+                ("yz", 1, 2),
+                ("zz", 2, 2),
+            )
+            numbers = " ".join(f'i{key}="{I[i, j]:.17g}"' for key, i, j in keys)
+            of = kind if name[0] == "l" else "revolute"
+            lines.append(
+                f'<link name="{name}"><inertial><origin xyz="{row(rng.normal(size=3))}" '
+                f'rpy="{row(rng.uniform(-3, 3, 3))}"/><mass value="{rng.uniform(0.1, 5):.17g}"/>'
+                f"<inertia {numbers}/></inertial></link>"
+                f'<joint name="to_{name}" type="{of}"><parent link="{parent}"/>'
+                f'<child link="{name}"/><origin xyz="{row(rng.normal(size=3))}" '
+                f'rpy="{row(rng.uniform(-3, 3, 3))}"/><axis xyz="{row(rng.normal(size=3))}"/>'
+                f'<limit lower="{rng.uniform(-2, 0.5):.17g}" upper="{rng.uniform(0.6, 2):.17g}" '
+                f'effort="20" velocity="2"/></joint>'
+            )
+    return f'<robot name="random">{"".join(lines)}</robot>', f"l{link}"
+
+
+def model_and_q(text, robot, q):
+    model = pinocchio.buildModelFromXML(text)
+    out = pinocchio.neutral(model)
+    for name, value in zip(robot.joint_names, q, strict=True):
+        joint = model.joints[model.getJointId(name)]
+        out[joint.idx_q] = np.cos(value) if joint.nq == 2 else value
+        if joint.nq == 2:
+            out[joint.idx_q + 1] = np.sin(value)
+    columns = [model.joints[model.getJointId(name)].idx_v for name in robot.joint_names]
+    return model, model.createData(), out, columns
+
+
+@pytest.mark.parametrize("seed", range(36))
+def test_pose_jacobian_and_home_inertia_are_those_of_pinocchio(seed, tmp_path):
+    text, tip = random_urdf(seed, 1 + seed % 12)
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    robot = load_robot(str(path), tip=tip)
+    assert robot.n == 1 + seed % 12
+    q = np.random.default_rng(seed).uniform(robot.lower, robot.upper)
+    model, data, theirs, columns = model_and_q(text, robot, q)
+    frame = model.getFrameId(tip)
+    pinocchio.framesForwardKinematics(model, data, theirs)
+    np.testing.assert_allclose(robot.fk(q), data.oMf[frame].homogeneous, atol=1e-10)
+    J = pinocchio.computeFrameJacobian(model, data, theirs, frame, pinocchio.LOCAL_WORLD_ALIGNED)[
+        :, columns
+    ]
+    np.testing.assert_allclose(robot.jacobian(q), J, atol=1e-10)
+    model, data, home, columns = model_and_q(text, robot, robot.home)
+    inertia = np.diag(pinocchio.crba(model, data, home))[columns]
+    np.testing.assert_allclose(robot.drives.inertia, inertia, rtol=1e-10)
+
+
+def test_legal_poses_are_found_from_home_and_from_beside_them():
+    arm = load_robot(str(EXAMPLE), tip="tool0")
+    rng = np.random.default_rng(3)
+    q = rng.uniform(arm.lower, arm.upper, (2000, arm.n))
+    tips = arm.fk(q)
+    far = arm.ik_batch(tips)
+    assert np.isin(far.status, REACHED).mean() >= 0.995
+    near = arm.ik_batch(tips, np.clip(q + rng.normal(0.0, 0.02, q.shape), arm.lower, arm.upper))
+    assert np.isin(near.status, REACHED).all()
+    assert near.residual.max() < 1e-8
+
+
+def test_drives_have_what_the_file_states_and_name_what_is_assumed():
+    drives = load_robot(str(EXAMPLE), tip="tool0").drives
+    np.testing.assert_array_equal(drives.effort_limit, [150.0, 150.0, 80.0, 28.0, 28.0, 28.0])
+    np.testing.assert_array_equal(drives.speed_limit, [2.6, 2.6, 3.1, 5.0, 5.0, 5.0])
+    assert not {"effort_limit", "speed_limit"} & set(drives.assumed)
+    assert "inertia" in drives.assumed  # the motors'
+
+
+def test_limits_of_zero_are_unknown_ones_and_never_zero(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(re.sub(r'(effort|velocity)="[\d.]+"', r'\1="0"', TEXT))
+    drives = load_robot(str(path), tip="tool0").drives
+    assert {"effort_limit", "speed_limit"} <= set(drives.assumed)
+    assert (drives.effort_limit > 0.0).all()
+    assert (drives.speed_limit > 0.0).all()
+
+
+def test_friction_that_would_stop_the_links_in_no_time_has_a_motor_behind_it(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(TEXT.replace("<axis", '<dynamics damping="2" friction="1"/><axis'))
+    drives = load_robot(str(path), tip="tool0").drives
+    rate = (drives.viscous + drives.coulomb / drives.friction_speed) / drives.inertia
+    np.testing.assert_array_equal(drives.viscous, np.full(6, 2.0))
+    assert (rate <= 2000.0).all()
+
+
+def test_an_arm_of_fewer_joints_controls_the_directions_that_are_asked(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(TEXT.replace('name="roll" type="revolute"', 'name="roll" type="fixed"'))
+    arm = load_robot(str(path), tip="wrist_1", task="x, y z")
+    assert arm.task_mask == (True, True, True, False, False, False)
+    q = np.random.default_rng(5).uniform(arm.lower, arm.upper, (200, arm.n))
+    assert np.isin(arm.ik_batch(arm.fk(q), q + 0.0).status, REACHED).all()
+
+
+def test_a_session_follows_with_an_arm_from_a_file():
+    recording = run("coarse_box", duration=6.0, robot=str(EXAMPLE), geometry=["tip=tool0"])
+    assert recording.score().value("position_error_mm.rms") < 1.0
+
+
+CIRCLE = (f'type="fixed"><parent link="{link}"/><child link="tool0"/>'
+          for link in ("flange", "tool0"))  # fmt: skip
+LOW, ELBOW = 'lower="-2.6"', '"elbow" type="revolute"'
+TOOL = {"tip": "tool0"}
+
+
+def changed(old, new, **options):
+    """The example with a mistake, and with what options it is loaded."""
+    assert old in TEXT
+    return TEXT.replace(old, new, 1), options or TOOL
+
+
+MISTAKES = {
+    "no tip": ((TEXT, {}), "tip is '', must be one of camera, tool0"),
+    "unknown tip": ((TEXT, {"tip": "tool1"}), "tool1"),
+    "tip before every joint": ((TEXT, {"tip": "base"}), "some joint between"),
+    "unknown option": ((TEXT, {"tip": "tool0", "L1": 1.0}), "L1"),
+    "unknown direction": ((TEXT, {"tip": "tool0", "task": "x up"}), "up"),
+    "no robot": (("<model/>", TOOL), "<robot>"),
+    "no links": (("<robot/>", TOOL), "<link>"),
+    "no joints": (('<robot><link name="a"/></robot>', TOOL), "<joint>"),
+    "two links of a name": (changed('name="camera"', 'name="forearm"'), "link name"),
+    "two roots": (changed("<joint", '<link name="lost"/><joint'), "lost"),
+    "two parents": (changed('child link="camera"', 'child link="tool0"'), "link tool0"),
+    "a circle beside the root": (changed(*CIRCLE), "joint tool_mount"),
+    "unknown parent": (changed('parent link="forearm"', 'parent link="fore"'), "of joint roll"),
+    "floating": (changed(ELBOW, '"elbow" type="floating"'), "joint elbow"),
+    "no length of axis": (changed("0 1 0", "0 0 0"), "axis of joint shoulder"),
+    "limits without room": (changed(LOW, 'lower="2.6"'), "joint elbow"),
+    "no limits": (changed(f'<limit {LOW} upper="2.6"', "<limit"), "joint elbow"),
+    "a word for a number": (changed(LOW, 'lower="low"'), "lower of joint elbow"),
+    "not a number": (changed('upper="2.6"', 'upper="nan"'), "upper of joint elbow"),
+    "two numbers of three": (changed('xyz="0 0 0.42"', 'xyz="0 0.42"'), "joint elbow"),
+    "negative effort": (changed('effort="80"', 'effort="-80"'), "effort of joint elbow"),
+    "negative mass": (changed('mass value="3.0"', 'mass value="-3.0"'), "link forearm"),
+    "an inertia of no body": (changed('izz="0.008"', 'izz="0.9"'), "link forearm"),
+    "a mimic between": (changed(f"<limit {LOW}", f'<mimic joint="waist"/><limit {LOW}'), "elbow"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_told_by_its_element(name, tmp_path):
+    (text, options), word = MISTAKES[name]
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    with pytest.raises((ParameterError, UnknownNameError), match=re.escape(word)) as told:
+        load_robot(str(path), **options)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_entities_are_refused_before_they_grow(encoding, tmp_path):
+    names = [f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 12)]
+    bomb = f'<!DOCTYPE robot [<!ENTITY e0 "ten letters">{"".join(names)}]><robot name="&e11;"/>'
+    path = tmp_path / "bomb.urdf"
+    path.write_bytes(bomb.encode(encoding))
+    with pytest.raises(ParameterError, match="DOCTYPE"):
+        load_robot(str(path))
+
+
+def test_a_file_that_is_no_xml_or_not_there_is_one_line(tmp_path):
+    path = tmp_path / "arm.urdf"
+    with pytest.raises(RecordingError, match=r"arm\.urdf"):
+        load_robot(str(path))
+    path.write_text(TEXT[:500])
+    with pytest.raises(RecordingError, match=r"arm\.urdf"):
+        load_robot(str(path))
+    with pytest.raises(TeleopError, match=r"xacro arm\.xacro > arm\.urdf"):
+        load_robot("arm.xacro")
