@@ -9,6 +9,7 @@ import pytest
 
 from teleop_core.base.errors import ParameterError, RecordingError, TeleopError, UnknownNameError
 from teleop_core.robots import load_robot
+from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.session.api import run
 
@@ -57,8 +58,8 @@ def random_urdf(seed, n):
     return f'<robot name="random">{"".join(lines)}</robot>', f"l{link}"
 
 
-def model_and_q(text, robot, q):
-    model = pinocchio.buildModelFromXML(text)
+def model_and_q(text, robot, q, model=None):
+    model = model or pinocchio.buildModelFromXML(text)
     out = pinocchio.neutral(model)
     for name, value in zip(robot.joint_names, q, strict=True):
         joint = model.joints[model.getJointId(name)]
@@ -88,6 +89,90 @@ def test_pose_jacobian_and_home_inertia_are_those_of_pinocchio(seed, tmp_path):
     model, data, home, columns = model_and_q(text, robot, robot.home)
     inertia = np.diag(pinocchio.crba(model, data, home))[columns]
     np.testing.assert_allclose(robot.drives.inertia, inertia, rtol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(36))
+def test_efforts_and_accelerations_of_the_links_are_those_of_pinocchio(seed, tmp_path):
+    text, tip = random_urdf(seed, 1 + seed % 12)
+    path = tmp_path / "arm.urdf"
+    path.write_text(text.replace('effort="20"', 'effort="1e4"'))
+    robot = load_robot(str(path), tip=tip, dynamics="links")
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(robot.lower, robot.upper)
+    dq, ddq, given = rng.normal(size=(3, robot.n))
+    whole = pinocchio.buildModelFromXML(text)
+    held = [whole.getJointId(n) for n in whole.names if n not in ("universe", *robot.joint_names)]
+    model = pinocchio.buildReducedModel(whole, held, pinocchio.neutral(whole))
+    data, theirs = model.createData(), model_and_q(text, robot, q, model)[2]
+    row, effort, found = robot.dynamics.parameters.copy(), np.empty(robot.n), np.empty(robot.n)
+    inverse_dynamics(q, dq, ddq, row, effort)
+    expected = pinocchio.rnea(model, data, theirs, dq, ddq)
+    np.testing.assert_allclose(effort, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
+    robot.dynamics.gravity(q, row, effort)
+    expected = pinocchio.computeGeneralizedGravity(model, data, theirs)
+    np.testing.assert_allclose(effort, expected, rtol=0.0, atol=1e-10 * (1 + abs(expected).max()))
+    M, inertia = np.empty((robot.n, robot.n)), pinocchio.crba(model, data, theirs)
+    inertia_matrix(q, row, M)
+    np.testing.assert_allclose(M, inertia, rtol=0.0, atol=1e-10 * inertia.max())
+    robot.dynamics.acceleration(q, dq, given, row, found)
+    expected = pinocchio.aba(model, data, theirs, dq, given)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
+
+
+def test_motors_of_a_row_add_to_the_inertia_and_to_the_efforts():
+    arm = load_robot(str(EXAMPLE), tip="tool0", dynamics="links")
+    row, q, still = arm.dynamics.parameters.copy(), arm.home.copy(), np.zeros(6)
+    before, after, effort, more = np.empty((6, 6)), np.empty((6, 6)), np.empty(6), np.empty(6)
+    inertia_matrix(q, row, before)
+    inverse_dynamics(q, still, np.ones(6), row, effort)
+    row[-6:] += np.arange(1.0, 7.0)
+    inertia_matrix(q, row, after)
+    inverse_dynamics(q, still, np.ones(6), row, more)
+    np.testing.assert_allclose(after - before, np.diag(np.arange(1.0, 7.0)), atol=1e-12)
+    np.testing.assert_allclose(more - effort, np.arange(1.0, 7.0), atol=1e-12)
+
+
+@pytest.mark.parametrize("dynamics", ["independent", "links"])
+def test_a_joint_that_turns_points_on_its_axis_has_the_inertia_of_an_assumed_motor(
+    dynamics, tmp_path
+):
+    path = tmp_path / "arm.urdf"
+    text = re.sub(r'i(xx|yy|zz)="[\d.]+"', r'i\1="0"', TEXT).replace('xyz="0.08 0 0.02"', "")
+    for lean in np.linspace(0.1, 1.5, 20):  # of the base, so that numbers round both ways
+        waist = f'<child link="column"/><origin rpy="{lean} 0.3 0.2" '
+        path.write_text(text.replace('<child link="column"/><origin ', waist))
+        arm = load_robot(str(path), tip="tool0", dynamics=dynamics)
+        assert arm.drives.inertia.min() > 1e-3
+        ddq = np.empty(6)
+        arm.dynamics.acceleration(
+            arm.home.copy(), np.zeros(6), np.ones(6), arm.dynamics.parameters.copy(), ddq
+        )
+        assert abs(ddq).max() < 1e4
+
+
+def test_the_inertia_of_the_links_at_home_with_their_motors_is_that_of_the_drives(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(TEXT.replace("<axis", '<dynamics damping="2" friction="1"/><axis'))
+    arm = load_robot(str(path), tip="tool0", dynamics="links")
+    M = np.empty((6, 6))
+    inertia_matrix(arm.home.copy(), arm.dynamics.parameters.copy(), M)
+    np.testing.assert_allclose(np.diag(M), arm.drives.inertia, rtol=1e-12)
+
+
+def test_a_session_follows_with_links_that_weigh_and_drives_that_carry_them():
+    options = ["tip=tool0", "dynamics=links"]
+    recording = run("coarse_box", duration=6.0, robot=str(EXAMPLE), geometry=options)
+    assert recording.score().value("position_error_mm.rms") < 1.0
+    arm = load_robot(str(EXAMPLE), tip="tool0", dynamics="links")
+    joints, row = recording["slave/measured_js"], arm.dynamics.parameters.copy()
+    q = np.stack([joints[f"{name}.position"] for name in arm.joint_names], axis=1)
+    given = np.stack([joints[f"{name}.effort"] for name in arm.joint_names], axis=1)
+    weight = np.empty(q.shape)
+    for place, effort in zip(q, weight, strict=True):
+        arm.dynamics.gravity(place, row, effort)
+    mean = weight.mean(axis=0)
+    assert abs(mean).max() > 3.0
+    np.testing.assert_allclose(given.mean(axis=0), mean, atol=0.1 * abs(mean).max())
 
 
 def test_legal_poses_are_found_from_home_and_from_beside_them():
@@ -159,6 +244,11 @@ MISTAKES = {
     "unknown tip": ((TEXT, {"tip": "tool1"}), "tool1"),
     "tip before every joint": ((TEXT, {"tip": "base"}), "some joint between"),
     "unknown option": ((TEXT, {"tip": "tool0", "L1": 1.0}), "L1"),
+    "unknown dynamics": ((TEXT, {"tip": "tool0", "dynamics": "full"}), "independent, links"),
+    "too weak": (
+        changed('effort="80"', 'effort="0.05"', dynamics="links", **TOOL),
+        "of joint elbow",
+    ),
     "unknown direction": ((TEXT, {"tip": "tool0", "task": "x up"}), "up"),
     "no robot": (("<model/>", TOOL), "<robot>"),
     "no links": (("<robot/>", TOOL), "<link>"),

@@ -26,7 +26,7 @@ _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACH
 
 
 @inner
-def _append(geometry: Array, n: int, index: int, T: Array) -> None:
+def append_fixed(geometry: Array, n: int, index: int, T: Array) -> None:
     """Replace T by T times constant transform ``index``."""
     at = n + 7 + 12 * index
     for i in range(3):
@@ -41,7 +41,7 @@ def _append(geometry: Array, n: int, index: int, T: Array) -> None:
 
 
 @inner
-def _move(kind: float, q: float, T: Array) -> None:
+def move_joint(kind: float, q: float, T: Array) -> None:
     """Replace T by T times the turn or slide of one joint."""
     if abs(kind) > 1.5:
         for i in range(3):
@@ -60,10 +60,10 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     for i in range(4):
         for j in range(4):
             T[i, j] = 1.0 if i == j else 0.0
-    _append(geometry, n, 0, T)
+    append_fixed(geometry, n, 0, T)
     for i in range(n):
-        _move(geometry[i], q[i], T)
-        _append(geometry, n, i + 1, T)
+        move_joint(geometry[i], q[i], T)
+        append_fixed(geometry, n, i + 1, T)
 
 
 @kernel
@@ -73,14 +73,14 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
     for i in range(4):
         for j in range(4):
             T[i, j] = 1.0 if i == j else 0.0
-    _append(geometry, n, 0, T)
+    append_fixed(geometry, n, 0, T)
     for j in range(n):
         # The axis for now, the point it goes through in the linear rows.
         sign = 1.0 if geometry[j] > 0.0 else -1.0
         for i in range(3):
             J[i, j], J[3 + i, j] = T[i, 3], sign * T[i, 2]
-        _move(geometry[j], q[j], T)
-        _append(geometry, n, j + 1, T)
+        move_joint(geometry[j], q[j], T)
+        append_fixed(geometry, n, j + 1, T)
     for j in range(n):
         x, y, z = T[0, 3] - J[0, j], T[1, 3] - J[1, j], T[2, 3] - J[2, j]
         a, b, c = J[3, j], J[4, j], J[5, j]

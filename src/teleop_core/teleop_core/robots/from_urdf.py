@@ -1,11 +1,12 @@
 """Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
 
 What moves the tip are the joints between root and tip; all others stay at zero, and weigh. The
-kinematics are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.dh_kernels`). Effort and
-velocity limits, damping and friction are the drives' where they stand in the file and are above
-zero. The inertia of a drive is that of the links at home; that of its motor is in no URDF. Whatever
-is left out is assumed as for tables (:mod:`teleop_core.robots.dh_drives`), and
-``Robot.drives.assumed`` names it. Meshes are not read.
+kinematics are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.dh_kernels`), the
+dynamics those of rigid bodies (:mod:`teleop_core.robots.chain_dynamics`). Effort and velocity
+limits, damping and friction are the drives' where they stand in the file and are above zero. The
+inertia of a drive is that of the links at home; that of its motor is in no URDF. Whatever is left
+out is assumed as for tables (:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed``
+names it. Meshes are not read.
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -24,16 +25,26 @@ from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import dot, length, product
+from teleop_core.robots.chain_dynamics import (
+    body_row,
+    chain_dynamics,
+    chain_gravity,
+    chain_row,
+    inertia_matrix,
+)
 from teleop_core.robots.dh_chain import DhJoint, chain_robot
 from teleop_core.robots.dh_drives import drives_of, least_inertia, parse_drives
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
 
+MODELS = ("independent", "links")
+"""How the arm of a file may move: see :func:`load_urdf`."""
 _KINDS = {"revolute": "turn", "continuous": "turn", "prismatic": "slide"}
 _ROUNDS = 2.0 * math.pi
 """Limit [rad] of a continuous joint to either side, assumed."""
 _ROUNDING = 1e-6  # of an inertia, over its trace: files are written with few digits
+_NO_INERTIA = 1e-9  # [kg·m² or kg]; below it is rounding of bodies on the axis, and unknown
 _Links = Mapping[str, Xml.Element]
 
 
@@ -58,7 +69,9 @@ class _NoDoctype(Xml.TreeBuilder):
         raise ParameterError("<!DOCTYPE>", name, "left out: a URDF declares no entities")
 
 
-def load_urdf(path: Path | str, *, tip: str = "", task: str = "") -> Robot:
+def load_urdf(
+    path: Path | str, *, tip: str = "", task: str = "", dynamics: str = "independent"
+) -> Robot:
     """Robot whose joints are those between the root of a URDF and a tip.
 
     Args:
@@ -66,6 +79,9 @@ def load_urdf(path: Path | str, *, tip: str = "", task: str = "") -> Robot:
         tip: Link whose frame is the tip; empty for the only link without a child.
         task: Directions that the arm is to control, of :data:`DIRECTIONS`, with blanks or commas
             between them; empty for all. An arm of fewer than six joints controls fewer.
+        dynamics: Of :data:`MODELS`. independent: axes that do not act on each other, gravity
+            balanced. links: the bodies of the file, which weigh and act on each other; the
+            controller feeds their gravity forward.
 
     Returns:
         The robot, its base the root link, with numeric inverse kinematics. Home is zero, or the
@@ -74,8 +90,10 @@ def load_urdf(path: Path | str, *, tip: str = "", task: str = "") -> Robot:
     Raises:
         RecordingError: The file cannot be read, or is not XML.
         ParameterError: An element that is missing or not possible; the message names it.
-        UnknownNameError: A tip, direction, link or type of joint that does not exist.
+        UnknownNameError: A tip, direction, dynamics, link or type of joint that does not exist.
     """
+    if dynamics not in MODELS:
+        raise UnknownNameError("dynamics", dynamics, MODELS)
     with damage_told(Path(path)):
         builder = Xml.XMLParser(target=_NoDoctype())
         builder.feed(Path(path).read_bytes())
@@ -97,16 +115,34 @@ def load_urdf(path: Path | str, *, tip: str = "", task: str = "") -> Robot:
     slides = zip(moving, limits, strict=True)
     reach = sum(float(length(joint.origin[:3, 3])) for joint in chain)
     reach += sum(max(abs(dh.lower), abs(dh.upper)) for j, dh in slides if j.kind == "prismatic")
-    home = {joint.name: limit.home for joint, limit in zip(moving, limits, strict=True)}
-    return chain_robot(
+    home = np.array([limit.home for limit in limits])
+    bodies, inertia = _bodies(moving, base, links, joints), np.zeros((len(moving), len(moving)))
+    inertia_matrix(home, chain_row(kinds, fixed, bodies, np.zeros(len(moving))), inertia)
+    drives = _drives(moving, np.diag(inertia).tolist())
+    robot = chain_robot(
         name=root.get("name") or Path(path).stem,
         joints=limits,
         kinds=kinds,
         fixed=fixed,
         reach=reach,
         task=_task(task),
-        drives=_drives(moving, _inertias(moving, home, base, links, joints)),
+        drives=drives,
     )
+    if dynamics == "independent":
+        return robot
+    row = chain_row(kinds, fixed, bodies, np.maximum(drives.inertia - np.diag(inertia), 0.0))
+    _refuse_weak(moving, drives, home, row)
+    return replace(robot, dynamics=chain_dynamics(row))
+
+
+def _refuse_weak(moving: list[_Joint], drives: Drives, home: Array, row: Array) -> None:
+    """Refuse drives that cannot hold the arm at home."""
+    weight = np.zeros(len(moving))
+    chain_gravity(home, row, weight)
+    for joint, most, needed in zip(moving, drives.effort_limit, abs(weight), strict=True):
+        if most <= needed:
+            name = f"effort of joint {joint.name}"
+            raise ParameterError(name, float(most), f"above {needed:.3g}, its load at home")
 
 
 def _named(root: Xml.Element, tag: str) -> dict[str, Xml.Element]:
@@ -224,8 +260,7 @@ def _frames(chain: list[_Joint]) -> tuple[list[Array], list[float]]:
     for joint in chain:
         last = product(last, joint.origin)
         if joint.axis is not None:
-            sign = -1.0 if joint.axis[2] < 0.0 else 1.0
-            align = transform(_turned_z(sign * joint.axis), np.zeros(3))
+            sign, align = _aligned(joint.axis)
             fixed.append(product(last, align))
             kinds.append(sign * (1.0 if _KINDS[joint.kind] == "turn" else 2.0))
             last = np.ascontiguousarray(align.T)
@@ -259,7 +294,7 @@ def _drives(moving: list[_Joint], inertias: list[float]) -> Drives:
             if value > 0.0:  # a limit of 0 is what files say that do not know it
                 own[entry] = value
         least = least_inertia(kind, own.get("viscous", 0.0), own.get("coulomb", 0.0))
-        if max(inertia, least) > 0.0:
+        if max(inertia, least) > _NO_INERTIA:
             own["inertia"] = max(inertia, least)
         stated[joint.name] = own
     drives = drives_of(kinds, parse_drives(stated, list(stated), kinds, 1.0))
@@ -267,42 +302,33 @@ def _drives(moving: list[_Joint], inertias: list[float]) -> Drives:
     return replace(drives, assumed=assumed)
 
 
-def _inertias(
-    moving: list[_Joint], home: Mapping[str, float], base: str, links: _Links, joints: list[_Joint]
-) -> list[float]:
-    """Inertia [kg·m² or kg] at home of all that each joint moves, about or along its axis."""
+def _bodies(moving: list[_Joint], base: str, links: _Links, joints: list[_Joint]) -> Array:
+    """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero."""
     carried: dict[str, list[_Joint]] = {}
     for joint in joints:
         carried.setdefault(joint.parent, []).append(joint)
-    sums = dict.fromkeys((joint.name for joint in moving), 0.0)
-    stack: list[tuple[str, Array, tuple[tuple[_Joint, Array], ...]]] = [(base, np.eye(4), ())]
+    places = {joint.name: i for i, joint in enumerate(moving)}
+    sums = np.zeros((len(moving), 13))
+    stack: list[tuple[str, Array, int]] = [(base, np.eye(4), -1)]
     while stack:
-        link, T, above = stack.pop()
+        link, T, mover = stack.pop()
         mass, inertia, place = _mass(link, links[link])
-        centre = product(T, place)
-        turned = product(product(centre[:3, :3], inertia), centre[:3, :3].T)
-        for joint, frame in above:
-            if joint.name in sums and joint.axis is not None:
-                axis = product(frame[:3, :3], joint.axis)
-                arm = np.cross(axis, centre[:3, 3] - frame[:3, 3])
-                turning = float(dot(axis, product(turned, axis)) + mass * dot(arm, arm))
-                sums[joint.name] += mass if joint.kind == "prismatic" else turning
+        if mover >= 0:
+            centre = product(T, place)
+            turned = product(product(centre[:3, :3], inertia), centre[:3, :3].T)
+            sums[mover] += body_row(mass, centre[:3, 3], turned)
         for joint in carried.get(link, ()):
-            frame = product(T, joint.origin)
-            moved = product(frame, _motion(joint, home.get(joint.name, 0.0)))
-            stack.append((joint.child, moved, (*above, (joint, frame))))
-    return list(sums.values())
+            if joint.name in places and joint.axis is not None:
+                stack.append((joint.child, _aligned(joint.axis)[1].T, places[joint.name]))
+            else:
+                stack.append((joint.child, product(T, joint.origin), mover))
+    return sums
 
 
-def _motion(joint: _Joint, value: float) -> Array:
-    """Transform (4, 4) of a joint at a value [rad, m]."""
-    if joint.axis is None or value == 0.0:
-        return np.eye(4)
-    if joint.kind == "prismatic":
-        return transform(np.eye(3), value * joint.axis)
-    sign = -1.0 if joint.axis[2] < 0.0 else 1.0
-    align = _turned_z(sign * joint.axis)
-    return transform(product(product(align, rotation("z", sign * value)), align.T), np.zeros(3))
+def _aligned(axis: Array) -> tuple[float, Array]:
+    """Sign of an axis along z, and the turn (4, 4) of z into the axis of that sign."""
+    sign = -1.0 if axis[2] < 0.0 else 1.0
+    return sign, transform(_turned_z(sign * axis), np.zeros(3))
 
 
 def _mass(name: str, link: Xml.Element) -> tuple[float, Array, Array]:
