@@ -51,25 +51,28 @@ def test_a_second_master_is_refused_and_the_first_one_goes_on(peer):
     kind = message_type(topics.MASTER_MEASURED_CP.kind.ros_type)
     second = peer.node.create_publisher(kind, topics.MASTER_MEASURED_CP.name, 10)
     form = layout(topics.MASTER_MEASURED_CP, ())
-    stamp, pose = 0, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    for _ in range(300):  # so that their numbers are apart
-        stamp += 1
-        first.publish(form.encode_one(stamp, pose))
+    stamp, pose = 300, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    for number in range(1, stamp + 1):  # so that their numbers are apart
+        first.publish(form.encode_one(number, pose))
+    commands = peer.listen(topics.SLAVE_SERVO_CP)  # which carry the stamps of their poses on
 
     def refused():
         """Report that tells of it; a later one is of a time without messages."""
         nonlocal stamp
         stamp += 2
+        peer.send(topics.SLAVE_SETPOINT_CP, stamp, pose)
         first.publish(form.encode_one(stamp, pose))
         second.publish(form.encode_one(stamp + 1, pose))
         status = peer.status("motion_scaling")
         count = status.number("refused.master/measured_cp.second_publisher")
-        return status if count > 100 and "a second publisher" in status.message else None
+        is_told = count > 100 and "a second publisher" in status.message
+        return status if is_told and commands.take() > 20 else None
 
     status = peer.wait(refused, "refusals of the second one")
     assert "2 publishers on master/measured_cp" in status.message
     assert "is from a second publisher" in status.message
-    assert status.number("received.master/measured_cp") > 200
+    assert all(stamp % 2 == 0 for stamp in commands.stamps if stamp > 300)
+    assert max(commands.stamps) > 302
     assert status.number("rate_hz.master/measured_cp") > 0.0
 
 
