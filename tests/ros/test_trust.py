@@ -46,14 +46,20 @@ def test_who_watches_a_session_passes_reports_over_that_are_none(peer):
 
 
 def test_a_second_master_is_refused_and_the_first_one_goes_on(peer):
-    peer.start("motion_scaling")
+    peer.start("motion_scaling", owner_silence=10.0)
     first = peer.publisher(topics.MASTER_MEASURED_CP)
     kind = message_type(topics.MASTER_MEASURED_CP.kind.ros_type)
     second = peer.node.create_publisher(kind, topics.MASTER_MEASURED_CP.name, 10)
     form = layout(topics.MASTER_MEASURED_CP, ())
     stamp, pose = 300, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    for number in range(1, stamp + 1):  # so that their numbers are apart
+    for number in range(1, stamp):  # so that their numbers are apart
         first.publish(form.encode_one(number, pose))
+
+    def heard():
+        first.publish(form.encode_one(stamp, pose))
+        return peer.status("motion_scaling").number("received.master/measured_cp") > 0
+
+    peer.wait(heard, "the first one, which owns the topic from then on")
     commands = peer.listen(topics.SLAVE_SERVO_CP)  # which carry the stamps of their poses on
 
     def refused():
