@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from teleop_core.bags.arms import ARMS_KEY
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
+from teleop_core.bags.robot_files import recorded_robots, robot_texts
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError
 from teleop_core.graph.graph import DEVICE, RECORDER_NAME, Member
@@ -139,6 +140,8 @@ def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
 def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     """Configuration and scenario that a recording was made with; empty ones for foreign bags.
 
+    The file of a robot is as it was then, see :mod:`teleop_core.bags.robot_files`.
+
     Raises:
         TeleopError: The stored configuration is not one.
     """
@@ -146,6 +149,10 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     layer = parse_text(text, f"{bag.path}: configuration") if text else {}
     if arms and not text:  # an import of several hands
         layer = {SESSION: {"arms": tuple(arms)}}
+    files = recorded_robots(bag.metadata)
+    for values in layer.values():
+        if (robot := values.get("robot")) in files:
+            values["robot"] = files[str(robot)]
     _begin_at_home(layer)
     return layer, bag.metadata.get("scenario", "")
 
@@ -223,6 +230,7 @@ def describe(configuration: Configuration) -> dict[str, str]:
     for arm in graph.namespaces:
         prefix = f"{arm}/" if arm else ""
         about |= {f"{prefix}{n}": str(configuration.value(n, arm)) for n in ("robot", "seed")}
+        about |= robot_texts(about[f"{prefix}robot"], prefix)
     return about | {"configuration": configuration.text()}
 
 

@@ -4,6 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 
+from teleop_core.bags.robot_files import recorded_robots
 from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import Figure
@@ -85,5 +86,7 @@ class ReplayMetric(Metric):
         if self._context.robot is None:
             return None
         with suppress(TeleopError, OSError):
-            return load_robot_set(self._context.robot, self._context.origin.geometry)
+            files = recorded_robots(self._context.bag.metadata)
+            robot = files.get(self._context.robot, self._context.robot)
+            return load_robot_set(robot, self._context.origin.geometry)
         return None

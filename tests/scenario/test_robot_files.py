@@ -1,0 +1,110 @@
+"""Robots from files in recordings: what is replayed and scored is the arm that moved."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import teleop_core as tc
+from teleop_core.bags.arms import of_arm
+from teleop_core.bags.robot_files import recorded_robots
+from teleop_core.cli import main
+from teleop_core.session.runner import recorded_configuration
+
+URDF = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text()
+TABLE = """
+name: my_scara
+convention: modified
+angles: degrees
+task: [x, y, z, rz]
+rows:
+  - {theta: q, lower: -150, upper: 150, home: -45}
+  - {a: 0.4, theta: q, lower: -150, upper: 150, home: 90}
+  - {a: 0.3, d: -q, lower: 0.0, upper: 0.2, home: 0.1}
+  - {theta: q}
+"""
+ROBOTS = {"arm.urdf": (URDF, ["tip=tool0"]), "scara.yaml": (TABLE, [])}
+
+
+def gone(path):
+    path.unlink()
+
+
+def longer(path):
+    path.write_text(re.sub(r"\b0\.(3|4)\b", r"0.\g<1>3", path.read_text()))
+    assert path.read_text() not in (URDF, TABLE)
+
+
+def no_text(path):
+    path.write_bytes(b"\xff\xfe<robot/>")
+
+
+def recorded(folder, name, **more):
+    """Recording of a session with a robot of a file, and that file."""
+    text, geometry = ROBOTS[name]
+    path = folder / name
+    path.write_text(text)
+    options = {"robot": str(path), "geometry": geometry, **more}
+    return tc.run("coarse_box", duration=0.6, out=folder / "bag", **options), path
+
+
+def replayed(bag, prefix=""):
+    return tc.replay(bag)[f"{prefix}slave/setpoint_js"].values
+
+
+@pytest.mark.parametrize("becomes", [gone, longer, no_text])
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_session_replays_to_the_bit_whatever_became_of_the_file_of_its_robot(
+    name, becomes, tmp_path
+):
+    recording, path = recorded(tmp_path, name)
+    before = replayed(recording.path)
+    becomes(path)
+    np.testing.assert_array_equal(replayed(recording.path), before)
+    again = tc.replay(recording.path, out=tmp_path / "again")  # which holds the arm as well
+    np.testing.assert_array_equal(replayed(again.path), before)
+
+
+def test_the_report_draws_the_arm_that_moved_when_its_file_is_gone(tmp_path):
+    recording, path = recorded(tmp_path, "arm.urdf")
+    path.unlink()
+    page = tmp_path / "report.html"
+    assert main(["evaluate", str(recording.path), "--html", str(page)]) == 0
+    assert '"name":"robot"' in page.read_text().replace(" ", "")
+
+
+def test_each_of_two_arms_keeps_its_own_file(tmp_path):
+    (tmp_path / "scara.yaml").write_text(TABLE)
+    right = {"right/robot": str(tmp_path / "scara.yaml"), "right/geometry": []}
+    recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
+    before = replayed(recording.path), replayed(recording.path, "right/")
+    assert before[0].shape[1] != before[1].shape[1]
+    path.unlink()
+    longer(tmp_path / "scara.yaml")
+    for prefix, values in zip(("", "right/"), before, strict=True):
+        np.testing.assert_array_equal(replayed(recording.path, prefix), values)
+
+
+def test_an_arm_of_a_name_has_no_file_of_the_arm_beside_it(tmp_path):
+    right = {"right/robot": "puma560", "right/geometry": []}
+    recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
+    assert recorded_robots(of_arm(recording.bag, "left").metadata) == {str(path): str(path)}
+    assert recorded_robots(of_arm(recording.bag, "right").metadata) == {}
+
+
+def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path):
+    recording, path = recorded(tmp_path, "arm.urdf")
+    assert recorded_robots(recording.metadata) == {str(path): str(path)}
+    assert recording.metadata["robot_file"] == URDF
+    assert recorded_configuration(recording.bag)[0]["slave"]["robot"] == str(path)
+    longer(path)
+    copy = recorded_robots(recording.metadata)[str(path)]
+    assert Path(copy).name == path.name
+    assert Path(copy).read_text() == URDF
+    assert recorded_configuration(recording.bag)[0]["slave"]["robot"] == copy
+
+
+def test_robots_of_a_name_store_no_file(tmp_path):
+    recording = tc.run("coarse_box", duration=0.1, out=tmp_path / "bag")
+    assert not [key for key in recording.metadata if key.endswith("robot_file")]
