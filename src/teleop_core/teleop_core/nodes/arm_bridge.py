@@ -1,0 +1,103 @@
+"""Node ``arm_bridge``: a real arm's controller in the place of ``slave_sim``."""
+
+import re
+import time
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rclpy.serialization import deserialize_message
+
+from teleop_core.graph.topics import (
+    SLAVE_MEASURED_JS,
+    SLAVE_OPERATION,
+    SLAVE_SETPOINT_JS,
+    Kind,
+    Topic,
+)
+from teleop_core.nodes.streams import Subscription, message_type
+from teleop_core.nodes.ticking import TickingNode
+from teleop_core.slave.bridges import BRIDGES, Command
+from teleop_core.slave.bridges.arm_bridge import ArmBridgeParameters
+from teleop_core.slave.bridges.hearing import Sample
+
+_WAITING = 20  # messages of the arm that wait while the loop is late
+_CALM_NS = 1_000_000_000  # the same words are logged again after this [ns]
+
+
+class ArmBridgeNode(TickingNode):
+    """Sends the newest setpoint as the controller takes it, and passes on what the arm says.
+
+    ``slave/measured_js`` goes out for each sound sample of the arm, under the time at which that
+    was taken, and never otherwise: its silence makes the server hold.
+    """
+
+    def setup(self, parameters: ArmBridgeParameters) -> None:
+        """Make the stage, open its topics and those of the arm."""
+        super().setup(parameters)
+        kind, p = BRIDGES.find(parameters.kind.kind), parameters
+        heard = Topic(p.state_topic or kind.state_topic, Kind.STATE)
+        told = Topic(p.command_topic or kind.command_topic, Kind.REPORT, message=kind.message)
+        self._kind, self._type = kind, message_type(kind.message)
+        self._make: Callable[[str], Any] = lambda name: message_type(name)()
+        self._arm = Subscription(self, heard, heard.name, _WAITING)
+        self._sender = self.open_publisher(told)
+        self._output = self.ports.output(SLAVE_MEASURED_JS)
+        self._told, self._told_ns, self.commands = "", 0, 0
+
+    def teardown(self) -> None:
+        """Close what :meth:`setup` opened."""
+        self._arm.close()
+        super().teardown()
+
+    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
+        """Pass on what the arm has said, and command it if that is due in one of the ticks."""
+        self.read_ports()
+        now_ns = self.epoch_ns + max(ticks)
+        with self.lock:
+            self._listen()
+            command = self._command(now_ns) if self.stage.is_due(now_ns) else None
+        if command is not None:
+            message = self._type()
+            self._kind.write(message, command, self.parameters.kind.parameters, self._make)
+            self._sender.publish(message)
+            self.commands += 1
+        self._tell_trouble()
+
+    def _listen(self) -> None:
+        while (taken := self._arm.take()) is not None:
+            message = deserialize_message(taken[0], self._arm.type)
+            stamp = message.header.stamp
+            stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+            if self.parameters.stamps == "sent":
+                stamp_ns = taken[1]["source_timestamp"]
+            sample = Sample(
+                message.name, message.position, message.velocity, message.effort, stamp_ns
+            )
+            if self.stage.hear(sample, time.time_ns()):
+                self._output.send(stamp_ns)
+
+    def _command(self, now_ns: int) -> Command | None:
+        setpoint, operation = self.input(SLAVE_SETPOINT_JS), self.input(SLAVE_OPERATION)
+        is_led = operation.stamp_ns is not None
+        found: Command | None = self.stage.command(now_ns, setpoint.age(), is_led)
+        return found
+
+    def _tell_trouble(self) -> None:
+        """Log what makes the arm hold, or that it goes on, once each."""
+        text = re.sub(r"[\d.]+", "", self.stage.trouble())  # not again for another number
+        now_ns = time.monotonic_ns()
+        if text == self._told or now_ns - self._told_ns < _CALM_NS or self.executor is None:
+            return
+        self._told, self._told_ns = text, now_ns
+        # A line in the log takes milliseconds, which the loop has not.
+        self.executor.create_task(self._log, self.stage.trouble())
+
+    def _log(self, text: str) -> None:
+        log = self.get_logger()
+        log.error(text) if text else log.info("leads the arm")
+
+    def values(self) -> dict[str, str]:
+        """How many commands went out, and how many samples of the arm were refused."""
+        refused = self.stage.hearing.refused.items()
+        counts = {f"refused.arm.{wrong.value}": str(count) for wrong, count in refused}
+        return {**counts, "commands": str(self.commands), "kind": self._kind.name}

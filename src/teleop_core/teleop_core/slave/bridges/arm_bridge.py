@@ -1,0 +1,209 @@
+"""Arm bridge: the stage that stands between the arm's server and the controller of a real arm.
+
+It reads what ``slave_sim`` reads, and writes where the arm is, in its place. What it does not
+believe it does not pass on; the server holds then, and reports ``feedback``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.graph.signals import DT
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
+    OPERATION,
+    SLAVE_MEASURED_JS,
+    SLAVE_OPERATION,
+    SLAVE_SETPOINT_JS,
+)
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.parameters import RobotParameters
+from teleop_core.slave.bridges import BRIDGES, Command
+from teleop_core.slave.bridges.hearing import Hearing, Sample
+from teleop_core.slave.bridges.leading import Lead
+from teleop_core.slave.bridges.names import JointMap
+from teleop_core.slave.operation.states import State
+
+RATES = (100, 125, 200, 250, 500, 1000)
+"""Commands a second that whole milliseconds allow."""
+_STATE, _BRAKED = OPERATION.index("state"), OPERATION.index("is_braked")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmBridgeParameters(RobotParameters):
+    """Parameters of :class:`ArmBridge`."""
+
+    kind: Choice = choice(
+        BRIDGES, "joint_state", doc="what the arm's controller understands", fixed=True
+    )
+    command_topic: str = parameter(
+        "", fixed=True, doc="where the controller takes commands; empty: where its kind does"
+    )
+    state_topic: str = parameter(
+        "", fixed=True,
+        doc="where the arm's JointState comes from; empty: from where that of its kind does",
+    )  # fmt: skip
+    joints: tuple[str, ...] = parameter(
+        (), fixed=True, doc="ours=theirs for each joint that the arm calls otherwise"
+    )
+    signs: tuple[float, ...] = parameter(
+        (), lower=-1.0, upper=1.0, fixed=True,
+        doc="1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
+    )  # fmt: skip
+    offsets: tuple[float, ...] = parameter(
+        (), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0"
+    )
+    order: tuple[str, ...] = parameter(
+        (), fixed=True,
+        doc="the arm's joints in the order of its commands, which a forward command does not name; "
+        "empty: the robot's order",
+    )  # fmt: skip
+    rate: int = parameter(
+        500, unit="1/s", lower=100, upper=1000, fixed=True, source="assumed",
+        doc="commands a second, one of " + ", ".join(map(str, RATES)),
+    )  # fmt: skip
+    stamps: str = parameter(
+        "header", choices=("header", "sent"), fixed=True,
+        doc="when a sample of the arm was taken: as its header says, or when it was sent, for "
+        "arms on a clock of their own",
+    )  # fmt: skip
+    oldest_stamp: float = parameter(
+        0.1, unit="s", lower=0.001, upper=1.0, fixed=True, source="assumed",
+        doc="samples whose stamps differ by more from our clock are refused",
+    )  # fmt: skip
+    start_tolerance: float = parameter(
+        0.02, unit="rad or m", lower=1e-4, upper=0.1, fixed=True, source="assumed",
+        doc="the arm is commanded once each joint is as near to its setpoint",
+    )  # fmt: skip
+    jump_tolerance: float = parameter(
+        0.02, unit="rad or m", lower=1e-4, upper=0.1, fixed=True, source="assumed",
+        doc="what a joint may move between two samples beyond twice its rated speed",
+    )  # fmt: skip
+    arm_timeout: float = parameter(
+        0.3, unit="s", lower=0.02, upper=5.0, fixed=True, source="assumed",
+        doc="without a sound sample for longer the arm is commanded no more; the server holds "
+        "before, at its command_timeout",
+    )  # fmt: skip
+    setpoint_timeout: float = parameter(
+        0.1, unit="s", lower=0.005, upper=5.0, fixed=True, source="assumed",
+        doc="without slave/setpoint_js for longer the arm is commanded no more",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Refuse a rate that is no whole number of milliseconds."""
+        if self.rate not in RATES:
+            raise ParameterError("rate", self.rate, f"one of {', '.join(map(str, RATES))}")
+
+
+class ArmBridge(RunningStage):
+    """Stage that leads a real arm's controller, and says where the arm is.
+
+    Its node calls it: ``hear`` for each message of the arm, ``command`` when one is due.
+
+    Raises:
+        TeleopError: The robot has no drives, or the joints do not fit.
+    """
+
+    def __init__(self, parameters: ArmBridgeParameters, dt: float = DT) -> None:
+        robot = load_robot_set(parameters.robot, parameters.geometry)
+        if robot.drives is None:
+            raise ParameterError("arm_bridge.robot", parameters.robot, "a robot with drives")
+        super().__init__(ARM_BRIDGE, robot.n, dt)
+        self.kernel = _nothing
+        p, speed = parameters, robot.drives.speed_limit
+        self.parameters, self.joints = (
+            p,
+            JointMap(robot.joint_names, p.joints, p.signs, p.offsets, p.order),
+        )
+        oldest = p.oldest_stamp if p.stamps == "header" else 0.0
+        self.hearing = Hearing(self.joints, speed, p.jump_tolerance, oldest)
+        self.lead_arm = Lead(robot.lower, robot.upper, speed, p.start_tolerance, 1.0 / p.rate)
+        self._every, self._sent_ns = round(1e9 / p.rate), 0
+        self._due_ns = 0
+
+    def hear(self, sample: Sample, now_ns: int) -> bool:
+        """Take what the arm says at ``now_ns`` [ns]; whether ``slave/measured_js`` is new.
+
+        After a jump nothing is, until the server has left ENABLED: the arm begins anew then.
+        """
+        hearing, row = self.hearing, self.signals
+        if hearing.has_jumped and row["slave_operation"][_STATE] != State.ENABLED:
+            hearing.begin_anew()
+            self.lead_arm.let_go("the arm jumped")
+        if not hearing.hear(sample, now_ns):
+            return False
+        values = (hearing.position, hearing.velocity, hearing.effort)
+        row["slave_measured_js"] = np.concatenate(values)
+        return True
+
+    def is_due(self, now_ns: int) -> bool:
+        """Whether a command is due in the tick of a time [ns]; times missed are left out."""
+        if now_ns < self._due_ns:
+            return False
+        late = now_ns - self._due_ns
+        self._due_ns = now_ns + self._every - (late if late < self._every else 0)
+        return True
+
+    def command(self, now_ns: int, setpoint_age: float, is_led: bool) -> Command | None:
+        """What the arm is to do now; None if it is to be commanded nothing.
+
+        Args:
+            now_ns: Time [ns].
+            setpoint_age: Time since the last setpoint came [s]; infinite before the first.
+            is_led: Whether the server has said how it is, in ``slave/operation``.
+        """
+        elapsed, self._sent_ns = 1e-9 * (now_ns - self._sent_ns), now_ns
+        if not self._moves(now_ns, setpoint_age, is_led, elapsed):
+            return None
+        joints, lead = self.joints, self.lead_arm
+        return Command(
+            joints.order,
+            joints.command(lead.position),
+            joints.command_rate(lead.velocity),
+            1e-9 * self._every,
+            now_ns,
+        )
+
+    def _moves(self, now_ns: int, setpoint_age: float, is_led: bool, elapsed: float) -> bool:
+        row, lead, hearing, p = self.signals, self.lead_arm, self.hearing, self.parameters
+        silence = 1e-9 * (now_ns - hearing.heard_ns)
+        strange = f"; heard are {hearing.strange} alone" if hearing.strange else ""
+        if not hearing.heard_ns:
+            return lead.let_go(f"the arm has not said yet where it is{strange}")
+        if hearing.has_jumped or silence > p.arm_timeout:
+            silent = f"no sound sample of the arm for {silence:.1f} s{strange}"
+            return lead.let_go(hearing.wrong if hearing.has_jumped else silent)
+        if not is_led:
+            return lead.let_go("waits for slave/operation: no server leads it")
+        if row["slave_operation"][_BRAKED] > 0.0:
+            return lead.brake(hearing.position, elapsed)
+        if setpoint_age > p.setpoint_timeout:
+            return lead.let_go(f"no slave/setpoint_js for {setpoint_age:.1f} s")
+        setpoint = row["slave_setpoint_js"]
+        return lead.step(setpoint, hearing.position, self.joints.ours, elapsed)
+
+    def trouble(self) -> str:
+        """Why the arm holds, or what it says that is not believed, in one line; empty if well."""
+        if self.hearing.wrong:
+            return f"the arm's state is not believed: {self.hearing.wrong}: holds"
+        return "" if self.lead_arm.is_leading else f"commands nothing: {self.lead_arm.waits}"
+
+    def concerns(self) -> list[str]:
+        """Why the arm holds."""
+        return [text] if (text := self.trouble()) else []
+
+
+def _nothing(row: object, dt: float) -> None:
+    """Stand in for a kernel: the node calls the stage."""
+
+
+ARM_BRIDGE = Stage(
+    "arm_bridge",
+    ArmBridgeParameters,
+    reads=(SLAVE_SETPOINT_JS, SLAVE_OPERATION),
+    writes=(SLAVE_MEASURED_JS,),
+    make=ArmBridge,
+    node="teleop_core.nodes.arm_bridge:ArmBridgeNode",
+)

@@ -1,0 +1,162 @@
+"""Hearing: what an arm says of its joints, and whether it can be believed."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from teleop_core.kernels.geometry import Array
+from teleop_core.slave.bridges.names import JointMap
+
+_OVERSPEED = 2.0
+"""A sound arm is at most so many times faster than rated; assumed, beyond the server's 1.5."""
+_LAG = 0.02
+"""Time constant of a speed that the arm does not tell and is differentiated [s], assumed."""
+
+
+class Wrong(Enum):
+    """Why a sample is not believed."""
+
+    NAMES = "names"
+    FORM = "form"
+    STAMP = "stamp"
+    JUMP = "jump"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One message of an arm, in its own names and order.
+
+    Attributes:
+        names: Joints.
+        position: Of each [rad or m].
+        velocity: Of each [rad/s or m/s], or empty; NaN where it is not known.
+        effort: Of each [N·m or N], or empty; NaN where it is not known.
+        stamp_ns: When it was sampled [ns].
+    """
+
+    names: Sequence[str]
+    position: Sequence[float]
+    velocity: Sequence[float]
+    effort: Sequence[float]
+    stamp_ns: int
+
+
+class Hearing:
+    """The newest sound sample of an arm, in our names, order and signs.
+
+    A jump is remembered: nothing is believed after it until :meth:`begin_anew`.
+
+    Args:
+        joints: Which joint is which.
+        speed_limit: Rated speeds (n,) [rad/s or m/s].
+        tolerance: What a joint may be farther than its speed reaches [rad or m].
+        oldest: Largest difference between a stamp and our clock [s]; 0: stamps only have to rise.
+
+    Attributes:
+        position: Where the arm is, shape (n,) [rad or m].
+        velocity: Shape (n,) [rad/s or m/s].
+        effort: Shape (n,) [N·m or N].
+        stamp_ns: Of the newest sound sample [ns]; 0 before the first.
+        heard_ns: When it came [ns]; 0 before the first.
+        wrong: What is wrong with the newest sample, in words; empty if it is sound.
+        strange: Names in a message without any of our joints, as a gripper's, since the newest
+            sound sample.
+        has_jumped: Whether a joint jumped.
+        refused: Number of samples that were not believed, by reason.
+    """
+
+    def __init__(
+        self, joints: JointMap, speed_limit: Array, tolerance: float, oldest: float
+    ) -> None:
+        n = len(joints.ours)
+        self._joints, self._speed_limit = joints, speed_limit
+        self.tolerance, self.oldest = tolerance, oldest
+        self.position, self.velocity, self.effort = np.zeros(n), np.zeros(n), np.zeros(n)
+        self.refused: Counter[Wrong] = Counter()
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Forget where the arm was: the next sound sample may be anywhere."""
+        self.stamp_ns = self.heard_ns = 0
+        self.wrong, self.strange, self.has_jumped = "", "", False
+        self.velocity[:] = 0.0
+
+    def hear(self, sample: Sample, now_ns: int) -> bool:
+        """Take a sample that came at ``now_ns`` [ns]; whether it is believed."""
+        if sample.names and self._joints.is_strange(sample.names):
+            self.refused[Wrong.NAMES] += 1
+            self.strange = ", ".join(sample.names)
+            return False
+        found = self._wrong(sample, now_ns)
+        if found is None:
+            self.wrong = self.strange = ""
+            return True
+        reason, self.wrong = found
+        self.refused[reason] += 1
+        return False
+
+    def _wrong(self, sample: Sample, now_ns: int) -> tuple[Wrong, str] | None:
+        """Take a sample, or say why it is not believed."""
+        if self.has_jumped:
+            return Wrong.JUMP, self.wrong
+        places = self._joints.places(sample.names)
+        if isinstance(places, str):
+            return Wrong.NAMES, places
+        theirs = _numbers(sample.position, sample.names, places)
+        if theirs is None or not np.isfinite(theirs).all():
+            return Wrong.FORM, "not one finite position for each name"
+        if text := self._wrong_stamp(sample.stamp_ns, now_ns):
+            return Wrong.STAMP, text
+        position = self._joints.position(theirs)
+        if text := self._jump(position, sample.stamp_ns):
+            self.has_jumped = True
+            return Wrong.JUMP, text
+        self._take(sample, position, places, now_ns)
+        return None
+
+    def _wrong_stamp(self, stamp_ns: int, now_ns: int) -> str:
+        if stamp_ns <= self.stamp_ns:
+            behind = 1e-9 * (self.stamp_ns - stamp_ns)
+            return f"its stamp does not rise: {behind:.4g} s behind the newest one"
+        age = 1e-9 * (now_ns - stamp_ns)
+        if 0.0 < self.oldest < abs(age):
+            return f"its stamp is {age:.4g} s old, at most {self.oldest:g} s to either side"
+        return ""
+
+    def _jump(self, position: Array, stamp_ns: int) -> str:
+        if not self.stamp_ns:
+            return ""
+        passed = 1e-9 * (stamp_ns - self.stamp_ns)
+        way = np.abs(position - self.position)
+        room = self.tolerance + _OVERSPEED * passed * self._speed_limit
+        if (way <= room).all():
+            return ""
+        i = int(np.argmax(way - room))
+        return (
+            f"{self._joints.theirs[i]} jumped by {way[i]:.4g} in {passed:.4g} s, at most "
+            f"{room[i]:.4g}; disable the arm, look at it, then enable it"
+        )
+
+    def _take(self, sample: Sample, position: Array, places: list[int], now_ns: int) -> None:
+        velocity = _numbers(sample.velocity, sample.names, places)
+        if velocity is not None and np.isfinite(velocity).all():
+            self.velocity[:] = self._joints.rate(velocity)
+        elif self.stamp_ns:
+            passed = 1e-9 * (sample.stamp_ns - self.stamp_ns)
+            share = passed / (passed + _LAG)
+            self.velocity += share * ((position - self.position) / passed - self.velocity)
+        effort = _numbers(sample.effort, sample.names, places)
+        known = effort is not None and np.isfinite(effort).all()
+        self.effort[:] = self._joints.rate(effort) if effort is not None and known else 0.0
+        self.position[:] = position
+        self.stamp_ns, self.heard_ns = sample.stamp_ns, now_ns
+
+
+def _numbers(values: Sequence[float], names: Sequence[str], places: list[int]) -> Array | None:
+    """Those of our joints, in our order; None if there is not one for each name."""
+    if len(values) != len(names):
+        return None
+    return np.array([values[place] for place in places], dtype=np.float64)

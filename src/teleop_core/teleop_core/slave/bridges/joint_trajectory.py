@@ -1,0 +1,55 @@
+"""Joint trajectories of one point: what ``joint_trajectory_controller`` of ros2_control takes.
+
+Each message replaces the trajectory before it. Its point lies at least two periods ahead, so that
+one late message does not let the arm come to the end of its way and stop.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from teleop_core.base.parameters import parameter
+from teleop_core.slave.bridges import Bridge, Command, write_time
+
+_POINT = "trajectory_msgs/msg/JointTrajectoryPoint"
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTrajectoryParameters:
+    """Parameters of trajectories of one point."""
+
+    ahead: int = parameter(
+        2, unit="periods", lower=2, upper=100, source="assumed",
+        doc="time from start of the point: the arm follows so much later",
+    )  # fmt: skip
+    velocity: str = parameter(
+        "none", choices=("none", "zero", "setpoint"),
+        doc="velocities of the point: left out, 0, or the setpoint's; a controller that commands "
+        "velocities too needs them",
+    )  # fmt: skip
+
+
+def write_trajectory(
+    message: Any,
+    command: Command,
+    parameters: JointTrajectoryParameters,
+    make: Callable[[str], Any],
+) -> None:
+    """Fill a ``trajectory_msgs/JointTrajectory``; its stamp stays 0, which means at once."""
+    point = make(_POINT)
+    point.positions = command.position.tolist()
+    if parameters.velocity != "none":
+        share = 1.0 if parameters.velocity == "setpoint" else 0.0
+        point.velocities = (share * command.velocity).tolist()
+    write_time(point.time_from_start, round(parameters.ahead * command.period * 1e9))
+    message.joint_names, message.points = list(command.names), [point]
+
+
+JOINT_TRAJECTORY = Bridge(
+    "joint_trajectory",
+    JointTrajectoryParameters,
+    "trajectory_msgs/msg/JointTrajectory",
+    "/joint_trajectory_controller/joint_trajectory",
+    "/joint_states",
+    write_trajectory,
+)

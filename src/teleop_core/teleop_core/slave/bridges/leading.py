@@ -1,0 +1,86 @@
+"""Leading: when an arm may be commanded, and how far each command may go."""
+
+import numpy as np
+
+from teleop_core.kernels.geometry import Array
+
+_CATCHING_UP = 1.2
+"""Largest speed of commands in rated speeds: setpoints keep 1, the rest makes up for late ones."""
+_LONGEST = 2.0  # periods for which one command may make up
+
+
+class Lead:
+    """Commands (n,) from setpoints: none before the arm stands at them, and none that jumps.
+
+    Args:
+        lower: Limits of the joints (n,) [rad or m].
+        upper: The same at the other end.
+        speed_limit: Rated speeds (n,) [rad/s or m/s].
+        tolerance: How far a joint may be from its setpoint when the lead begins [rad or m].
+        period: Time from command to command [s].
+
+    Attributes:
+        position: The last command (n,) [rad or m].
+        velocity: How fast it went there (n,) [rad/s or m/s].
+        is_leading: Whether the arm is led to the setpoint.
+        waits: Why it is not, in words.
+    """
+
+    def __init__(
+        self, lower: Array, upper: Array, speed_limit: Array, tolerance: float, period: float
+    ) -> None:
+        n = len(lower)
+        self._lower, self._upper, self._speed_limit = lower, upper, speed_limit
+        self.tolerance, self._period = tolerance, period
+        self.position, self.velocity, self._braked = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._is_braked = self.is_leading = False
+        self.waits = "nothing has come yet"
+
+    def let_go(self, reason: str) -> bool:
+        """Command nothing; the controller holds the arm at the last command. False, as `step`."""
+        self.is_leading = self._is_braked = False
+        self.waits = reason
+        return False
+
+    def step(
+        self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float
+    ) -> bool:
+        """Go on towards a setpoint (n,); whether there is a command to send.
+
+        Args:
+            setpoint: Where the server wants the joints (n,) [rad or m].
+            measured: Where they are (n,) [rad or m].
+            names: Of the joints, for messages.
+            elapsed: Time since the last command [s].
+        """
+        self._is_braked = False
+        if not self.is_leading:
+            off = np.abs(setpoint - measured)
+            if not (off <= self.tolerance).all():
+                i = int(np.argmax(off))
+                return self.let_go(
+                    f"{names[i]} is {off[i]:.4g} from its setpoint, at most {self.tolerance:g} "
+                    "to begin"
+                )
+            self.position[:] = measured
+            self.is_leading, self.waits = True, ""
+        self._approach(np.clip(setpoint, self._lower, self._upper), elapsed)
+        return True
+
+    def brake(self, measured: Array, elapsed: float) -> bool:
+        """Bring the arm to where it is when its brakes close; whether there is a command."""
+        if not self.is_leading and not self._is_braked:
+            return False
+        if self.is_leading:
+            self._braked[:] = measured
+            self.is_leading, self._is_braked = False, True
+            self.waits = "its brakes hold it"
+        self._approach(self._braked, elapsed)
+        return True
+
+    def _approach(self, goal: Array, elapsed: float) -> None:
+        elapsed = min(max(elapsed, 1e-3), _LONGEST * self._period)
+        reach = _CATCHING_UP * elapsed * self._speed_limit
+        step = np.clip(goal - self.position, -reach, reach)
+        self.position += step
+        self.velocity[:] = step / elapsed

@@ -1,0 +1,215 @@
+"""Arm bridge without ROS: names, what is believed of an arm, when it is commanded and how far."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.slave.bridges import BRIDGES, Command
+from teleop_core.slave.bridges.arm_bridge import RATES, ArmBridge, ArmBridgeParameters
+from teleop_core.slave.bridges.hearing import Hearing, Sample, Wrong
+from teleop_core.slave.bridges.leading import Lead
+from teleop_core.slave.bridges.names import JointMap
+from teleop_core.slave.operation.states import State
+from teleop_core.slave.slave import SlaveParameters
+
+MS = 1_000_000
+SPEED = np.array([1.0, 2.0])
+ARMS = sorted((Path(__file__).resolve().parents[2] / "config/arms").glob("*.yaml"))
+
+
+def hearing(oldest=0.1):
+    return Hearing(JointMap(("a", "b"), ["b=elbow"], [1.0, -1.0]), SPEED, 0.02, oldest)
+
+
+def sample(stamp_ms, position=(0.1, 0.2), names=("a", "elbow"), velocity=()):
+    return Sample(names, position, velocity, (), stamp_ms * MS)
+
+
+def lead():
+    return Lead(-np.ones(2), np.ones(2), SPEED, 0.02, 0.002)
+
+
+def test_a_command_in_the_arms_order_and_signs_is_measured_as_what_was_commanded():
+    joints = JointMap(("a", "b"), ["a=x", "b=y"], [-1.0, 1.0], [0.5, 0.0], ["y", "x"])
+    ours = np.array([0.3, -0.7])
+    sent = dict(zip(joints.order, joints.command(ours), strict=True))
+    theirs = np.array([sent[name] for name in joints.theirs])
+    assert joints.position(theirs) == pytest.approx(ours)
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        ({"renamed": ["c=x"]}, "joints"),
+        ({"renamed": ["a"]}, "joints"),
+        ({"renamed": ["a=b"]}, "joints"),
+        ({"signs": [1.0]}, "signs"),
+        ({"signs": [1.0, 0.5]}, "signs"),
+        ({"offsets": [1.0]}, "offsets"),
+        ({"order": ["a", "a"]}, "order"),
+    ],
+)
+def test_joints_that_do_not_fit_are_refused_by_their_parameter(given, name):
+    with pytest.raises(ParameterError) as caught:
+        JointMap(("a", "b"), **given)
+    assert caught.value.name == f"arm_bridge.{name}"
+
+
+def test_names_in_another_order_among_others_are_read_by_name():
+    heard = hearing()
+    assert heard.hear(sample(1, (9.0, 0.2, 0.1), ("finger", "elbow", "a")), 2 * MS)
+    assert heard.position == pytest.approx([0.1, -0.2])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "reason", "words"),
+    [
+        (sample(3, names=("a", "wrist")), Wrong.NAMES, "says nothing of elbow"),
+        (sample(3, (0.1, 0.2, 0.3), ("a", "elbow", "a")), Wrong.NAMES, "a twice"),
+        (sample(3, (0.1,)), Wrong.FORM, "position for each name"),
+        (sample(3, (0.1, np.nan)), Wrong.FORM, "finite"),
+        (sample(2), Wrong.STAMP, "does not rise"),
+        (sample(1), Wrong.STAMP, "does not rise"),
+        (sample(200), Wrong.STAMP, "old, at most 0.1"),
+        (sample(3, (0.2, 0.2)), Wrong.JUMP, "a jumped by 0.1"),
+    ],
+)
+def test_a_sample_that_cannot_be_is_refused_and_changes_nothing(wrong, reason, words):
+    heard = hearing()
+    assert heard.hear(sample(2), 2 * MS)
+    assert not heard.hear(wrong, 3 * MS)
+    assert words in heard.wrong
+    assert heard.refused == {reason: 1}
+    assert heard.position == pytest.approx([0.1, -0.2])
+    assert heard.stamp_ns == 2 * MS
+
+
+def test_nothing_is_believed_after_a_jump_before_the_arm_begins_anew():
+    heard = hearing()
+    heard.hear(sample(1), MS)
+    heard.hear(sample(2, (0.9, 0.2)), 2 * MS)
+    assert not heard.hear(sample(3), 3 * MS)
+    heard.begin_anew()
+    assert heard.hear(sample(4, (0.9, 0.2)), 4 * MS)
+
+
+def test_a_speed_that_the_arm_does_not_know_is_that_of_its_motion():
+    heard = hearing()
+    for i in range(200):
+        assert heard.hear(sample(1 + i, (0.5e-3 * i, 0.0), velocity=(np.nan, 0.0)), (1 + i) * MS)
+    assert heard.velocity == pytest.approx([0.5, 0.0], rel=0.01)
+
+
+def test_nothing_is_commanded_before_the_arm_stands_at_its_setpoint():
+    led, measured = lead(), np.array([0.1, 0.0])
+    assert not led.step(np.array([0.2, 0.0]), measured, ("a", "b"), 0.002)
+    assert "a is 0.1 from its setpoint" in led.waits
+    assert led.step(np.array([0.11, 0.0]), measured, ("a", "b"), 0.002)
+    assert np.abs(led.position - measured).max() <= 1.2 * 0.002 * SPEED[0] + 1e-12
+
+
+def test_no_command_is_faster_than_its_joint_or_beyond_its_limits():
+    led = lead()
+    assert led.step(np.zeros(2), np.zeros(2), ("a", "b"), 0.002)
+    for _ in range(2000):
+        before = led.position.copy()
+        assert led.step(np.array([5.0, -5.0]), before, ("a", "b"), 10.0)
+        assert (np.abs(led.position - before) <= 1.2 * 2 * 0.002 * SPEED + 1e-12).all()
+    assert led.position == pytest.approx([1.0, -1.0])
+
+
+def test_brakes_bring_the_command_to_where_the_arm_was_and_leave_it_there():
+    led = lead()
+    led.step(np.zeros(2), np.zeros(2), ("a", "b"), 0.002)
+    at = np.array([-0.01, 0.01])
+    for _ in range(100):
+        assert led.brake(at, 0.002)
+        at = at + 0.001  # it sags
+    assert led.position == pytest.approx([-0.01, 0.01])
+    assert not led.is_leading
+
+
+def bridge(**values):
+    made = ArmBridge(build(ArmBridgeParameters, values))
+    made.signals["slave_operation"][0] = 1.0
+    return made
+
+
+def home_sample(made, stamp_ns):
+    return Sample(made.joints.theirs, made.signals["slave_setpoint_js"].tolist(), (), (), stamp_ns)
+
+
+def test_a_silent_arm_server_or_setpoint_ends_the_commands():
+    made = bridge()
+    now = 10**9
+    assert made.command(now, 0.0, True) is None
+    assert made.hear(home_sample(made, now), now)
+    assert made.command(now + MS, 0.0, True) is not None
+    assert made.command(now + 2 * MS, 0.0, False) is None
+    assert made.command(now + 3 * MS, 0.2, True) is None
+    assert made.command(now + 4 * MS, 0.0, True) is not None
+    assert made.command(now + 400 * MS, 0.0, True) is None
+    assert "no sound sample" in made.trouble()
+
+
+def test_an_arm_that_jumped_is_commanded_nothing_while_it_is_enabled():
+    made, now = bridge(), 10**9
+    made.signals["slave_operation"][0] = State.ENABLED
+    assert made.hear(home_sample(made, now), now)
+    assert made.command(now + MS, 0.0, True) is not None
+    there = home_sample(made, now + 2 * MS)
+    far = [there.position[0] + 0.5, *there.position[1:]]
+    assert not made.hear(Sample(there.names, far, (), (), there.stamp_ns), now + 2 * MS)
+    assert made.command(now + 3 * MS, 0.0, True) is None
+    made.signals["slave_operation"][0] = State.FAULT
+    assert made.hear(home_sample(made, now + 4 * MS), now + 4 * MS)
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_commands_go_out_at_the_rate_that_was_asked_for(rate):
+    made = bridge(rate=rate)
+    assert sum(made.is_due(i * MS) for i in range(1000)) == rate
+
+
+def test_a_rate_between_whole_milliseconds_is_refused():
+    with pytest.raises(ParameterError, match="rate"):
+        build(ArmBridgeParameters, {"rate": 300})
+
+
+def blank(_=""):
+    def time():
+        return SimpleNamespace(sec=0, nanosec=0)
+
+    return SimpleNamespace(header=SimpleNamespace(stamp=time()), time_from_start=time())
+
+
+@pytest.mark.parametrize("name", list(BRIDGES))
+def test_every_kind_writes_the_positions_in_the_order_of_its_names(name):
+    part, message = BRIDGES.find(name), blank()
+    command = Command(("x", "y"), np.array([1.0, 2.0]), np.array([3.0, 4.0]), 0.004, 7 * 10**9)
+    part.write(message, command, part.parameters(), blank)
+    if name == "forward_command":
+        assert message.data == [1.0, 2.0]
+    elif name == "joint_trajectory":
+        (point,) = message.points
+        assert (message.joint_names, point.positions) == (["x", "y"], [1.0, 2.0])
+        assert point.time_from_start.nanosec == 8_000_000
+        assert message.header.stamp.sec == 0
+    else:
+        assert (message.name, message.position) == (["x", "y"], [1.0, 2.0])
+        assert message.header.stamp.sec == 7
+
+
+@pytest.mark.parametrize("file", ARMS, ids=lambda path: path.stem)
+def test_the_configuration_of_each_arm_has_parameters_that_exist(file):
+    groups = {k: v["ros__parameters"] for k, v in yaml.safe_load(file.read_text()).items()}
+    common = groups["/**"]
+    made = build(ArmBridgeParameters, common | groups["arm_bridge"])
+    led = build(SlaveParameters, common | groups["slave"])
+    assert not made.order or len(made.order) == len(led.start)
+    assert not led.operation.starts_enabled
