@@ -13,6 +13,7 @@ NODES = (
     "network",
     "slave",
     "slave_sim",
+    "arm_bridge",
     "recorder",
     "teleop_session",
     "stage",
@@ -90,6 +91,7 @@ setup(
         files("config", "*.json"),
         files("config", "*.rviz"),
         files("config/robots", "*.yaml"),
+        files("config/arms", "*.yaml"),
         files("launch", "*.launch.py"),
     ],
     entry_points={

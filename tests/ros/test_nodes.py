@@ -1,5 +1,6 @@
 """Every node, as a real process, answers on its topics, takes parameters and ends cleanly."""
 
+import re
 import resource
 import signal
 import subprocess
@@ -15,6 +16,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.children import environment
+from teleop_core.nodes.start import main
 from teleop_core.robots import load_robot
 
 pytestmark = pytest.mark.ros
@@ -410,3 +412,20 @@ def test_wrong_parameter_files_end_with_one_line_and_2(tmp_path, name, content, 
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
     assert needed in done.stderr
+
+
+@pytest.mark.parametrize("name", [*STAGES, "teleop_session"])
+def test_help_of_an_executable_names_its_topics_and_starts_nothing(name, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [name, "--help"])
+    assert main() == 0
+    text = capsys.readouterr().out
+    assert text.startswith(f"usage: {name}")
+    stage = STAGES.find(name) if name in STAGES else STAGES.find("slave")
+    topics = {topic.name for topic in (*stage.reads, *stage.writes)}
+    assert (name == "teleop_session") != (topics <= set(re.findall(r"[\w/]+", text)))
+
+
+def test_help_of_a_stage_that_there_is_not_names_those_there_are(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["stage", "nosuch", "--help"])
+    assert main() == 2
+    assert "slave_sim" in capsys.readouterr().err

@@ -12,7 +12,8 @@ def test_the_hand_feels_the_block_that_the_slave_presses(peer, compose):
     compose(
         operator={"kind": "line", "center": [0.0, -0.02, 0.04], "size": [0.0, 0.04, 0.0],
                   "period": 4.0, "rotation": 0.0},
-        motion_scaling={"reflection": {"force_gain": 1.0}, "reach_force": {"is_on": False}},
+        motion_scaling={"reflection": {"architecture": "position_force"},
+                        "reach_force": {"is_on": False}},
         slave={"operation": {"longest_outage": 0.0}},
         slave_sim={"world": {"kind": "box", "place": [0.241, -0.236, -0.087]}},
     )  # fmt: skip

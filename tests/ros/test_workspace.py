@@ -25,6 +25,7 @@ NODES = {
     "inverse_kinematics",
     "slave",
     "slave_sim",
+    "arm_bridge",
     "recorder",
 }
 

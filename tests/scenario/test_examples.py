@@ -68,6 +68,15 @@ def test_own_object_is_touched_as_the_built_in_ones_are(tmp_path):
     assert all(0.9 < peak < 1.2 for peak in numbers(r"at most ([\d.]+) N", text))
 
 
+def test_own_architecture_feels_force_as_position_force_does_and_less_drag(tmp_path):
+    text = run("own_architecture", tmp_path)
+    drag, felt = numbers(r"([\d.]+) N in free", text), numbers(r"to ([\d.]+) N", text)
+    assert drag[:2] == [0.0, 0.0]
+    assert 0.0 < drag[3] < 0.5 * drag[2]
+    assert felt[0] == 0.0
+    assert felt[3] >= felt[1] > 2.0 * felt[2]
+
+
 def test_own_network_loses_more_the_deeper_it_fades(tmp_path):
     text = run("own_network", tmp_path)
     lost, ages = numbers(r"(\d+) % lost", text), numbers(r"than (\d+) ms", text)

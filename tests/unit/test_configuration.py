@@ -53,7 +53,8 @@ def test_setting_with_its_stage_sets_that_parameter_alone():
 def test_bare_key_sets_every_stage_that_has_it():
     layer = parse_setting("robot=mma")
     assert layer == {
-        name: {"robot": "mma"} for name in ("inverse_kinematics", "slave", "slave_sim")
+        name: {"robot": "mma"}
+        for name in ("inverse_kinematics", "slave", "slave_sim", "arm_bridge")
     }
     assert parse_setting("seed=5") == {
         name: {"seed": 5} for name in ("operator", "haptic_master", "network", "slave_sim")

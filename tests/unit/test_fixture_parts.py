@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 
 from teleop_core.base.errors import PartError
 from teleop_core.base.parameters import build, parameter
-from teleop_core.chain.fixtures import FIXTURES, Fixture, register_fixture, shape_of
+from teleop_core.chain.fixtures import FIXTURES, Fixture, register_fixture
 from teleop_core.chain.fixtures.sphere import SphereParameters, sphere_depth, sphere_outline
 from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.kernels import kernel
+from teleop_core.kernels.parts import numbers_of
 
 # Quotients of numbers below one.
 ROUNDING = 1e-15
@@ -39,7 +40,7 @@ def test_depth_of_a_sphere_leads_to_its_nearest_point(offset, diameter):
 def test_outline_lies_on_the_walls_and_depth_begins_there(name):
     part = FIXTURES.find(name)
     parameters = part.parameters()
-    points, shape = part.outline(parameters), shape_of(parameters)
+    points, shape = part.outline(parameters), numbers_of(parameters)
     points = points[np.isfinite(points).all(axis=1)]
     assert not part.depths(0.999 * points, shape).any()
     assert (part.depths(1.001 * points, shape) > 0.0).all()
@@ -49,7 +50,7 @@ def test_outline_lies_on_the_walls_and_depth_begins_there(name):
 @pytest.mark.parametrize("name", ["box", "sphere"])
 def test_middle_of_every_fixture_is_inside(name):
     part = FIXTURES.find(name)
-    assert not part.depths(np.zeros((1, 3)), shape_of(part.parameters())).any()
+    assert not part.depths(np.zeros((1, 3)), numbers_of(part.parameters())).any()
 
 
 def test_own_fixture_is_chosen_by_its_name_and_has_its_parameters(own_parts):
@@ -68,7 +69,7 @@ def test_own_fixture_is_chosen_by_its_name_and_has_its_parameters(own_parts):
     register_fixture(Fixture("my_cone", ConeParameters, depth, outline))
     chosen = build(FixtureParameters, {"kind": "my_cone", "my_cone.height": 0.05}).kind
     assert chosen.parameters == ConeParameters(height=0.05)
-    assert np.array_equal(shape_of(chosen.parameters), (0.05, 0.02, 0.03))
+    assert np.array_equal(numbers_of(chosen.parameters), (0.05, 0.02, 0.03))
 
 
 def writes_four(offset, shape, out):

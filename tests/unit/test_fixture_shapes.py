@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
-from teleop_core.chain.fixtures import FIXTURES, shape_of
+from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.fixtures.box import BoxParameters
 from teleop_core.chain.fixtures.cone import ConeParameters
 from teleop_core.chain.fixtures.cylinder import CylinderParameters
@@ -29,6 +29,7 @@ from teleop_core.chain.fixtures.line import LineParameters
 from teleop_core.chain.fixtures.path import PathParameters, path_depth
 from teleop_core.chain.fixtures.sphere import SphereParameters
 from teleop_core.chain.mapping.parameters import FixtureParameters
+from teleop_core.kernels.parts import numbers_of
 
 # Sums and products of numbers below one.
 ROUNDING = 1e-14
@@ -163,7 +164,7 @@ def a_place(data, parameters):
 def found(name, parameters, offset):
     """Depth and way of a fixture at a place (3,)."""
     out = np.full(3, math.nan)
-    depth = FIXTURES.find(name).depth(np.array(offset, dtype=float), shape_of(parameters), out)
+    depth = FIXTURES.find(name).depth(np.array(offset, dtype=float), numbers_of(parameters), out)
     return depth, out
 
 
@@ -293,7 +294,7 @@ def test_the_middle_of_what_is_forbidden_has_a_way_out():
 def test_a_path_takes_64_points_and_no_more():
     most = PathParameters(points=(0.01, 0.0, 0.0) * 64)
     out = np.empty(3)
-    assert path_depth(np.array([0.01, 0.0, 0.0]), shape_of(most), out) == 0.0
+    assert path_depth(np.array([0.01, 0.0, 0.0]), numbers_of(most), out) == 0.0
     with pytest.raises(ParameterError) as error:
         PathParameters(points=(0.01, 0.0, 0.0) * 65)
     assert error.value.name == "path.points"
@@ -345,7 +346,7 @@ def digest():
     seen = hashlib.sha256()
     for name in KINDS:
         part = FIXTURES.find(name)
-        shape, out = shape_of(part.parameters(**OBLIQUE.get(name, {}))), np.empty(3)
+        shape, out = numbers_of(part.parameters(**OBLIQUE.get(name, {}))), np.empty(3)
         for offset in np.random.default_rng(2).uniform(-0.06, 0.06, (40, 3)):
             seen.update(np.float64(part.depth(offset, shape, out)).tobytes() + out.tobytes())
     return seen.hexdigest()

@@ -107,7 +107,7 @@ def test_swinging_fast_in_free_air_is_no_push(size, turns):
 
 
 def test_what_an_estimate_costs_is_time_alone_and_off_it_is_zero():
-    texts = ("reflection.force_gain=0.0",)
+    texts = ("reflection.architecture=unilateral",)
     without, with_it = (
         VirtualTime(configure("palpation", settings=[*texts, f"estimate={word}"])).run(12_000)
         for word in ("false", "true")
@@ -170,7 +170,7 @@ def test_a_stretched_arm_tells_a_finite_force():
 
 
 def test_the_estimate_is_scored_in_touch_where_there_is_one():
-    given = ["reflection.force_gain=0.0", "duration=14.0"]
+    given = ["reflection.architecture=unilateral", "duration=14.0"]
     none, found = (
         tc.run(configure("palpation", settings=[*given, f"estimate={word}"])).score()
         for word in ("false", "true")

@@ -98,7 +98,7 @@ def test_a_bias_is_what_is_told_of_nothing():
 
 def pressed(*texts, ticks=13_000):
     """Rows of a session that presses a block from 12 s on."""
-    given = ["reflection.force_gain=0.0", *texts]
+    given = ["reflection.architecture=unilateral", *texts]
     return VirtualTime(configure("palpation", settings=given)).run(ticks)
 
 
@@ -150,7 +150,7 @@ def test_a_sensor_that_cannot_be_is_refused_by_name(text):
 
 def score(*texts):
     """Score of a recorded press."""
-    given = ["reflection.force_gain=0.0", "duration=14.0", *texts]
+    given = ["reflection.architecture=unilateral", "duration=14.0", *texts]
     return tc.run(configure("palpation", settings=given)).score()
 
 

@@ -342,7 +342,7 @@ def test_a_turn_counts_by_its_angle_whatever_the_sign_of_its_quaternion(sign):
 
 
 def test_a_force_behind_a_deadband_is_off_by_no_more_than_its_share():
-    given = ["reflection.force_gain=1", *(f"network.deadband.{text}" for text in
+    given = ["reflection.architecture=position_force", *(f"network.deadband.{text}" for text in
              ("is_on=true", "place=1e-3", "turn=0.05"))]  # fmt: skip
     run = session(*given, scenario="palpation")
     rows = run.run(run.lead + 10_000)
@@ -454,7 +454,7 @@ def test_a_slave_that_was_stopped_far_away_is_taken_up_where_it_rests():
 
 
 def test_a_force_from_behind_a_network_is_felt_and_fades_where_nothing_comes():
-    given = ["reflection.force_gain=1", "network.back.least_delay=0.3"]
+    given = ["reflection.architecture=position_force", "network.back.least_delay=0.3"]
     run = session(*given, scenario="palpation")
     rows = run.run(run.lead + 14_000)
     pushed = np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1)

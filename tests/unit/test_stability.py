@@ -66,10 +66,11 @@ def test_a_heavier_hand_stands_a_late_spring_no_better_but_a_damped_one_does():
     assert exact_boundary(damped, 0.05) > exact_boundary(MEDIUM, 0.05)
 
 
-def test_the_chain_throws_a_hand_above_its_boundary_unless_there_is_a_tank():
-    bench = Bench()
-    found = chain_boundary(bench, MEDIUM, 0.05, "none")
+def test_force_throws_a_hand_above_its_boundary_but_not_with_a_tank_or_by_a_soft_spring():
+    bench, force = Bench(), ("position_force", "none")
+    found = chain_boundary(bench, MEDIUM, 0.05, force)
     assert 600.0 < found < 1200.0
-    assert chain_boundary(bench, MEDIUM, 0.05, "tank") == STIFFEST
-    calm, thrown = (fastest(bench, MEDIUM, 0.05, share * found, "none") for share in (0.5, 2.0))
+    for way in (("position_force", "tank"), ("position_position", "none")):
+        assert chain_boundary(bench, MEDIUM, 0.05, way) == STIFFEST
+    calm, thrown = (fastest(bench, MEDIUM, 0.05, share * found, force) for share in (0.5, 2.0))
     assert thrown > 2.0 * calm

@@ -27,6 +27,10 @@ from .session.exchange import (
     export_recording as export_recording,
     import_recording as import_recording,
 )
+from .chain.architectures import (
+    Architecture as Architecture,
+    register_architecture as register_architecture,
+)
 from .chain.filters import (
     TremorFilter as TremorFilter,
     register_tremor_filter as register_tremor_filter,
@@ -44,6 +48,11 @@ from .chain.operators import (
 )
 from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
 from .base.parameters import NoParameters as NoParameters, parameter as parameter
+from .slave.bridges import (
+    Bridge as Bridge,
+    Command as Command,
+    register_bridge as register_bridge,
+)
 from .slave.world import (
     WorldObject as WorldObject,
     register_world_object as register_world_object,

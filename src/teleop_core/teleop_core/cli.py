@@ -291,6 +291,7 @@ def _scenarios(_: argparse.Namespace) -> int:
 
 
 def _parts(_: argparse.Namespace) -> int:
+    from teleop_core.chain.architectures import ARCHITECTURES
     from teleop_core.chain.filters import TREMOR_FILTERS
     from teleop_core.chain.fixtures import FIXTURES
     from teleop_core.chain.network import NETWORKS
@@ -298,13 +299,14 @@ def _parts(_: argparse.Namespace) -> int:
     from teleop_core.evaluation import METRICS
     from teleop_core.graph.stage import STAGES
     from teleop_core.robots import ROBOTS
+    from teleop_core.slave.bridges import BRIDGES
     from teleop_core.slave.controllers import CONTROLLERS
     from teleop_core.slave.plants import PLANTS
     from teleop_core.slave.world import WORLD_OBJECTS
 
     parts = (
-        OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, NETWORKS, TREMOR_FILTERS,
-        STAGES, METRICS,
+        OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, ARCHITECTURES, NETWORKS,
+        TREMOR_FILTERS, BRIDGES, STAGES, METRICS,
     )  # fmt: skip
     for registry in parts:
         print(f"{registry.kinds:16}{', '.join(registry)}")

@@ -371,6 +371,7 @@ STAGES: Registry[Stage] = Registry(
         "inverse_kinematics": "teleop_core.chain.mapping.inverse_kinematics:INVERSE_KINEMATICS",
         "slave": "teleop_core.slave.slave:SLAVE",
         "slave_sim": "teleop_core.slave.slave_sim:SLAVE_SIM",
+        "arm_bridge": "teleop_core.slave.bridges.arm_bridge:ARM_BRIDGE",
         "recorder": "teleop_core.bags.recording:RECORDER",
     },
     _checked,

@@ -38,6 +38,9 @@ def _start() -> int:
     name = Path(sys.argv[0]).stem
     if name not in {SESSION, *STAGES}:
         name = sys.argv.pop(1) if len(sys.argv) > 1 and sys.argv[1][:1] != "-" else ANY
+    if {"-h", "--help"} & set(sys.argv):
+        print(help_text(name))
+        return 0
     if name == SESSION:
         from teleop_core.nodes.teleop_session import TeleopSession
 
@@ -48,3 +51,30 @@ def _start() -> int:
         return run(lambda: TeleopSession(names.get("__ns", "").strip("/")))
     stage = STAGES.find(name)
     return run(lambda: make_node(stage))
+
+
+def help_text(name: str) -> str:
+    """What an executable is, reads and writes, and how it is set.
+
+    Args:
+        name: Of a stage, :data:`SESSION`, or :data:`ANY` for all of them.
+
+    Raises:
+        UnknownNameError: There is no such stage.
+    """
+    if name == ANY:
+        return f"usage: {ANY} NAME [--ros-args ...], with NAME one of {', '.join(STAGES)}"
+    lines = [f"usage: {name} [--ros-args ...]", ""]
+    if name == SESSION:
+        lines.append("  a whole session in one process; its parameters are those of its stages")
+    else:
+        stage = STAGES.find(name)
+        for verb, topics in (("reads", stage.reads), ("writes", stage.writes)):
+            lines.append(f"  {verb:7} {', '.join(topic.name for topic in topics) or 'nothing'}")
+    ways = {
+        f"{name} --ros-args -p NAME:=VALUE": "set a parameter",
+        f"{name} --ros-args --params-file FILE.yaml": "set those of a file",
+        f"{name} --ros-args -r __ns:=/left": "be one of the arm `left`",
+        f"teleop parameters {'' if name == SESSION else name}": "list them",
+    }
+    return "\n".join([*lines, "", *(f"  {way:60} {what}" for way, what in ways.items())])

@@ -98,6 +98,9 @@ def _ordered(graph: Graph) -> list[Member]:
 _SHARED = ("seed", "device.workspace", "device.start")
 """What operator and haptic master both know: said of one alone, it holds for both."""
 
+_SAID_TO_ALL = ("seed", "robot", "geometry")
+"""What is said to every stage that has it, also to those that a session leaves out."""
+
 
 def _values_for(member: Member, merged: Layer, graph: Graph) -> dict[str, object]:
     """What is said of the stage, then of the stage of this arm."""
@@ -125,7 +128,7 @@ def _check_names(merged: Layer, graph: Graph) -> None:
         if arm and arm not in graph.arms:
             raise UnknownNameError(f"arm of {name}", arm, [a for a in graph.arms if a] or ["none"])
         if stage not in {SESSION, RECORDER_NAME, *stages} and stage in STAGES.names():
-            own = [key for key in merged[name] if key != _SHARED[0]]  # a seed is said to all
+            own = [key for key in merged[name] if key not in _SAID_TO_ALL]
             if not own:
                 continue
             keys = ", ".join(f"{name}.{key}" for key in own)

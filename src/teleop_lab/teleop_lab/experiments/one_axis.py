@@ -136,8 +136,8 @@ def found_boundary(grip: Grip, delay: float) -> float:
 
 
 _MAPPING = {
-    "reflection.force_gain": 1.0, "reflection.max_force": 10.0, "feedback_timeout": 5.0,
-    "reach_force.is_on": False,
+    "reflection.architecture": "position_force", "reflection.max_force": 10.0,
+    "feedback_timeout": 5.0, "reach_force.is_on": False,
 }  # fmt: skip
 _IDEAL_DEVICE = {
     "device.friction": 0.0, "device.position_resolution": 0.0, "device.gimbal_noise": 0.0,

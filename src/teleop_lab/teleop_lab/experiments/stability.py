@@ -1,4 +1,4 @@
-"""Stability: how stiff a thing may be that the hand feels late, by delay, grip and passivity."""
+"""Stability: how stiff a thing may be that the hand feels late, by delay, grip and architecture."""
 
 import math
 from collections.abc import Mapping
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, Figure
+from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.drawing import PUBLISHED, axis, joined, line
 from teleop_lab.experiments.experiment import Experiment
@@ -23,6 +23,11 @@ DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2)
 """By which the force comes later [s]."""
 SOFTEST, STIFFEST = 20.0, 50_000.0
 """Objects that are tried [N/m]: softer than tissue, and steel."""
+Way = tuple[str, str]
+"""Architecture and passivity."""
+_WAYS: tuple[Way, ...] = (
+    ("position_force", "none"), ("position_force", "tank"), ("position_position", "none"),
+)  # fmt: skip
 _ROUNDS = 8
 _SECONDS = 8.0  # of each session: two touches
 _TOUCH = 2000  # ticks before the tip is on its path
@@ -33,17 +38,20 @@ _COLORS = (FIRST, SECOND, FIXTURE)
 _APPARENT_MASS = DeviceParameters().apparent_mass
 
 
-def _settings(grip: Grip, delay: float, stiffness: float, passivity: str) -> Settings:
+def _settings(grip: Grip, delay: float, stiffness: float, way: Way) -> Settings:
+    architecture, passivity = way
+    late = (f"slave/measured_{kind}@motion_scaling={delay + 1e-3}" for kind in ("cf", "cp"))
     return {
         "world.material": "own", "world.stiffness": stiffness, "world.damping": 0.0,
         "world.friction_coefficient": 0.0, "reflection.max_force": 10.0, "feedback_timeout": 1.0,
-        "reflection.passivity": passivity, "hand.mass": grip.mass - _APPARENT_MASS,
-        "hand.stiffness": grip.stiffness, "hand.damping": grip.damping,
-        "delays": (f"slave/measured_cf@motion_scaling={delay + 1e-3}",),
+        "reflection.architecture": architecture, "reflection.passivity": passivity,
+        "hand.mass": grip.mass - _APPARENT_MASS, "hand.stiffness": grip.stiffness,
+        "hand.damping": grip.damping,
+        "delays": tuple(late),
     }  # fmt: skip
 
 
-def fastest(bench: Bench, grip: Grip, delay: float, stiffness: float, passivity: str) -> float:
+def fastest(bench: Bench, grip: Grip, delay: float, stiffness: float, way: Way) -> float:
     """Fastest that the hand gets [m/s] in ``palpation``, of an object without damper or friction.
 
     Args:
@@ -51,23 +59,23 @@ def fastest(bench: Bench, grip: Grip, delay: float, stiffness: float, passivity:
         grip: The hand.
         delay: By which the force comes later [s].
         stiffness: Of the object [N/m].
-        passivity: ``none`` or ``tank``.
+        way: Architecture and passivity.
     """
-    rows = bench.signals("palpation", _SECONDS, _settings(grip, delay, stiffness, passivity))
+    rows = bench.signals("palpation", _SECONDS, _settings(grip, delay, stiffness, way))
     place = rows["master_measured_cp"][_TOUCH:, :3]
     ways = np.linalg.norm(place[_WINDOW:] - place[:-_WINDOW], axis=1)
     return float(ways.max()) / (_WINDOW * 1e-3)
 
 
-def chain_boundary(bench: Bench, grip: Grip, delay: float, passivity: str) -> float:
+def chain_boundary(bench: Bench, grip: Grip, delay: float, way: Way) -> float:
     """Stiffness [N/m] up to which the whole chain leaves the hand calm, from 20 to 50 000 N/m.
 
     The device has its friction and its steps, the arm its lag and the reference its filter.
     """
-    most = _THROWN * fastest(bench, grip, 0.0, SOFTEST, "none")
+    most = _THROWN * fastest(bench, grip, 0.0, SOFTEST, _WAYS[0])
 
     def is_calm(stiffness: float) -> bool:
-        return fastest(bench, grip, delay, stiffness, passivity) <= most
+        return fastest(bench, grip, delay, stiffness, way) <= most
 
     if is_calm(STIFFEST):
         return STIFFEST
@@ -91,16 +99,14 @@ def _measure(bench: Bench) -> Findings:
                     group=f"one axis before a spring, {name} grip",
                     note="the graph takes a tick and more by itself" if delay == 0.0 else "")
             )  # fmt: skip
-            found[name, delay] = tuple(
-                chain_boundary(bench, grip, delay, passivity) for passivity in ("none", "tank")
-            )
+            found[name, delay] = tuple(chain_boundary(bench, grip, delay, way) for way in _WAYS)
             done += 1
             bench.progress(done, total)
-    for k, passivity in enumerate(("none", "tank")):
+    for k, (architecture, passivity) in enumerate(_WAYS):
         rows += [
             Row(quantity=f"force {1e3 * delay:.0f} ms later", unit="N/m",
                 predicted=found[name, delay][k],
-                group=f"whole chain, {name} grip, passivity {passivity}",
+                group=f"whole chain, {name} grip, {architecture}, passivity {passivity}",
                 note="stiffest tried" if found[name, delay][k] == STIFFEST else "")
             for name in GRIPS for delay in DELAYS
         ]  # fmt: skip
@@ -112,8 +118,8 @@ _NOTES = (
     "force comes late, with half a tick for its hold; predicted: our hand, device without friction "
     "or steps, and mapping.",
     f"Whole chain: stiffness up to which the hand in palpation gets no more than {_THROWN:g} times "
-    "as fast as without delay on the softest object. Slow swinging takes longer to grow than the "
-    f"{_SECONDS:g} s of a session, so long delays read high.",
+    "as fast as where force comes from the softest object without delay. Slow swinging takes "
+    f"longer to grow than the {_SECONDS:g} s of a session, so long delays read high.",
     "The object is a spring alone. Grips are assumed.",
 )
 
@@ -124,7 +130,7 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
     traces = []
     for (name, grip), color in zip(GRIPS.items(), _COLORS, strict=True):
         exact = np.array([exact_boundary(grip, delay) for delay in smooth])
-        whole, tank = np.array([found[name, delay] for delay in DELAYS]).T
+        whole, tank, spring = np.array([found[name, delay] for delay in DELAYS]).T
         traces += [
             {**line(1e3 * smooth, exact, f"{name}, one exact axis", color, 1.2, "N/m"),
              "line": {"color": color, "width": 1.2, "dash": "dot"}},
@@ -132,6 +138,7 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
         ]  # fmt: skip
         if name == "medium":
             traces.append(joined(delays, tank, "with a tank, stiffest tried", PUBLISHED, "N/m"))
+            traces.append(joined(delays, spring, "medium, position_position", THIRD, "N/m"))
     layout = {"xaxis": axis("the force comes later by", "ms"),
               "yaxis": axis("stiffness", "N/m", type="log")}  # fmt: skip
     sentence = "Below its line a hand stays calm, above it it is thrown by what it feels late."
@@ -140,7 +147,7 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
 
 STABILITY = Experiment(
     "stability",
-    "how stiff a thing may be whose force comes late, by grip, with passivity and without",
+    "how stiff a thing may be whose force comes late, by grip, architecture and passivity",
     "exact boundary of one axis",
     _measure,
 )

@@ -17,8 +17,7 @@ from teleop_core.base.errors import PartError
 from teleop_core.base.registry import Registry, part_check, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.trials import fenced, is_whole
-from teleop_core.slave.world import shape_of
+from teleop_core.kernels.parts import fenced, is_whole, numbers_of
 
 __all__ = ["LONGEST_NS", "MEMORY", "TREMOR_FILTERS", "TremorFilter", "register_tremor_filter"]
 
@@ -60,7 +59,7 @@ class TremorFilter:
 
     def numbers_of(self, parameters: object) -> Array:
         """Numbers of a parameter group, as the filter takes them."""
-        return shape_of(parameters) if self.numbers is None else self.numbers(parameters)
+        return numbers_of(parameters) if self.numbers is None else self.numbers(parameters)
 
 
 def _try(part: TremorFilter) -> None:

@@ -14,10 +14,11 @@ from teleop_core.kernels import inner
 
 FOLLOWING_STATE: list[Field] = [
     ("in_force_ns", "i8"), ("rose_ns", "i8"), ("lag_ns", "i8"), ("lost_ns", "i8"),
-    ("felt_ns", "i8"), ("felt_at_ns", "i8"),
+    ("felt_ns", "i8"), ("felt_at_ns", "i8"), ("seen_ns", "i8"), ("seen_at_ns", "i8"),
 ]  # fmt: skip
 """Stamp in force; when it rose last, and how far behind the last command it was; since when the
-slave does not follow; stamp of the slave's force, and when that rose last [ns]."""
+slave does not follow; stamp of the slave's force, and when that rose last; the same of where it
+was measured [ns]."""
 
 
 @inner
@@ -34,13 +35,23 @@ def hear(s: Any, row: Any) -> None:
         s.rose_ns, s.lag_ns = now_ns, s.last_ns - stamp_ns
     if row.slave_measured_cf_ns > s.felt_ns:
         s.felt_at_ns = now_ns
-    s.in_force_ns, s.felt_ns = stamp_ns, row.slave_measured_cf_ns
+    if row.slave_measured_cp_ns > s.seen_ns:
+        s.seen_at_ns = now_ns
+    s.in_force_ns, s.felt_ns, s.seen_ns = (
+        stamp_ns, row.slave_measured_cf_ns, row.slave_measured_cp_ns
+    )  # fmt: skip
 
 
 @inner
 def is_felt(p: Any, s: Any, row: Any) -> bool:
     """Whether the slave's force was heard of lately; one that does not change is sent seldom."""
     return bool(row.master_measured_cp_ns - s.felt_at_ns <= p.timeout_ns + SELDOM_NS)
+
+
+@inner
+def is_seen(p: Any, s: Any, row: Any) -> bool:
+    """Whether it was heard lately where the slave is."""
+    return bool(row.master_measured_cp_ns - s.seen_at_ns <= p.timeout_ns)
 
 
 @inner

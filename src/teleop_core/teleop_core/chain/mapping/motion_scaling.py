@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from teleop_core.base.parameters import values_of
-from teleop_core.chain.fixtures import FIXTURES, shape_of
+from teleop_core.chain.architectures import ARCHITECTURES
+from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.mapping.following import FOLLOWING_STATE, follows, hear, is_in_doubt
 from teleop_core.chain.mapping.limits import (
     LIMIT_FIELDS,
@@ -23,6 +24,7 @@ from teleop_core.chain.mapping.parameters import (
     FixtureParameters,
     MotionScalingParameters,
     ReachForceParameters,
+    ReflectionParameters,
     axis_map,
     tool_maps,
 )
@@ -36,6 +38,7 @@ from teleop_core.chain.mapping.plausibility import (
 from teleop_core.chain.mapping.reflection import (
     REFLECTION_PARAMETERS,
     REFLECTION_STATE,
+    make_law,
     reflect,
 )
 from teleop_core.chain.mapping.walls import (
@@ -54,6 +57,7 @@ from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
     MASTER_SERVO_CF,
     SLAVE_MEASURED_CF,
+    SLAVE_MEASURED_CP,
     SLAVE_REACH,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
@@ -66,6 +70,7 @@ from teleop_core.kernels.geometry import (
     rotate_by_vector,
     turn_within,
 )
+from teleop_core.kernels.parts import numbers_of
 
 _PARAMETERS = [
     ("gain", "f8", (2,)), ("stylus_tool", "f8", (4,)), ("slave_master", "f8", (4,)),
@@ -239,7 +244,9 @@ def _refuse(
 
 
 @kernel
-def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: float) -> None:
+def motion_scaling_step(
+    p: Any, s: Any, sent: Any, fixture: Any, law: Any, row: Any, dt: float
+) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
 
     Args:
@@ -247,6 +254,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
         s: State record; written.
         sent: Records of :data:`~teleop_core.chain.mapping.limits.SENT_FIELDS`; written.
         fixture: :class:`Shape`.
+        law: :class:`~teleop_core.chain.mapping.reflection.Law`; written.
         row: Signals.
         dt: Tick [s].
 
@@ -297,7 +305,7 @@ def motion_scaling_step(p: Any, s: Any, sent: Any, fixture: Any, row: Any, dt: f
     remember(s, sent, s.last_ns)
     _wall(p, s, fixture, period, stylus, row.master_servo_cf)
     _push_back(p, s, row.master_servo_cf)
-    reflect(p, s, period, stylus, row)
+    reflect(p, s, law, is_following, period, stylus, row)
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
     _report(p, s, gain, is_following, row)
@@ -323,6 +331,7 @@ class MotionScaling(RunningStage):
         self._values = parameters
         self.kernel = motion_scaling_step
         self._shape = Shape(None, np.empty(0), np.zeros(3), np.zeros(3))
+        self._law = make_law(ARCHITECTURES.find("unilateral"), np.empty(0))
         self.reset()
         self.retune(parameters)
 
@@ -331,6 +340,7 @@ class MotionScaling(RunningStage):
         s, self._told = self.state, (0, 0)
         assign(s, 0)
         assign(self._sent, 0)
+        self._law.clear()
         s["is_fine"], s["joint"] = MODES.index(self._values.mode), -1
         s["command"][3] = s["alignment"][0] = s["tool"][0] = s["turned"][0] = 1.0
 
@@ -352,9 +362,7 @@ class MotionScaling(RunningStage):
         take_hand(p, parameters.plausible)
         p["silence_ns"] = round(parameters.plausible.button_silence * 1e9)
         self._take_reach_force(parameters.reach_force)
-        p["reflected"] = parameters.reflection.force_gain
-        p["reflected_most"] = parameters.reflection.max_force
-        p["has_tank"] = parameters.reflection.passivity == "tank"
+        self._take_reflection(parameters.reflection)
         if parameters.mode != self._values.mode:
             self.state["is_fine"] = MODES.index(parameters.mode)
         turned = ("tool_roll", "axes", "tool_axes")
@@ -376,14 +384,32 @@ class MotionScaling(RunningStage):
         self.parameters["reach_depth"] = depth
 
     def _take_fixture(self, fixture: FixtureParameters) -> None:
-        kind, numbers = FIXTURES.find(fixture.kind.kind), shape_of(fixture.kind.parameters)
+        kind, numbers = FIXTURES.find(fixture.kind.kind), numbers_of(fixture.kind.parameters)
         self.parameters["size"] = kind.size(fixture.kind.parameters)
         depth = kind.depth_pointer
         if depth is self._shape.depth and len(numbers) == len(self._shape.numbers):
             self._shape.numbers[:] = numbers  # the tick that is composed already goes on
             return
         self._shape = self._shape._replace(depth=depth, numbers=numbers)
-        self.arguments = (self.parameters, self.state, self._sent, self._shape)
+        self._compose_anew()
+
+    def _take_reflection(self, reflection: ReflectionParameters) -> None:
+        p, chosen = self.parameters, reflection.architecture
+        p["is_reflected"] = chosen.kind != "unilateral"
+        p["reflected_most"] = reflection.max_force
+        p["has_tank"] = reflection.passivity == "tank"
+        part = ARCHITECTURES.find(chosen.kind)
+        numbers = part.numbers_of(chosen.parameters)
+        if part.push_pointer is self._law.push and len(numbers) == len(self._law.numbers):
+            self._law.numbers[:] = numbers  # the tick that is composed already goes on
+            return
+        self._law = make_law(part, numbers)
+        self.state["heard"] = self.state["seen"] = 0.0  # what is new sets in from nothing
+        self.state["push"] = 0.0
+        self._compose_anew()
+
+    def _compose_anew(self) -> None:
+        self.arguments = (self.parameters, self.state, self._sent, self._shape, self._law)
         self._bound = None
 
     def fall_silent(self) -> None:
@@ -421,10 +447,11 @@ MOTION_SCALING = Stage(
         SLAVE_SETPOINT_CP,
         SLAVE_REACH,
         SLAVE_MEASURED_CF,
+        SLAVE_MEASURED_CP,
         MASTER_FILTERED_OUT,
     ),
     writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE),
-    late=(SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF),
+    late=(SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF, SLAVE_MEASURED_CP),
     optional=(MASTER_FILTERED_OUT,),
     trigger=MASTER_MEASURED_CP,
     needs=(SLAVE_SETPOINT_CP,),

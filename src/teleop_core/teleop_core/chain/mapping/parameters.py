@@ -7,6 +7,7 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import Choice, choice, parameter
+from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.mapping.walls import WALLS
@@ -61,13 +62,11 @@ class ReachForceParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class ReflectionParameters:
-    """The push of what the slave touches, which the hand feels."""
+    """What the hand feels of the slave, and of what that touches."""
 
-    force_gain: float = parameter(
-        0.0, unit="N/N", lower=0.0, upper=10.0,
-        doc="force at the hand over slave/measured_cf; 0: the hand feels nothing of it "
-        "(unilateral); more: position goes there, force comes back (position-force)",
-    )  # fmt: skip
+    architecture: Choice = choice(
+        ARCHITECTURES, "unilateral", doc="what the hand feels of the slave"
+    )
     max_force: float = parameter(
         3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",

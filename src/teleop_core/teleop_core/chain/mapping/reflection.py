@@ -1,50 +1,86 @@
-"""Reflection: the push of what the slave touches at the hand, and the tank that pays for it."""
+"""Reflection: what the hand feels of the slave, and the tank that pays for it."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
-from teleop_core.chain.mapping.following import is_felt
+import numpy as np
+
+from teleop_core.chain.architectures import MEMORY, Architecture
+from teleop_core.chain.mapping.following import is_felt, is_seen
 from teleop_core.graph.signals import Field
 from teleop_core.kernels import inner
 from teleop_core.kernels.geometry import Array
 
 REFLECTION_PARAMETERS: list[Field] = [
-    ("reflected", "f8"), ("reflected_most", "f8"), ("has_tank", "i8")
+    ("is_reflected", "i8"), ("reflected_most", "f8"), ("has_tank", "i8")
 ]  # fmt: skip
 REFLECTION_STATE: list[Field] = [
-    ("heard", "f8"), ("tank", "f8"),
+    ("heard", "f8"), ("seen", "f8"), ("tank", "f8"),
     ("push", "f8", (3,)), ("pushed_at", "f8", (3,)), ("pushed_way", "f8"),
 ]  # fmt: skip
-"""Share of the force that counts, energy in the tank [J], the last push [N], where it began [m],
-and how far the hand went with it [m]."""
-# Time [s] over which a force that comes from afar sets in, or fades where nothing comes any more.
+"""Share of the force and of the slave's place that counts, energy in the tank [J], the last push
+[N], where it began [m], and how far the hand went with it [m]."""
+# Time [s] over which what comes from afar sets in, or fades where nothing comes any more.
 _FADE = 0.1
 # Of a tank: push that an empty one allows [N], and a step of the device's reading [m].
 _SPARE, _READING = 0.005, 0.06e-3
 
 
-@inner
-def reflect(p: Any, s: Any, period: float, stylus: Array, row: Any) -> None:
-    """Add what the slave touches to the hand's force (3,) [N]; what falls silent fades.
+class Law(NamedTuple):
+    """The architecture: its push, its numbers and memory, what it gets and what it writes."""
 
-    Source:
-        Position-force architecture, Lawrence 1993: the slave gets the hand's place, the hand gets
-        the slave's force.
+    push: Any
+    numbers: Array
+    memory: Array
+    felt: Array
+    away: Array
+    out: Array
+
+    def clear(self) -> None:
+        """Forget what happened."""
+        for array in (self.memory, self.felt, self.away, self.out):
+            array[:] = 0.0
+
+
+def make_law(part: Architecture, numbers: Array) -> Law:
+    """The law of an architecture, at rest."""
+    return Law(part.push_pointer, numbers, np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3))
+
+
+@inner
+def reflect(
+    p: Any, s: Any, law: Any, is_following: bool, period: float, stylus: Array, row: Any
+) -> None:
+    """Add to the hand's force (3,) [N] what it feels of the slave; what falls silent fades.
+
+    Args:
+        p: Record with :data:`REFLECTION_PARAMETERS`.
+        s: Record with :data:`REFLECTION_STATE`; written.
+        law: :class:`Law`; written.
+        is_following: Whether the slave is led by the hand; where it goes its own way is not felt.
+        period: Since the sample before [s].
+        stylus: Where the tip of the stylus is (3,) [m].
+        row: Signals.
     """
-    if p.reflected == 0.0:  # once it is switched on, the push sets in from nothing
-        s.heard = s.push[0] = s.push[1] = s.push[2] = 0.0
+    if p.is_reflected == 0:
         return
-    force, felt = row.master_servo_cf, row.slave_measured_cf
-    step = period / _FADE
+    force, step = row.master_servo_cf, period / _FADE
     s.heard = min(max(s.heard + (step if is_felt(p, s, row) else -step), 0.0), 1.0)
+    is_led = is_following and is_seen(p, s, row)
+    s.seen = min(max(s.seen + (step if is_led else -step), 0.0), 1.0)
+    for i in range(3):
+        law.felt[i] = s.heard * row.slave_measured_cf[i]
+        law.away[i] = s.seen * (row.slave_measured_cp[i] - s.command[i])
+    law.push(law.numbers, law.memory, law.felt, law.away, period, law.out)
     square = 0.0
     for i in range(3):
-        square += felt[i] * felt[i]
-    asked = p.reflected * math.sqrt(square)
-    share = p.reflected * (p.reflected_most / asked if asked > p.reflected_most else 1.0)
+        square += law.out[i] * law.out[i]
+    share = 1.0
+    if square > p.reflected_most * p.reflected_most:
+        share = p.reflected_most / math.sqrt(square)
     _fill_tank(s, stylus)
     for i in range(3):
-        s.push[p.axis[i]] = p.sign[i] * s.heard * share * felt[i]
+        s.push[p.axis[i]] = p.sign[i] * share * law.out[i]
     if p.has_tank:
         _draw_from_tank(s)
     for i in range(3):

@@ -17,8 +17,7 @@ from teleop_core.base.errors import PartError
 from teleop_core.base.registry import Registry, part_check, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.trials import fenced, is_whole
-from teleop_core.slave.world import shape_of
+from teleop_core.kernels.parts import fenced, is_whole, numbers_of
 
 __all__ = ["CHANCES", "LOST", "MEMORY", "NETWORKS", "Network", "register_network"]
 
@@ -59,7 +58,7 @@ class Network:
 
     def numbers_of(self, parameters: object) -> Array:
         """Numbers of a parameter group, as the draw takes them."""
-        return shape_of(parameters) if self.numbers is None else self.numbers(parameters)
+        return numbers_of(parameters) if self.numbers is None else self.numbers(parameters)
 
 
 def _try(part: Network) -> None:

@@ -18,9 +18,9 @@ from teleop_core.base.registry import Registry
 from teleop_core.graph.signals import DT
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.parts import fenced, is_whole
 from teleop_core.robots.drives import Drives
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.trials import fenced, is_whole
 
 __all__ = ["CONTROLLERS", "Controller", "drives_and_poles", "per_joint", "register_controller"]
 

@@ -15,13 +15,12 @@ import numpy as np
 from numba import types
 
 from teleop_core.base.errors import PartError
-from teleop_core.base.parameters import values_of
 from teleop_core.base.registry import Registry, part_check, tried
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.trials import fenced, is_whole
+from teleop_core.kernels.parts import fenced, is_whole, numbers_of
 
-__all__ = ["WORLD_OBJECTS", "WorldObject", "register_world_object", "shape_of"]
+__all__ = ["WORLD_OBJECTS", "WorldObject", "register_world_object"]
 
 _ROW = types.float64[::1]
 DISTANCE = types.float64(_ROW, _ROW, _ROW)
@@ -55,14 +54,6 @@ class WorldObject:
         return pointer(self.distance, DISTANCE)
 
 
-def shape_of(parameters: object) -> Array:
-    """Numbers of the parameters of a shape, in their order, as its kernel takes them."""
-    row: list[float] = []
-    for value in values_of(parameters).values():
-        row.extend(value if isinstance(value, tuple) else (value,))  # type: ignore[arg-type]
-    return np.array(row, dtype=np.float64)
-
-
 _STEP = 1e-6  # along the normal, over which the distance must grow by as much [m]
 _TRIED = np.array([(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37),
                    (-0.29, 0.23, -0.41)])  # fmt: skip
@@ -79,7 +70,7 @@ def _try(part: WorldObject) -> None:
         parameters = part.parameters()
         np.asarray(part.outline(parameters), np.float64).reshape(-1, 3)
         for offset in _TRIED:
-            _try_at(part, shape_of(parameters), offset)
+            _try_at(part, numbers_of(parameters), offset)
 
 
 def _try_at(part: WorldObject, numbers: Array, offset: Array) -> None:

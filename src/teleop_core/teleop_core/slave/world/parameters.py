@@ -8,7 +8,8 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import Choice, choice, parameter
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.world import WORLD_OBJECTS, shape_of
+from teleop_core.kernels.parts import numbers_of
+from teleop_core.slave.world import WORLD_OBJECTS
 
 
 class Material(NamedTuple):
@@ -77,7 +78,7 @@ class WorldParameters:
     @property
     def shape(self) -> Array:
         """Numbers of the object, as its distance takes them."""
-        return shape_of(self.kind.parameters)
+        return numbers_of(self.kind.parameters)
 
     def distance(self, tip: Array, center: Array) -> float:
         """How far a tip (3,) is outside the object with its middle at ``center`` (3,) [m]."""

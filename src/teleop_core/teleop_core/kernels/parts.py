@@ -1,4 +1,4 @@
-"""Trials: arrays to try a part with, which show what it reads or writes beyond their ends.
+"""Parts: the numbers that a part's kernel takes, and arrays to try it with.
 
 Compiled code checks no index. What lies behind an array in a session is another part's memory; in
 a trial it is a fence of NaN, which is seen in the result when it is read, and gone when written.
@@ -6,9 +6,18 @@ a trial it is a fence of NaN, which is seen in the result when it is read, and g
 
 import numpy as np
 
+from teleop_core.base.parameters import values_of
 from teleop_core.kernels.geometry import Array
 
 _FENCE = 256
+
+
+def numbers_of(parameters: object) -> Array:
+    """Numbers of a parameter group in their order, tuples one by one, as its kernel takes them."""
+    row: list[float] = []
+    for value in values_of(parameters).values():
+        row.extend(value if isinstance(value, tuple) else (value,))  # type: ignore[arg-type]
+    return np.array(row, dtype=np.float64)
 
 
 def fenced(values: Array) -> tuple[Array, Array]:

@@ -1,0 +1,48 @@
+"""Let the hand feel the slave by a law of your own: the force, and a spring where the tip lags."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import teleop_core as tc
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BothParameters:
+    """What ``--set reflection.both.slack=...`` sets; the push gets these in their order."""
+
+    stiffness: float = tc.parameter(300.0, unit="N/m", lower=0.0, upper=5000.0, doc="of the spring")
+    slack: float = tc.parameter(2e-3, unit="m", lower=0.0, upper=0.1, doc="lag that is not felt")
+
+
+@tc.kernel
+def both_push(
+    numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array
+) -> None:
+    """Push by the force on the tip, and by a spring where the tip lags by more than the slack."""
+    length = (away[0] ** 2 + away[1] ** 2 + away[2] ** 2) ** 0.5
+    share = max(length - numbers[1], 0.0) / length if length > 0.0 else 0.0
+    for i in range(3):
+        out[i] = felt[i] + numbers[0] * share * away[i]
+
+
+tc.register_architecture(tc.Architecture("both", BothParameters, both_push))
+
+
+def main() -> None:
+    """Print what the hand feels in free motion, and of silicone that the slave presses."""
+    for kind in ("unilateral", "position_force", "position_position", "both"):
+        settings = {"reflection.architecture": kind, "world.material": "silicone"}
+        recording = tc.run("palpation", duration=14.0, settings=settings)
+        felt, true = recording["master/servo_cf"], recording["slave/true_cf"]
+        force = np.linalg.norm(felt.values[:, :3], axis=1)
+        pressed = np.interp(felt.time, true.time, np.linalg.norm(true.values[:, :3], axis=1)) > 0.0
+        free = float(np.median(force[~pressed & (felt.time > 6.0)]))
+        print(f"{kind}: {free:.2f} N in free motion, up to {force.max():.2f} N of silicone")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""Architectures: what the hand feels of the slave, one file per kind.
+
+A kind turns the force on the slave's tip, and how far the tip is from where the hand leads it, into
+a push. Axes, silence, the largest push and passivity are the same for all
+(:mod:`teleop_core.chain.mapping.reflection`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from teleop_core.base.errors import PartError
+from teleop_core.base.registry import Registry, part_check, tried
+from teleop_core.kernels import pointer
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+
+__all__ = ["ARCHITECTURES", "MEMORY", "Architecture", "register_architecture"]
+
+_ROW = types.float64[::1]
+PUSH = types.void(_ROW, _ROW, _ROW, _ROW, types.float64, _ROW)
+"""Signature of a push kernel, so that one compiled stage serves every kind."""
+MEMORY = 12
+"""Numbers that an architecture remembers."""
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """A kind of architecture: what comes back to the hand.
+
+    Attributes:
+        name: What ``--set reflection.architecture=`` calls it.
+        parameters: Its parameter group.
+        push: ``push(numbers, memory, felt, away, period, out)``, a kernel or a plain function,
+            called for every sample of the master. ``numbers`` are those of the parameters;
+            ``memory`` (12,) is kept from sample to sample, and zero at the start; ``felt`` (3,) is
+            the force on the tip [N], ``away`` (3,) the way from where the hand leads the tip to
+            where the tip was measured [m], both along the slave's base, as late as they come, and
+            zero where nothing comes; ``period`` is the time since the sample before [s]. Writes the
+            push (3,) along the slave's base [N].
+        numbers: ``numbers(parameters)`` gives what ``push`` takes; None for the numbers of the
+            parameters in their order.
+    """
+
+    name: str
+    parameters: type
+    push: Callable[[Array, Array, Array, Array, float, Array], None]
+    numbers: Callable[[Any], Array] | None = None
+
+    @cached_property
+    def push_pointer(self) -> Any:
+        """The push as an argument for kernels."""
+        return pointer(self.push, PUSH)
+
+    def numbers_of(self, parameters: object) -> Array:
+        """Numbers of a parameter group, as the push takes them."""
+        return numbers_of(parameters) if self.numbers is None else self.numbers(parameters)
+
+
+def _try(part: Architecture) -> None:
+    """Push for some samples, so that what cannot work is told before anything runs."""
+    needs = (
+        "one with push(numbers, memory, felt, away, period, out) and parameters that all have "
+        "defaults"
+    )
+    with tried("architecture", part.name, needs):
+        numbers = part.numbers_of(part.parameters())
+        memory, fence = fenced(np.zeros(MEMORY))
+        out, behind = fenced(np.zeros(3))
+        for size in (0.0, 1.0, -3.0):
+            part.push(numbers, memory, np.full(3, size), np.full(3, 1e-3 * size), 1e-3, out)
+            if not (np.isfinite(out).all() and is_whole(fence) and is_whole(behind)):
+                text = f"one whose push is finite and remembers {MEMORY} numbers; it is {out!r}"
+                raise PartError("architecture", part.name, text)
+
+
+ARCHITECTURES: Registry[Architecture] = Registry(
+    "architecture",
+    "architectures",
+    {
+        "unilateral": "teleop_core.chain.architectures.unilateral:UNILATERAL",
+        "position_force": "teleop_core.chain.architectures.position_force:POSITION_FORCE",
+        "position_position": "teleop_core.chain.architectures.position_position:POSITION_POSITION",
+    },
+    part_check("architecture", Architecture, "push"),
+    _try,
+)
+"""All kinds by name."""
+
+
+def register_architecture(part: Architecture, *, replace: bool = False) -> Architecture:
+    """Add a kind under its own name for the rest of the program; see :meth:`Registry.add`."""
+    return ARCHITECTURES.add(part.name, part, replace=replace)

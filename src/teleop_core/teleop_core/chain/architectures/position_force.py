@@ -1,0 +1,33 @@
+"""Position-force: the slave gets the hand's place, the hand gets the force on the slave's tip."""
+
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.chain.architectures import Architecture
+from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionForceParameters:
+    """How much of the force comes back."""
+
+    force_gain: float = parameter(
+        1.0, unit="N/N", lower=0.0, upper=10.0, doc="force at the hand over slave/measured_cf"
+    )
+
+
+@kernel
+def position_force_push(
+    numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array
+) -> None:
+    """Write the push (3,) [N]: the force on the tip times the gain.
+
+    Source:
+        Lawrence 1993, position-force.
+    """
+    for i in range(3):
+        out[i] = numbers[0] * felt[i]
+
+
+POSITION_FORCE = Architecture("position_force", PositionForceParameters, position_force_push)

@@ -1,0 +1,152 @@
+"""Architectures: what the hand feels of the slave, by each law, and over a network."""
+
+import numpy as np
+import pytest
+
+import teleop_core as tc
+from teleop_core.base.errors import PartError, UnknownNameError
+from teleop_core.base.parameters import build
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.graph.signals import STATE
+from teleop_core.kernels import kernel
+from teleop_core.session.configuration import configure
+from teleop_core.session.virtual import VirtualTime
+
+pytestmark = pytest.mark.usefixtures("own_parts")
+CALM = ("reach_force.is_on=false", "reflection.max_force=10.0")
+
+
+def pressing(*texts, ticks=14_000):
+    """Signals of the scenario ``palpation``."""
+    return VirtualTime(configure("palpation", settings=[*CALM, *texts])).run(ticks)
+
+
+def on_the_slave(force):
+    """Forces (N, 3) of the hand along the slave's base."""
+    return np.column_stack((-force[:, 2], -force[:, 0], force[:, 1]))
+
+
+def test_position_position_is_a_spring_from_the_command_to_the_tip():
+    chosen = ("reflection.architecture=position_position",)
+    rows = pressing(*chosen, "position_position.stiffness=400.0")
+    away = rows["slave_measured_cp"][:-1, :3] - rows["slave_servo_cp"][1:, :3]
+    force = on_the_slave(rows["master_servo_cf"][1:])
+    settled = slice(5000, None)  # the slave follows, and the push has set in
+    assert np.linalg.norm(force[settled], axis=1).max() > 0.5
+    np.testing.assert_allclose(force[settled], 400.0 * away[settled], atol=1e-12)
+
+
+def test_the_hand_feels_no_spring_while_the_slave_goes_its_own_way():
+    rows = pressing(
+        "reflection.architecture=position_position", "feedback_timeout=1.0",
+        "delays=[slave/measured_cp@motion_scaling=0.2]", ticks=6000,
+    )  # fmt: skip
+    follows = rows["teleop_state"][:, STATE["is_following"]] > 0.0
+    own_way = slice(0, int(np.argmax(follows)))
+    moved = np.linalg.norm(np.ptp(rows["slave_measured_cp"][own_way, :3], axis=0))
+    assert moved > 0.01  # the arm goes to where it starts
+    assert not rows["master_servo_cf"][own_way].any()
+    assert rows["master_servo_cf"][own_way.stop + 200 :].any()
+
+
+def test_position_position_over_a_network_is_a_spring_to_where_the_tip_was():
+    rows = pressing(
+        "teleop.stages=[network]", "network.preset=delay_100", "feedback_timeout=1.0",
+        "reflection.architecture=position_position",
+    )  # fmt: skip
+    away = rows["network_measured_cp"][:-1, :3] - rows["slave_servo_cp"][1:, :3]
+    force = on_the_slave(rows["master_servo_cf"][1:])
+    np.testing.assert_allclose(force[6000:], 150.0 * away[6000:], atol=1e-12)
+
+
+def test_a_unilateral_hand_feels_nothing_of_what_the_slave_presses():
+    rows = pressing("reflection.architecture=unilateral")
+    assert rows["slave_true_cf"].any()
+    assert not rows["master_servo_cf"].any()
+
+
+def swing(architecture, stiffness, delay):
+    """Fastest that the hand gets [m/s] where it presses a block of which it hears late."""
+    both = ",".join(f"slave/measured_{kind}@motion_scaling={delay}" for kind in ("cf", "cp"))
+    rows = pressing(
+        f"reflection.architecture={architecture}", "world.material=own", f"delays=[{both}]",
+        f"world.stiffness={stiffness}", "world.damping=0.0", "feedback_timeout=1.0",
+        ticks=16_000,
+    )  # fmt: skip
+    places = rows["master_measured_cp"][6000:, :3]
+    return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
+
+
+def test_a_spring_softer_than_the_grip_throws_no_hand_that_force_does():
+    calm = swing("unilateral", 20_000.0, 0.1)
+    assert swing("position_force", 20_000.0, 0.1) > 3.0 * calm
+    assert swing("position_position", 20_000.0, 0.1) < 1.5 * calm
+
+
+@pytest.mark.parametrize(
+    ("kind", "silent"), [("position_force", "cf"), ("position_position", "cp")]
+)
+def test_what_falls_silent_fades_within_a_tenth_of_a_second(kind, silent):
+    chosen = [*CALM, f"reflection.architecture={kind}", "feedback_timeout=0.05"]
+    session = VirtualTime(configure("palpation", settings=chosen))
+    stage, pushes = session.stages["motion_scaling"], []
+    row = stage.signals
+    session.run(11_600)
+    pose_ns = int(row["master_measured_cp_ns"])
+    for tick in range(1, 201):
+        now_ns = pose_ns + tick * 1_000_000
+        row["master_measured_cp_ns"] = now_ns
+        row["slave_setpoint_cp_ns"] = now_ns  # it follows, but for what is silent
+        for name in {"cf", "cp"} - {silent}:
+            row[f"slave_measured_{name}_ns"] = now_ns
+        stage.step()
+        pushes.append(np.linalg.norm(row["master_servo_cf"][:3]))
+    assert pushes[0] > 0.1
+    assert pushes[-1] == 0.0
+    assert np.abs(np.diff(pushes)).max() < 0.05 * pushes[0]
+
+
+def test_another_architecture_sets_in_from_nothing_within_a_tenth_of_a_second():
+    session = VirtualTime(configure("palpation", settings=[*CALM]))
+    session.run(11_600)
+    stage = session.stages["motion_scaling"]
+    chosen = {"reflection.architecture": "position_position", "reach_force.is_on": False}
+    stage.retune(build(MotionScalingParameters, chosen))
+    force = np.linalg.norm(session.run(200)["master_servo_cf"][:, :3], axis=1)
+    assert force[0] < 0.02 * force[150:].max()
+    assert np.abs(np.diff(force)).max() < 2.0 * 150.0 * 55e-6  # of the spring, two steps read
+    stage.retune(
+        build(MotionScalingParameters, chosen | {"reflection.position_position.stiffness": 0.0})
+    )
+    assert not session.run(2)["master_servo_cf"].any()
+
+
+def test_an_architecture_of_ones_own_is_one_call_and_remembers_twelve_numbers():
+    @kernel
+    def counting(numbers, memory, felt, away, period, out):
+        memory[11] += period
+        out[0], out[1], out[2] = 0.0, 0.0, 0.01 * memory[11]
+
+    tc.register_architecture(tc.Architecture("counting", tc.NoParameters, counting))
+    rows = pressing("reflection.architecture=counting", ticks=3000)
+    force = on_the_slave(rows["master_servo_cf"])
+    np.testing.assert_allclose(np.diff(force[1000:, 2]), 1e-5, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda n, m, f, a, t, out: out.fill(np.nan),
+        lambda n, m, f, out: None,
+        lambda n, m, f, a, t, out: m.base[12:].fill(0.0),  # behind what it may remember
+        lambda n, m, f, a, t, out: out.base[3:].fill(0.0),  # behind what it may write
+    ],
+)
+def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(wrong):
+    with pytest.raises(PartError, match="architecture"):
+        tc.register_architecture(tc.Architecture("wrong", tc.NoParameters, wrong))
+
+
+def test_an_unknown_architecture_is_refused_with_those_there_are():
+    with pytest.raises(UnknownNameError, match="position_position"):
+        configure("palpation", settings=["reflection.architecture=four_channel"])
