@@ -36,12 +36,18 @@ crtk_msgs: setup
 	@$(BIN)/python -c 'from crtk_msgs.msg import OperatingState' 2>/dev/null || \
 	    $(BIN)/python src/crtk_msgs/build_without_ament.py || true
 
+# A block of silicone over 200 ms there and back, without and with an energy tank.
+FAR := --scenario palpation --set teleop.stages=[network] network.there.least_delay=0.1 \
+    network.back.least_delay=0.1 feedback_timeout=1.0 world.material=silicone
+
 demo: setup
 	rm -rf $(OUT)/demo
 	$(BIN)/teleop sim --scenario coarse_box --out $(OUT)/demo/coarse_box
 	$(BIN)/teleop sim --scenario fine_box --out $(OUT)/demo/fine_box
+	$(BIN)/teleop sim $(FAR) --out $(OUT)/demo/touch_late
+	$(BIN)/teleop sim $(FAR) reflection.passivity=tank --out $(OUT)/demo/touch_late_tank
 	$(BIN)/teleop live --scenario coarse_box --duration 10 --out $(OUT)/demo/live
-	$(BIN)/teleop evaluate $(OUT)/demo/coarse_box $(OUT)/demo/fine_box $(OUT)/demo/live \
+	$(BIN)/teleop evaluate $(addprefix $(OUT)/demo/,coarse_box fine_box touch_late touch_late_tank live) \
 	    --json $(OUT)/demo/scores.json --html $(OUT)/demo/report.html
 	@echo "$(CURDIR)/$(OUT)/demo/report.html"
 	@echo "to see it and be the hand: $(BIN)/teleop console"
