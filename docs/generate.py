@@ -15,6 +15,7 @@ from teleop_core.evaluation import key_table
 from teleop_core.graph.graph import Graph, Link, build_graph
 from teleop_core.graph.layers import declared_groups
 from teleop_core.graph.topics import (
+    BY_NAME,
     DIAGNOSTICS,
     NETWORK_TOPICS,
     OPERATOR_BUTTONS,
@@ -177,6 +178,32 @@ def per_joint(values: Array) -> str:
     return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
 
+ROW = ROOT / "src" / "teleop_core" / "teleop_core" / "graph" / "row.py"
+ROW_HEAD = '''"""Row: fields of the records of stages' ports, of every topic of the built-in stages.
+
+Written by docs/generate.py from :mod:`teleop_core.graph.topics`; change that, not this file. A
+stage has the fields of its own topics alone: a kernel that asks for another one does not compile.
+"""
+
+from teleop_core.kernels.fields import Fields
+from teleop_core.kernels.geometry import Array
+
+
+class Row(Fields):
+    """Newest value of each topic, as its kind has it, and its stamp [ns]."""
+
+    now_ns: int
+    answered_ns: int
+'''
+
+
+def row_module() -> str:
+    """Module with the class that names the fields of stages' records."""
+    topics = [topic for topic in BY_NAME.values() if topic.width(1)]
+    lines = [f"    {topic.field}: Array\n    {topic.field}_ns: int\n" for topic in topics]
+    return ROW_HEAD + "".join(lines)
+
+
 def between(text: str, markers: tuple[str, str], written: str) -> str:
     """A document with what is written between two markers."""
     before, begin, rest = text.partition(markers[0])
@@ -187,8 +214,9 @@ def between(text: str, markers: tuple[str, str], written: str) -> str:
 
 
 def pages() -> Iterator[tuple[Path, str]]:
-    """Every generated document with what it must hold."""
+    """Every generated file with what it must hold."""
     graph, docs = build_graph(), ROOT / "docs"
+    yield ROW, row_module()
     yield docs / "parameters.md", parameters_page()
     yield docs / "topics.md", topics_page(graph)
     yield docs / "scores.md", scores_page()

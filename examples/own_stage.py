@@ -7,9 +7,9 @@ topic it answers to and that its readers read its answer in that topic's place.
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import teleop_core as tc
 from teleop_core.graph.topics import SLAVE_SERVO_CP, passed_on
@@ -24,8 +24,21 @@ class LimitParameters:
     speed: float = tc.parameter(0.02, unit="m/s", lower=1e-4, upper=10.0, doc="largest speed")
 
 
+class LimitState(tc.Fields):
+    """What it remembers from tick to tick."""
+
+    held: tc.Vector3
+    has_begun: int
+
+
+class LimitRow(tc.Row):
+    """Its topics: those that there are, and one of its own."""
+
+    slave_limited_cp: NDArray[np.float64]
+
+
 @tc.kernel
-def limit(p: Any, s: Any, row: Any, dt: float) -> None:
+def limit(p: LimitParameters, s: LimitState, row: LimitRow, dt: float) -> None:
     """Go towards the pose commanded, no farther in a tick than the speed allows."""
     wanted, limited = row.slave_servo_cp, row.slave_limited_cp
     if s.has_begun == 0:
@@ -45,8 +58,7 @@ def limit(p: Any, s: Any, row: Any, dt: float) -> None:
 
 VELOCITY_LIMIT = tc.Stage(
     "velocity_limit", LimitParameters, reads=(SLAVE_SERVO_CP,), writes=(LIMITED,), step=limit,
-    state=(("held", "f8", (3,)), ("has_begun", "i8")), trigger=SLAVE_SERVO_CP,
-    replaces=SLAVE_SERVO_CP,
+    state=LimitState, trigger=SLAVE_SERVO_CP, replaces=SLAVE_SERVO_CP,
 )  # fmt: skip
 tc.register_stage(VELOCITY_LIMIT)
 

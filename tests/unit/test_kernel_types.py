@@ -19,7 +19,9 @@ from teleop_core.kernels.geometry import (
     multiply_quaternions,
     rotate_by_vector,
 )
+from teleop_core.graph.row import Row
 from teleop_core.kernels import Kernel, bound, inner, kernel, pointer
+from teleop_core.kernels.fields import Fields, Vector3, record
 
 
 @kernel
@@ -33,6 +35,21 @@ def half(x: float) -> float:
     return 0.5 * x
 
 
+class State(Fields):
+    held: Vector3
+    count: int
+
+
+class Wider(State):
+    speed: float
+
+
+@inner
+def hold(s: State, row: Row) -> None:
+    s.held[0] = row.slave_servo_cp[0] + s.count
+
+
+state, wider = record(State), record(Wider)
 row, table = np.zeros(3), np.zeros((4, 4))
 """
 
@@ -54,9 +71,20 @@ def twice(x: float, other: Kernel[[float], float]) -> float:
 
 
 twice(1.0, half)
+
+
+@kernel
+def step(s: Wider, signals: Row, dt: float) -> None:
+    hold(s, signals)
+    s.speed = dt * signals.now_ns
 """
 
 WRONG = (
+    "state.heldd[0] = 1.0",
+    "state.speed = 1.0",
+    "state.count = 'many'",
+    "def late(row: Row) -> int: return row.slave_servo_cp_nss",
+    "def wrong(s: State, row: Row) -> None: step(s, row, 1e-3)",
     "spring(row, 2.0, 3)",
     "spring(2.0, 2.0, 3, row)",
     "spring(row, row, 3, row)",

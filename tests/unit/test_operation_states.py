@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.base.parameters import build
-from teleop_core.kernels import kernel, records
+from teleop_core.kernels import kernel
+from teleop_core.kernels.fields import record
 from teleop_core.slave.operation import (
     Answer,
     Event,
@@ -18,7 +19,7 @@ from teleop_core.slave.operation import (
     State,
     command_event,
 )
-from teleop_core.slave.operation.states import COMMANDS, STATE_FIELDS, TABLE, answer_text, change
+from teleop_core.slave.operation.states import COMMANDS, TABLE, OperatingState, answer_text, change
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 D, E, P, F = State.DISABLED, State.ENABLED, State.PAUSED, State.FAULT
@@ -45,7 +46,7 @@ def _change(s, event):
 
 
 def make(state, **fields):
-    found = records(STATE_FIELDS)[0]
+    found = record(OperatingState)
     found["state"], found["is_homed"] = state, 1
     for name, value in fields.items():
         found[name] = value

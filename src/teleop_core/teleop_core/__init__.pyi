@@ -38,6 +38,7 @@ from .chain.filters import (
 from .chain.fixtures import Fixture as Fixture, register_fixture as register_fixture
 from .graph.graph import Graph as Graph, build_graph as build_graph
 from .kernels import kernel as kernel
+from .kernels.fields import Fields as Fields, Vector3 as Vector3
 from .chain.network import Network as Network, register_network as register_network
 from .chain.operators import (
     Operator as Operator,
@@ -73,6 +74,7 @@ from .robots import (
 from .robots.parameters import RobotParameters as RobotParameters
 from .session.configuration import Configuration as Configuration
 from .session.virtual import VirtualTime as VirtualTime
+from .graph.row import Row as Row
 from .graph.stage import Runner as Runner, Stage as Stage, register_stage as register_stage
 from .graph.topics import Kind as Kind, Topic as Topic
 

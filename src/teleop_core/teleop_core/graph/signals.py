@@ -13,6 +13,7 @@ from typing import Any
 
 from teleop_core.graph.topics import TELEOP_STATE, Kind, Topic
 from teleop_core.kernels import kernel, records
+from teleop_core.kernels.fields import Field
 from teleop_core.kernels.geometry import Array
 
 TICK_NS = 1_000_000
@@ -22,7 +23,6 @@ DT = TICK_NS / 1e9
 
 STATE_FIELDS = TELEOP_STATE.columns
 STATE = {name: index for index, name in enumerate(STATE_FIELDS)}
-Field = tuple[str, str] | tuple[str, str, tuple[int, ...]]
 
 
 def topic_fields(topics: Iterable[Topic], joints: int) -> list[Field]:

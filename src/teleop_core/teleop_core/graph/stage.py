@@ -16,9 +16,10 @@ import numpy as np
 from teleop_core.base.errors import PartError
 from teleop_core.base.parameters import Value, specs, values_of
 from teleop_core.base.registry import Registry
-from teleop_core.graph.signals import DT, Field, assign, make_signals
+from teleop_core.graph.signals import DT, assign, make_signals
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels import bound, raise_pending, records
+from teleop_core.kernels.fields import Field, Fields, fields_of
 
 __all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
 
@@ -85,8 +86,9 @@ class Stage:
         writes: Topics it writes, streams and at most one report.
         step: ``step(parameters, state, signals, dt)``, a kernel or a plain function: ``parameters``
             and ``state`` are records with a field for each parameter and each entry of ``state``.
-        state: Fields of what it remembers from step to step, as :class:`numpy.dtype` takes them;
-            zero at the start.
+        state: What it remembers from step to step, zero at the start: a class of
+            :class:`~teleop_core.kernels.fields.Fields`, or fields as :class:`numpy.dtype` takes
+            them.
         make: In place of ``step`` and ``state``: makes the :class:`Runner` from parameters and the
             length of a tick [s].
         late: Those of ``reads`` that are taken as they were at the end of the last tick. A cycle
@@ -111,7 +113,7 @@ class Stage:
     reads: tuple[Topic, ...]
     writes: tuple[Topic, ...]
     step: Callable[..., None] | None = None
-    state: tuple[Field, ...] = ()
+    state: type[Fields] | tuple[Field, ...] = ()
     make: Callable[[Any, float], Runner] | None = None
     late: tuple[Topic, ...] = ()
     optional: tuple[Topic, ...] = ()
@@ -169,12 +171,18 @@ class Stage:
                 signature(getattr(self.step, "py_func", self.step)).bind(*range(4))
             except TypeError as error:
                 raise PartError("stage", self.name, f"{takes} ({error})") from error
-        for word, fields in (("state", self.state), ("notes", self.notes)):
+        for word, fields in (("state", self.remembered(1)), ("notes", self.notes)):
             try:
                 np.dtype(list(fields))
             except (TypeError, ValueError) as error:
                 text = f"one whose {word} is a list of fields as numpy.dtype takes it ({error})"
                 raise PartError("stage", self.name, text) from error
+
+    def remembered(self, joints: int) -> list[Field]:
+        """Fields of its state, for a robot with this many joints."""
+        if isinstance(self.state, type):
+            return fields_of(self.state, joints)
+        return list(self.state)
 
     def _insist(self, is_so: bool, expected: str) -> None:
         if not is_so:
@@ -284,14 +292,15 @@ class _Plain(RunningStage):
     """A stage of records alone: parameters become fields, the state starts at zero."""
 
     def __init__(self, stage: Stage, parameters: Any, dt: float) -> None:
-        super().__init__(stage, len(joints_of(parameters)), dt)
+        joints = len(joints_of(parameters))
+        super().__init__(stage, joints, dt)
         assert stage.step is not None
         self.kernel = stage.step
         declared = [(spec, value) for spec, value in _numbers(parameters)]
         self._parameters = records(
             [_field(name, value) for name, value in declared] or [("none", "i8")]
         )[0]
-        self._state = records(list(stage.state) or [("none", "i8")])[0]
+        self._state = records(stage.remembered(joints) or [("none", "i8")])[0]
         self.arguments = (self._parameters, self._state)
         self._begin = self.signals.copy()
         self.retune(parameters)

@@ -2,16 +2,18 @@
 
 import math
 from enum import IntEnum
-from typing import Any
 
+from teleop_core.graph.row import Row
 from teleop_core.graph.signals import copy
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import PerJoint, Wrench
 from teleop_core.kernels.filters import lag_step
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.interpolation import begin_way
+from teleop_core.slave.arm import ArmModel
+from teleop_core.slave.interpolation import WayParameters, WayState, begin_way
 from teleop_core.slave.operation.faults import Fault
 from teleop_core.slave.operation.states import State
-from teleop_core.slave.operation.watch import fail
+from teleop_core.slave.operation.watch import ServerParameters, ServerState, fail
 
 
 class CommandStatus(IntEnum):
@@ -23,6 +25,55 @@ class CommandStatus(IntEnum):
     MOVING = 3  # to a goal, as to where the slave starts, or at a speed: nothing is followed
     CLOSED = 4  # not enabled, or not homed: nothing is followed
     BLIND = 5  # the arm has not said lately where it is: it holds
+
+
+class SlaveRow(Row):
+    """Ports of the slave, and how it took the command of this tick."""
+
+    command_status: int
+
+
+class SlaveNumbers(ServerParameters, WayParameters):
+    """Parameter record of an arm's server."""
+
+    start: PerJoint  # where it starts to follow [rad or m]
+    braking: PerJoint  # what its drives can brake [rad/s² or m/s²]
+    acceleration: PerJoint
+    rest_speed: PerJoint
+    near: PerJoint
+    filter_gain: float
+    filter_zero: float
+    filter_pole: float
+    start_speed: float  # share of the rated speeds
+    tool_speed: float  # [m/s]
+    tool_acceleration: float  # [m/s²]
+    is_filtered: int
+
+
+class SlaveState(ServerState, WayState):
+    """State record of an arm's server."""
+
+    filtered: PerJoint
+    step: PerJoint  # of the setpoint in the last tick [rad or m]
+    move_from: PerJoint
+    move_to: PerJoint
+    drive: PerJoint  # wanted speeds of the joints [rad/s or m/s]
+    asked: PerJoint
+    tool_step: float
+    twist: Wrench  # wanted of the tip [m/s, rad/s]
+    command_stamp_ns: int
+    arrival_ns: int
+    seen_ns: int
+    refused: int
+    refused_before: int
+    in_row: int
+    is_stream: int
+    gap_ns: int
+    moved_ticks: int
+    move_ticks: int
+    motion: int
+    driven_ns: int  # when the wanted speed came
+    asked_ns: int
 
 
 # Stamps this far ahead of the slave's clock are an error, not a clock that is a little ahead.
@@ -37,7 +88,7 @@ _ENABLED, _SILENCE, _JUMP = int(State.ENABLED), int(Fault.SILENCE), int(Fault.JU
 
 
 @inner
-def plan_move(p: Any, s: Any, arm: Any, dt: float) -> None:
+def plan_move(p: SlaveNumbers, s: SlaveState, arm: ArmModel, dt: float) -> None:
     """Begin the cubic move from the setpoint to ``move_to``, as fast as all limits allow.
 
     Joints keep their share of the speed limits and the acceleration of their drives, the tip its
@@ -64,7 +115,7 @@ def plan_move(p: Any, s: Any, arm: Any, dt: float) -> None:
 
 
 @inner
-def advance_move(s: Any) -> None:
+def advance_move(s: SlaveState) -> None:
     """Make a tick of the cubic move."""
     if s.moved_ticks >= s.move_ticks:
         return
@@ -80,7 +131,7 @@ def advance_move(s: Any) -> None:
 
 
 @inner
-def come_to_rest(p: Any, s: Any, how: int, dt: float) -> None:
+def come_to_rest(p: SlaveNumbers, s: SlaveState, how: int, dt: float) -> None:
     """Stop the setpoint: at once, at what the drives can brake, or where the brakes hold the arm.
 
     Args:
@@ -108,7 +159,7 @@ def come_to_rest(p: Any, s: Any, how: int, dt: float) -> None:
 
 
 @inner
-def _not_followed(s: Any, row: Any) -> int:
+def _not_followed(s: SlaveState, row: SlaveRow) -> int:
     """Status of an arm that follows nothing; what comes meanwhile is seen, and old later."""
     s.seen_ns = max(s.seen_ns, row.slave_servo_jp_ns)
     s.arrival_ns, s.in_row, s.is_stream = 0, 0, 0
@@ -116,7 +167,7 @@ def _not_followed(s: Any, row: Any) -> int:
 
 
 @inner
-def _age_of_command(p: Any, s: Any, now_ns: int) -> int:
+def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
     """FRESH or STALE; a stream of commands that was silent for too long pauses the arm."""
     silence_ns = now_ns - s.arrival_ns
     if silence_ns <= p.timeout_ns:
@@ -128,7 +179,7 @@ def _age_of_command(p: Any, s: Any, now_ns: int) -> int:
 
 
 @inner
-def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
+def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> int:
     """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
 
     A jump is farther from the command in force than full speed reaches in the command timeout, or
@@ -163,13 +214,13 @@ def take_command(p: Any, s: Any, row: Any, dt: float) -> int:
 
 
 @inner
-def _longest_gap(p: Any, s: Any) -> int:
+def _longest_gap(p: SlaveNumbers, s: SlaveState) -> int:
     """Time [ns] after which a stream is broken: of slow ones twice their period."""
     return max(p.timeout_ns, 2 * s.gap_ns)
 
 
 @inner
-def follows(p: Any, s: Any, now_ns: int) -> bool:
+def follows(p: SlaveNumbers, s: SlaveState, now_ns: int) -> bool:
     """Whether the setpoint goes to the command: it is fresh, or alone and no stream that broke."""
     if s.state != _ENABLED or s.is_busy or not s.is_homed:
         return False
@@ -177,7 +228,7 @@ def follows(p: Any, s: Any, now_ns: int) -> bool:
 
 
 @inner
-def advance_setpoint(p: Any, s: Any, before: Array, dt: float) -> None:
+def advance_setpoint(p: SlaveNumbers, s: SlaveState, before: Array, dt: float) -> None:
     """Filter the command and move the setpoint there, within the limits of speed and acceleration.
 
     Args:
@@ -221,7 +272,7 @@ def _eased(ahead: float, flow: float, step: float, most: float) -> float:
 
 
 @inner
-def limit_tool(p: Any, s: Any, arm: Any, last: Array, dt: float) -> None:
+def limit_tool(p: SlaveNumbers, s: SlaveState, arm: ArmModel, last: Array, dt: float) -> None:
     """Shorten the step of all joints where the tip would be too fast; write the setpoint's pose.
 
     Args:

@@ -9,17 +9,40 @@ from typing import Any
 import numpy as np
 
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import PerJoint
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.rigid_body import invert_positive, write_model
 from teleop_core.slave.friction import bend, friction
+from teleop_core.slave.joints import JointNumbers, JointState
 from teleop_core.slave.world.contact import add_push
 
 _DAMPING = 0.02  # assumed: of a gear on its spring, share of critical with the motor alone
 
 
+class ElasticNumbers(JointNumbers):
+    """Fields of a parameter record with gears that bend."""
+
+    gear_stiffness: PerJoint  # [N·m/rad or N/m]; 0 for a joint that does not bend
+    gear_damping: PerJoint
+    motor_inertia: PerJoint  # [kg·m² or kg]
+
+
+class ElasticState(JointState):
+    """Fields of a state record with the links behind them."""
+
+    link: PerJoint  # [rad or m]
+    link_speed: PerJoint
+
+
 @inner
 def _accelerate_links(
-    acceleration: Any, dynamics: Array, p: Any, q: Array, dq: Array, effort: Array, ddq: Array
+    acceleration: Any,
+    dynamics: Array,
+    p: ElasticNumbers,
+    q: Array,
+    dq: Array,
+    effort: Array,
+    ddq: Array,
 ) -> None:
     """Write link accelerations (n,): the rigid model without the motors of elastic joints."""
     n = q.shape[0]
@@ -41,8 +64,8 @@ def _accelerate_links(
 def _derivative(
     acceleration: Any,
     dynamics: Array,
-    p: Any,
-    s: Any,
+    p: ElasticNumbers,
+    s: ElasticState,
     effort: Array,
     start: Array,
     place: Array,
@@ -71,8 +94,8 @@ def _derivative(
 def integrate_elastic(
     acceleration: Any,
     dynamics: Array,
-    p: Any,
-    s: Any,
+    p: ElasticNumbers,
+    s: ElasticState,
     steps: int,
     effort: Array,
     q: Array,
@@ -84,9 +107,8 @@ def integrate_elastic(
     Args:
         acceleration: Pointer to the robot's rigid-body model, motors included.
         dynamics: Its parameter row.
-        p: Record with ``gear_stiffness``, 0 for a joint that does not bend, ``gear_damping``,
-            ``motor_inertia``, (n,) each, and the friction's parameters.
-        s: Record with the links and the friction's state; written.
+        p: Parameters.
+        s: State; written.
         steps: Number of equal Runge-Kutta steps, >= 1.
         effort: Drive effort (n,) [N·m or N].
         q: Motor positions behind their gears (n,) [rad or m]; written.

@@ -5,32 +5,47 @@ and by what pushes it. The push is what is left, and known as well as friction i
 """
 
 import math
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
-from teleop_core.graph.signals import Field, copy
+from teleop_core.graph.signals import copy
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import Fields, PerJoint
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.rigid_body import invert_positive, write_model
+from teleop_core.slave.arm import Arm
+from teleop_core.slave.friction import FrictionNumbers
 
-OBSERVER_PARAMETERS: list[Field] = [("is_estimated", "i8"), ("observer_gain", "f8")]
 _DAMPING = 1e-4
 """Of the way from efforts to force, over its mean square gain: a direction in which the arm feels
 a hundredth of what it feels in others is told at half."""
 
 
-def observer_state(n: int) -> list[Field]:
-    """Fields of the state of the observer of an arm with ``n`` joints."""
-    rows = ("residual", "last_effort", "lagged", "last_speed", "momentum")
-    return [
-        *((name, "f8", (n,)) for name in rows),
-        ("last_inertia", "f8", (n, n)), ("is_observed", "i8"),
-    ]  # fmt: skip
+class ObserverNumbers(FrictionNumbers):
+    """Fields of a parameter record with what the observer knows."""
+
+    effort_limit: PerJoint
+    is_estimated: int
+    observer_gain: float
+
+
+class ObserverState(Fields):
+    """Fields of a state record with what the observer has seen."""
+
+    measured: PerJoint
+    speed: PerJoint
+    residual: PerJoint
+    last_effort: PerJoint
+    lagged: PerJoint
+    last_speed: PerJoint
+    momentum: PerJoint
+    last_inertia: Annotated[Array, "joints", "joints"]
+    is_observed: int
 
 
 @inner
-def _lag(s: Any, effort: Array, model: Array, share: float) -> None:
+def _lag(s: ObserverState, effort: Array, model: Array, share: float) -> None:
     """Let efforts less the arm's own lag as much as the measured speeds do, by a share per tick.
 
     Speeds are those of differences: from the middle of one tick to that of the next an arm moves
@@ -43,7 +58,7 @@ def _lag(s: Any, effort: Array, model: Array, share: float) -> None:
 
 
 @inner
-def _known_effort(p: Any, s: Any, i: int) -> float:
+def _known_effort(p: ObserverNumbers, s: ObserverState, i: int) -> float:
     """Effort of joint ``i`` that drives, the arm itself and friction account for [N·m or N]."""
     speed, scale = s.speed[i], p.friction_speed[i]
     dry = p.coulomb[i] * (speed / math.sqrt(speed * speed + scale * scale))
@@ -51,7 +66,7 @@ def _known_effort(p: Any, s: Any, i: int) -> float:
 
 
 @inner
-def _observe(p: Any, s: Any, model: Array, dt: float) -> None:
+def _observe(p: ObserverNumbers, s: ObserverState, model: Array, dt: float) -> None:
     """Bring the residual (n,) [N·m or N] to the present tick, and keep what the next one needs.
 
     Args:
@@ -114,7 +129,7 @@ def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> No
 
 
 @inner
-def forget(s: Any, wrench: Array) -> None:
+def forget(s: ObserverState, wrench: Array) -> None:
     """Begin anew with the next estimate; until then there is none, and the wrench (6,) is zero."""
     s.is_observed = 0
     for i in range(s.residual.shape[0]):
@@ -124,15 +139,17 @@ def forget(s: Any, wrench: Array) -> None:
 
 
 @inner
-def estimate(p: Any, s: Any, arm: Any, lag: float, dt: float, wrench: Array) -> None:
+def estimate(
+    p: ObserverNumbers, s: ObserverState, arm: Arm, lag: float, dt: float, wrench: Array
+) -> None:
     """Write the force on the tip along the slave's base, without torque, as the joints tell it.
 
     It knows what an encoder, an amplifier and the control law's model know, and the plant's mean
     friction. The residual is that of the tick that ended.
 
     Args:
-        p: Record with :data:`OBSERVER_PARAMETERS` and the friction's parameters.
-        s: Record with :func:`observer_state`; written.
+        p: Parameters.
+        s: State; written.
         arm: Its rooms ``measured``, ``joints`` and ``J`` are written.
         lag: Time constant of the measured speeds [s].
         dt: Tick [s].

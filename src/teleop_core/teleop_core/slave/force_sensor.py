@@ -6,26 +6,38 @@ hangs behind the sensor and its bias are added, and noise that is drawn anew for
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from teleop_core.base.parameters import parameter
-from teleop_core.graph.signals import Field
+from teleop_core.graph.row import Row
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, Wrench
+from teleop_core.slave.arm import Arm
 
 BLOCK = 1000
 """Ticks for which the noise is drawn at once."""
 STANDARD_GRAVITY = 9.80665
 """Weight of a mass [m/s²]; it pulls along -z of the slave's base."""
 _STREAM = 3  # of random numbers beside the seed; those of a human operator are 1 and 2
-SENSOR_PARAMETERS: list[Field] = [
-    ("is_ideal", "i8"), ("has_noise", "i8"), ("sensor_share", "f8"),
-    ("sensor_offset", "f8", (6,)), ("sensor_noise", "f8", (6,)),
-]  # fmt: skip
-SENSOR_STATE: list[Field] = [
-    ("felt", "f8", (6,)), ("sensed", "f8", (6,)), ("next_noise", "i8"),
-]  # fmt: skip
+
+
+class SensorNumbers(Fields):
+    """Fields of a parameter record with what the sensor does."""
+
+    is_ideal: int
+    has_noise: int
+    sensor_share: float
+    sensor_offset: Wrench
+    sensor_noise: Wrench
+
+
+class SensorState(Fields):
+    """Fields of a state record with the low-pass and the noise."""
+
+    felt: Wrench
+    sensed: Wrench
+    next_noise: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +84,7 @@ class ForceSensorParameters:
         source="assumed: faster than a hand moves, slower than what steps of encoders blur",
     )  # fmt: skip
 
-    def write(self, p: Any, dt: float) -> None:
+    def write(self, p: SensorNumbers, dt: float) -> None:
         """Write the record of a simulated arm that makes ticks of ``dt`` [s]."""
         p["sensor_share"] = -math.expm1(-2.0 * math.pi * self.force_bandwidth * dt)
         p["sensor_noise"] = [self.force_noise] * 3 + [self.torque_noise] * 3
@@ -100,7 +112,7 @@ class SensorNoise:
         self._rng = np.random.default_rng((self._seed, _STREAM))
         self._end = 0
 
-    def prepare(self, s: Any, ticks: int) -> None:
+    def prepare(self, s: SensorState, ticks: int) -> None:
         """Draw what the next ticks take from row ``s.next_noise`` on."""
         first = int(s["next_noise"])
         left = self._end - first
@@ -113,14 +125,14 @@ class SensorNoise:
 
 
 @inner
-def sense(p: Any, s: Any, arm: Any, row: Any) -> None:
+def sense(p: SensorNumbers, s: SensorState, arm: Arm, row: Row) -> None:
     """Write ``slave_measured_cf``: what the sensor makes of ``slave_true_cf``.
 
     The low-pass is exact for a force that stays what it is for a tick.
 
     Args:
-        p: Record with :data:`SENSOR_PARAMETERS`.
-        s: Record with :data:`SENSOR_STATE`; written.
+        p: Parameters.
+        s: State; written.
         arm: Its ``noises`` are standard normal numbers (N, 6).
         row: Signals.
     """

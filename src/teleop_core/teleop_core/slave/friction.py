@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, IntegerPerJoint, PerJoint
 
 # Noise: the multiplicative generator of Lewis, Goodman and Miller (1969), multiplier of Park,
 # Miller and Stockmeyer (1993).
@@ -19,15 +20,35 @@ _MULTIPLIER, _MODULUS = 48271, 2147483647
 _DAMPING = 1.0  # of a stuck joint on its bristle, share of critical
 
 
+class FrictionNumbers(Fields):
+    """Fields of a parameter record with the friction of each joint."""
+
+    viscous: PerJoint  # [N·m·s/rad or N·s/m]
+    coulomb: PerJoint  # dry friction [N·m or N]
+    friction_speed: PerJoint  # [rad/s or m/s]
+    bristle: PerJoint  # [N·m/rad or N/m]; 0 where it does not stick
+    bristle_damping: PerJoint
+    wander: PerJoint
+    wander_travel: PerJoint
+
+
+class FrictionState(Fields):
+    """Fields of a state record with the friction of each joint."""
+
+    bent: PerJoint  # bend of the bristle at the start of the step [rad or m]
+    grip: PerJoint  # share of dry friction in force
+    slipped: PerJoint
+    astray: PerJoint
+    noise: IntegerPerJoint
+
+
 @inner
-def friction(p: Any, s: Any, i: int, moved: float, speed: float) -> float:
+def friction(p: FrictionNumbers, s: FrictionState, i: int, moved: float, speed: float) -> float:
     """Friction of joint ``i`` [N·m or N], against its speed.
 
     Args:
-        p: Record with ``viscous``, ``coulomb``, ``friction_speed``, ``bristle``,
-            ``bristle_damping``, (n,) each.
-        s: Record with ``bent``, the bristle's bend at the start of the step, and ``grip``, the
-            share of dry friction in force, (n,) each.
+        p: Parameters.
+        s: State.
         i: Joint.
         moved: How far it has come since the start of the step [rad or m].
         speed: Its speed [rad/s or m/s].
@@ -41,7 +62,7 @@ def friction(p: Any, s: Any, i: int, moved: float, speed: float) -> float:
 
 
 @inner
-def bend(p: Any, s: Any, i: int, moved: float) -> None:
+def bend(p: FrictionNumbers, s: FrictionState, i: int, moved: float) -> None:
     """Bend the bristle of joint ``i`` by a whole step, as far as dry friction carries it.
 
     The rest of the way slips, and is added to ``s.slipped``.
@@ -56,7 +77,7 @@ def bend(p: Any, s: Any, i: int, moved: float) -> None:
 
 
 @inner
-def wander(p: Any, s: Any) -> None:
+def wander(p: FrictionNumbers, s: FrictionState) -> None:
     """Let the dry friction of joints that slipped change: first-order noise of mean 1 over the way.
 
     Teeth and balls meet other places of their paths as a joint moves on; at rest they stay, and so

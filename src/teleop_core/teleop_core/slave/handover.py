@@ -14,7 +14,7 @@ import numpy as np
 
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.simulation import Arm
+from teleop_core.slave.arm import Arm
 
 _NO_LIMIT = 1e6  # times a drive's: what would be cut off counts as well
 _TICKS = 20  # after which a derivative's filter has forgotten the noise of one difference

@@ -1,25 +1,40 @@
 """Interpolation: the way from command to command where they come slower than the ticks."""
 
-from typing import Any
-
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, PerJoint
 from teleop_core.kernels.geometry import Array
 
-WAY_FIELDS = ("begin", "slope", "bend", "end_slope")
-"""Joints at the beginning of the way, their first and second slope there and their slope at its
-end, per way: state of :func:`begin_way`."""
 _LINEAR, _MINIMUM_JERK = 1, 2
 
 
+class WayParameters(Fields):
+    """Fields of a parameter record that say how commands are joined."""
+
+    lower: PerJoint
+    upper: PerJoint
+    interpolation: int  # place of its name in :data:`~teleop_core.slave.slave.INTERPOLATIONS`
+
+
+class WayState(Fields):
+    """Fields of a state record with the way to the newest command; slopes are per way."""
+
+    command: PerJoint  # where the way is now [rad or m]
+    target: PerJoint  # the newest command
+    begin: PerJoint
+    slope: PerJoint  # first slope at the beginning
+    bend: PerJoint  # second slope there
+    end_slope: PerJoint
+    ticks: int  # that are done
+    span: int  # ticks in all
+
+
 @inner
-def begin_way(p: Any, s: Any, command: Array, period_ns: int, dt: float) -> None:
+def begin_way(p: WayParameters, s: WayState, command: Array, period_ns: int, dt: float) -> None:
     """Go to a new command, over the period of commands if that is longer than a tick.
 
     Args:
-        p: Parameters: ``lower`` and ``upper`` (n,), ``interpolation``, the place of its name in
-            :data:`~teleop_core.slave.slave_sim.INTERPOLATIONS`.
-        s: State: ``target``, ``command`` and :data:`WAY_FIELDS` (n,), ``ticks`` of the way done,
-            ``span`` in all; written.
+        p: Parameters.
+        s: State; written.
         command: New joints (n,) [rad or m], held inside their limits.
         period_ns: Time since the last command [ns]; 0 for the first.
         dt: Tick [s].
@@ -42,7 +57,7 @@ def begin_way(p: Any, s: Any, command: Array, period_ns: int, dt: float) -> None
 
 
 @inner
-def _coefficients(s: Any, i: int) -> tuple[float, float, float, float, float]:
+def _coefficients(s: WayState, i: int) -> tuple[float, float, float, float, float]:
     """Of the quintic in the share of the way, first to fifth power."""
     rise, a, b, e = s.target[i] - s.begin[i], s.slope[i], s.bend[i], s.end_slope[i]
     return (
@@ -55,7 +70,7 @@ def _coefficients(s: Any, i: int) -> tuple[float, float, float, float, float]:
 
 
 @inner
-def _slopes(s: Any, i: int) -> tuple[float, float]:
+def _slopes(s: WayState, i: int) -> tuple[float, float]:
     """First and second slope of joint i where it is on its way; 0 if it waits at the end."""
     if s.ticks > s.span:
         return 0.0, 0.0
@@ -66,7 +81,7 @@ def _slopes(s: Any, i: int) -> tuple[float, float]:
 
 
 @inner
-def advance_on_way(p: Any, s: Any) -> None:
+def advance_on_way(p: WayParameters, s: WayState) -> None:
     """Move the command on by one tick; at the end of the way it is the newest command, exactly.
 
     The polynomial of fifth degree with given position, speed and acceleration at its ends is the

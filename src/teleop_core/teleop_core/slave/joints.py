@@ -6,16 +6,24 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.friction import bend, friction
-from teleop_core.slave.world.contact import add_push
+from teleop_core.slave.friction import FrictionNumbers, FrictionState, bend, friction
+from teleop_core.slave.world.contact import ContactState, WorldNumbers, add_push
+
+
+class JointNumbers(FrictionNumbers, WorldNumbers):
+    """Fields of a parameter record with what acts on moving joints."""
+
+
+class JointState(FrictionState, ContactState):
+    """Fields of a state record with the same."""
 
 
 @inner
 def _derivative(
     acceleration: Any,
     dynamics: Array,
-    p: Any,
-    s: Any,
+    p: JointNumbers,
+    s: JointState,
     effort: Array,
     start: Array,
     q: Array,
@@ -35,8 +43,8 @@ def _derivative(
 def integrate(
     acceleration: Any,
     dynamics: Array,
-    p: Any,
-    s: Any,
+    p: JointNumbers,
+    s: JointState,
     steps: int,
     effort: Array,
     q: Array,
@@ -48,8 +56,8 @@ def integrate(
     Args:
         acceleration: Pointer to the robot's rigid-body model.
         dynamics: Its parameter row.
-        p: Record with the friction's parameters; see :func:`teleop_core.slave.friction.friction`.
-        s: Record with the friction's state; written.
+        p: Parameters.
+        s: State; written.
         steps: Number of equal Runge-Kutta steps, >= 1.
         effort: Drive effort (n,) [N·m or N].
         q: Joint positions (n,) [rad or m]; written.

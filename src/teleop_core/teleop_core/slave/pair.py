@@ -6,6 +6,7 @@ from typing import Any
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.kernels import kernel
+from teleop_core.slave.commands import SlaveRow
 from teleop_core.slave.simulation import simulation_step
 from teleop_core.slave.slave import SLAVE, Slave, SlaveParameters
 from teleop_core.slave.slave_sim import SLAVE_SIM, SlaveSim, SlaveSimParameters
@@ -24,7 +25,7 @@ class ArmParameters(SlaveParameters, SlaveSimParameters):
 
 
 @kernel
-def arm_step(server: Any, simulated: Any, row: Any, dt: float) -> None:
+def arm_step(server: Any, simulated: Any, row: SlaveRow, dt: float) -> None:
     """One tick of both on one row of signals.
 
     Args:

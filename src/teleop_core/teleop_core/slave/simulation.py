@@ -1,26 +1,22 @@
 """Simulation: one tick of the arm's drives and mechanics, on records of parameters and state."""
 
 import math
-from typing import Any, NamedTuple
 
-from teleop_core.graph.signals import Field, copy
+from teleop_core.graph.row import Row
+from teleop_core.graph.signals import copy
 from teleop_core.graph.topics import OPERATION
-from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import PerJoint
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots.rigid_body import write_model
-from teleop_core.slave.elastic import integrate_elastic
-from teleop_core.slave.force_observer import (
-    OBSERVER_PARAMETERS,
-    estimate,
-    forget,
-    observer_state,
-)
-from teleop_core.slave.force_sensor import SENSOR_PARAMETERS, SENSOR_STATE, sense
+from teleop_core.slave.arm import Arm
+from teleop_core.slave.elastic import ElasticNumbers, ElasticState, integrate_elastic
+from teleop_core.slave.force_observer import ObserverNumbers, ObserverState, estimate, forget
+from teleop_core.slave.force_sensor import SensorNumbers, SensorState, sense
 from teleop_core.slave.friction import wander
 from teleop_core.slave.joints import integrate
-from teleop_core.slave.plants import PER_JOINT
-from teleop_core.slave.transmission import LONGEST_DELAY, drive, follow_encoders
-from teleop_core.slave.world.contact import WORLD_PARAMETERS, touch, world_state
+from teleop_core.slave.transmission import DriveNumbers, DriveState, drive, follow_encoders
+from teleop_core.slave.world.contact import touch
 
 # A joint that is farther from its setpoint [rad or m] is no joint of a simulation in its senses.
 _ASTRAY = 10.0
@@ -29,55 +25,22 @@ SPEED_LAG = 5e-3
 _BRAKED = OPERATION.index("is_braked")
 
 
-def simulation_records(n: int) -> tuple[Any, Any]:
-    """Parameter and state record of a simulated arm with ``n`` joints."""
-    joints = (*PER_JOINT, "bristle_damping", "gear_damping", "effort_limit", "speed_limit",
-              "compensated", "braking")  # fmt: skip
-    rows: list[Field] = [(name, "f8", (n,)) for name in joints]
-    rows += [(name, "i8") for name in ("steps", "delay_ticks", "has_gears")]
-    rows += [*WORLD_PARAMETERS, *SENSOR_PARAMETERS, *OBSERVER_PARAMETERS]
-    plant = ("measured", "speed", "bent", "grip", "astray", "slipped", "carried", "link",
-             "link_speed")  # fmt: skip
-    state: list[Field] = [(name, "f8", (n,)) for name in plant]
-    state += [("noise", "i8", (n,)), ("driven", "i8"), ("late", "f8", (LONGEST_DELAY + 1, n))]
-    state += [*world_state(n), *SENSOR_STATE, *observer_state(n)]
-    return records(rows)[0], records(state)[0]
+class SimulationNumbers(ElasticNumbers, DriveNumbers, SensorNumbers, ObserverNumbers):
+    """Parameter record of a simulated arm."""
+
+    encoder_step: PerJoint  # [rad or m]
+    compensated: PerJoint  # share of gravity that is fed forward
+    braking: PerJoint  # of the brakes [rad/s² or m/s²]
+    steps: int
+    has_gears: int
 
 
-class Arm(NamedTuple):
-    """Model, control law and motion of the arm: pointers and plain arrays, which kernels take."""
-
-    tip_fk: Any  # of the links as they were made
-    jacobian: Any  # of the same
-    distance: Any  # of the object that the tip can touch
-    acceleration: Any
-    gravity: Any
-    control: Any
-    tip_geometry: Array
-    coupling: Array
-    dynamics: Array
-    model: Array  # the dynamics that the control law knows
-    gains: Array
-    memory: Array  # of the control law
-    q: Array  # joint positions (n,) at the encoders, unrounded
-    dq: Array
-    effort: Array
-    setpoint: Array
-    measured: Array
-    feedforward: Array  # (n,); (2 n + n²,) for laws that take the model
-    limit: Array
-    joints: Array  # room for joints
-    tip: Array  # true joint positions (n,), behind the transmission
-    T: Array
-    shape: Array  # numbers of the object
-    offset: Array  # rooms for what the tip feels: (3,), (3,) and (6, n)
-    normal: Array
-    J: Array
-    noises: Array  # of the force sensor in the coming ticks (N, 6)
+class SimulationState(ElasticState, DriveState, SensorState, ObserverState):
+    """State record of a simulated arm."""
 
 
 @inner
-def _measure(p: Any, s: Any, q: Array, dt: float) -> None:
+def _measure(p: SimulationNumbers, s: SimulationState, q: Array, dt: float) -> None:
     """Read the encoders."""
     for i in range(q.shape[0]):
         measured = round(q[i] / p.encoder_step[i]) * p.encoder_step[i]
@@ -87,7 +50,7 @@ def _measure(p: Any, s: Any, q: Array, dt: float) -> None:
 
 
 @inner
-def _control(p: Any, s: Any, arm: Any, dt: float) -> None:
+def _control(p: SimulationNumbers, s: SimulationState, arm: Arm, dt: float) -> None:
     """Write the effort that the control law asks for."""
     n = arm.q.shape[0]
     copy(s.measured, arm.measured)
@@ -104,7 +67,7 @@ def _control(p: Any, s: Any, arm: Any, dt: float) -> None:
 
 
 @inner
-def _brake(p: Any, s: Any, arm: Any, dt: float) -> None:
+def _brake(p: SimulationNumbers, s: SimulationState, arm: Arm, dt: float) -> None:
     """Let brakes as strong as the drives stop the arm, whatever its dynamics have become."""
     for i in range(arm.q.shape[0]):
         fastest, less = p.speed_limit[i] * 1.5, p.braking[i] * dt
@@ -118,7 +81,7 @@ def _brake(p: Any, s: Any, arm: Any, dt: float) -> None:
 
 
 @inner
-def _see_joints(p: Any, s: Any, arm: Any) -> None:
+def _see_joints(p: SimulationNumbers, s: SimulationState, arm: Arm) -> None:
     """Write where the joints truly are, behind gears that bend and tendons with play."""
     if p.has_gears:
         copy(s.link, arm.joints)
@@ -128,7 +91,7 @@ def _see_joints(p: Any, s: Any, arm: Any) -> None:
 
 
 @inner
-def _touch(p: Any, s: Any, arm: Any, row: Any) -> None:
+def _touch(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row) -> None:
     """Let the tip feel the object, at the links that move it."""
     if p.has_gears:
         touch(p, s, arm, s.link, s.link_speed, row.slave_true_cf)
@@ -137,7 +100,7 @@ def _touch(p: Any, s: Any, arm: Any, row: Any) -> None:
 
 
 @inner
-def _estimate(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
+def _estimate(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row, dt: float) -> None:
     """Write what joints and drives tell of the force on the tip; brakes tell nothing."""
     if p.is_estimated and not row.slave_operation[_BRAKED] > 0.0:
         estimate(p, s, arm, SPEED_LAG, dt, row.slave_estimated_cf)
@@ -146,7 +109,7 @@ def _estimate(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
 
 
 @inner
-def _move_on(p: Any, s: Any, arm: Any, braked: bool, dt: float) -> None:
+def _move_on(p: SimulationNumbers, s: SimulationState, arm: Arm, braked: bool, dt: float) -> None:
     """Move the arm by a tick: by its brakes, or under the effort of its drives."""
     if braked:
         _brake(p, s, arm, dt)
@@ -162,7 +125,9 @@ def _move_on(p: Any, s: Any, arm: Any, braked: bool, dt: float) -> None:
 
 
 @kernel
-def simulation_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
+def simulation_step(
+    p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row, dt: float
+) -> None:
     """One control tick of a simulated arm: write what its encoders say, and where its tip is.
 
     What is measured is sampled at the start of the tick, together with the setpoint it is held

@@ -6,7 +6,6 @@ arm. Where the arm is, it is told.
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -25,12 +24,15 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_JS,
 )
 from teleop_core.kernels import kernel, pointer, records
+from teleop_core.kernels.fields import record
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.kernels.portable import length
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.robot import Robot
+from teleop_core.slave.arm import ArmModel
+from teleop_core.slave.commands import SlaveNumbers, SlaveState
 from teleop_core.slave.motion import MotionCommands
 from teleop_core.slave.operation import (
     Answer,
@@ -43,7 +45,7 @@ from teleop_core.slave.operation import (
 from teleop_core.slave.operation.states import answer_text, change
 from teleop_core.slave.operation.watch import fail
 from teleop_core.slave.simulation import SPEED_LAG
-from teleop_core.slave.step import ArmModel, slave_records, slave_step
+from teleop_core.slave.step import slave_step
 from teleop_core.slave.trajectory import shortest_move_time
 
 _TIMES = {
@@ -125,7 +127,8 @@ class Slave(RunningStage):
             raise ParameterError("slave.robot", parameters.robot, "a robot with drives")
         n = self.robot.n
         super().__init__(SLAVE, n, dt)
-        self.parameters, self.state = slave_records(n)
+        self.parameters = record(SlaveNumbers, n)
+        self.state = record(SlaveState, n)
         self.arm = ArmModel(
             fk=self.robot.fk_pointer,
             jacobian=pointer(self.robot.kernels.jacobian, FK),
@@ -292,7 +295,7 @@ class Slave(RunningStage):
 
 
 @kernel
-def _request(p: Any, s: Any, event: int) -> int:
+def _request(p: SlaveNumbers, s: SlaveState, event: int) -> int:
     """Take a command; of a stop the fault is told."""
     if event == _STOP:
         was = s.is_stopped
@@ -302,7 +305,7 @@ def _request(p: Any, s: Any, event: int) -> int:
 
 
 @kernel
-def _fail(p: Any, s: Any, fault: int, value: float, bound: float) -> None:
+def _fail(p: SlaveNumbers, s: SlaveState, fault: int, value: float, bound: float) -> None:
     """Take note of a fault."""
     fail(p, s, fault, -1, value, bound)
 

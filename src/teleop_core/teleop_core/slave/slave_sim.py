@@ -19,19 +19,21 @@ from teleop_core.graph.topics import (
     SLAVE_TRUE_CP,
 )
 from teleop_core.kernels import pointer
+from teleop_core.kernels.fields import record
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import dh_kernels, load_robot_set
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.kinematics import FK
 from teleop_core.robots.parameters import RobotParameters
+from teleop_core.slave.arm import Arm
 from teleop_core.slave.controllers import CONTROLLERS, per_joint
 from teleop_core.slave.elastic import gear_damping
 from teleop_core.slave.force_sensor import ForceSensorParameters, SensorNoise
 from teleop_core.slave.friction import bristle_damping
 from teleop_core.slave.handover import missing_effort
 from teleop_core.slave.plants import PER_JOINT, PLANTS, Physics
-from teleop_core.slave.simulation import Arm, simulation_records, simulation_step
-from teleop_core.slave.stability import check_friction, check_stable, loop_key
+from teleop_core.slave.simulation import SimulationNumbers, SimulationState, simulation_step
+from teleop_core.slave.stability import Loop, check_friction, check_stable, loop_key
 from teleop_core.slave.transmission import LONGEST_DELAY
 from teleop_core.slave.world import WORLD_OBJECTS
 from teleop_core.slave.world.parameters import WorldParameters
@@ -98,7 +100,8 @@ class SlaveSim(RunningStage):
             raise ParameterError("slave_sim.robot", parameters.robot, "a robot with drives")
         n, model = self.robot.n, self.robot.dynamics
         super().__init__(SLAVE_SIM, n, dt)
-        self.parameters, self.state = simulation_records(n)
+        self.parameters = record(SimulationNumbers, n)
+        self.state = record(SimulationState, n)
         self._law = CONTROLLERS.find(parameters.controller.kind.kind)
         self._seed, physics = parameters.seed, self._physics(parameters)
         self._noise = SensorNoise(parameters.seed)
@@ -265,10 +268,8 @@ class SlaveSim(RunningStage):
         """Try the loop as it is set, where the arm is; see :mod:`teleop_core.slave.stability`."""
         assert self.robot.drives is not None
         check_friction(self.parameters, self.robot.drives.inertia, self.dt)
-        check_stable(
-            self._law, self.robot, self.parameters, self.state, self.arm, self.signals, self.dt,
-            are_large_tried=parameters.trials == "all",
-        )  # fmt: skip
+        loop = Loop(self.parameters, self.state, self.arm, self.signals, self.dt)
+        check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
 
     def _hand_over(self) -> None:
         """Let the integrators take over what new gains give less, once these are in force."""

@@ -4,18 +4,21 @@ A loop is tried before it is used: copies of the arm run under it. What a trial 
 depend on when it is made, so a loop that has passed is not tried twice in one process.
 """
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from teleop_core.base.errors import ParameterError
+from teleop_core.graph.row import Row
 from teleop_core.kernels import IS_COMPILED, bound, records
 from teleop_core.kernels.callables import raise_pending
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
+from teleop_core.slave.arm import Arm
 from teleop_core.slave.controllers import Controller
 from teleop_core.slave.plants import PER_JOINT
-from teleop_core.slave.simulation import Arm, simulation_step
+from teleop_core.slave.simulation import SimulationNumbers, SimulationState, simulation_step
 
 _TICKS, _LAST = 400, 100
 # After _TICKS no error may be so many times what it was. Laws that learn may let errors grow for a
@@ -38,7 +41,7 @@ _ARM = ("gains", "dynamics", "model", "coupling")
 _passed: set[tuple[object, ...]] = set()
 
 
-def check_friction(p: Any, inertia: Array, dt: float) -> None:
+def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
     """Refuse friction that the drives cannot move, or that the integrator cannot follow.
 
     Args:
@@ -69,7 +72,36 @@ def check_friction(p: Any, inertia: Array, dt: float) -> None:
         raise ParameterError("slave_sim.coulomb", p["coulomb"].tolist(), needed)
 
 
-def loop_key(p: Any, arm: Arm) -> tuple[bytes, ...]:
+class Loop(NamedTuple):
+    """A simulated arm with its control law: what one tick of it takes."""
+
+    p: SimulationNumbers
+    s: SimulationState
+    arm: Arm
+    row: Row
+    dt: float
+
+    def copied(self) -> "Loop":
+        """The same arm apart, in free air, for a loop is judged there."""
+        p, s, row = (_copy(record) for record in (self.p, self.s, self.row))
+        p["has_world"] = s["is_near"] = 0
+        p["is_ideal"], p["has_noise"], p["is_estimated"] = 1, 0, 0
+        parts = (np.array(part) if isinstance(part, np.ndarray) else part for part in self.arm)
+        return Loop(p, s, Arm(*parts), row, self.dt)
+
+    def step(self) -> Callable[[], None]:
+        """What makes a tick of it."""
+        tick = bound(simulation_step, *self)
+
+        def made() -> None:
+            self.row.now_ns += round(self.dt * 1e9)
+            tick()
+            raise_pending()
+
+        return made
+
+
+def loop_key(p: SimulationNumbers, arm: Arm) -> tuple[bytes, ...]:
     """Numbers that make the loop of an arm what it is, wherever the arm is.
 
     Args:
@@ -81,9 +113,8 @@ def loop_key(p: Any, arm: Arm) -> tuple[bytes, ...]:
 
 
 def check_stable(
-    law: Controller, robot: Robot, p: Any, s: Any, arm: Arm, row: Any, dt: float, *,
-    are_large_tried: bool = True,
-) -> None:  # fmt: skip
+    law: Controller, robot: Robot, loop: Loop, *, are_large_tried: bool = True
+) -> None:
     """Refuse a loop in which small errors grow, or that does not come back from large ones.
 
     Small errors: two copies of the arm are held at the present setpoint, one of them with a small
@@ -97,30 +128,27 @@ def check_stable(
     Args:
         law: The control law.
         robot: What it moves.
-        p: Parameter record of the slave.
-        s: State record.
-        arm: Its arrays.
-        row: Signals.
-        dt: Tick [s].
+        loop: The arm as it is now.
         are_large_tried: Whether large errors must come back, too.
 
     Raises:
         ParameterError: An error grows, or does not come back.
         Exception: What a law in plain Python raises.
     """
-    place = (robot.geometry_row.tobytes(), arm.q.tobytes())
-    tried = (law.control, robot.kernels, dt, *place, are_large_tried, *loop_key(p, arm))
+    place = (robot.geometry_row.tobytes(), loop.arm.q.tobytes())
+    key = loop_key(loop.p, loop.arm)
+    tried = (law.control, robot.kernels, loop.dt, *place, are_large_tried, *key)
     if tried in _passed:
         return
-    _check_small(law.name, p, s, arm, row, dt)
+    _check_small(law.name, loop)
     if IS_COMPILED and are_large_tried:  # in plain Python dashes take seconds
-        _check_large(law.name, robot, p, s, arm, row, dt)
+        _check_large(law.name, robot, loop)
     _passed.add(tried)
 
 
-def _check_small(name: str, p: Any, s: Any, arm: Arm, row: Any, dt: float) -> None:
-    error = _ERROR * np.array(p["encoder_step"])
-    calm, shaken = (_held(p, s, arm, row, dt, by) for by in (0.0 * error, error))
+def _check_small(name: str, loop: Loop) -> None:
+    error, dt = _ERROR * np.array(loop.p.encoder_step), loop.dt
+    calm, shaken = (_held(loop, by) for by in (0.0 * error, error))
     with np.errstate(all="ignore"):
         growth = np.max(np.abs(shaken - calm) / error, axis=0)
     if not (growth <= _GROWTH).all():
@@ -133,32 +161,28 @@ def _check_small(name: str, p: Any, s: Any, arm: Arm, row: Any, dt: float) -> No
         raise ParameterError("slave_sim.controller.kind", name, needed)
 
 
-def _held(p: Any, s: Any, arm: Arm, row: Any, dt: float, by: Array) -> Array:
+def _held(loop: Loop, by: Array) -> Array:
     """Positions (N, n) in the last ticks of an arm that is held ``by`` (n,) off its setpoint."""
-    p, s, arm, row = _copies(p, s, arm, row)
+    loop = loop.copied()
     for field in ("encoder_step", "effort_step"):
-        p[field] *= _FINE
-    p["coulomb"], p["wander"] = 0.0, 0.0
-    arm.q[:] += by
-    found, step = np.empty((_LAST, len(arm.q))), bound(simulation_step, p, s, arm, row, dt)
+        loop.p[field] *= _FINE
+    loop.p["coulomb"], loop.p["wander"] = 0.0, 0.0
+    loop.arm.q[:] += by
+    found, step = np.empty((_LAST, len(loop.arm.q))), loop.step()
     for k in range(_TICKS):
-        row["now_ns"] += round(dt * 1e9)
         step()
-        raise_pending()
-        found[k % _LAST] = arm.q
+        found[k % _LAST] = loop.arm.q
     return found
 
 
-def _check_large(
-    name: str, robot: Robot, p: Any, s: Any, arm: Arm, row: Any, dt: float
-) -> None:  # fmt: skip
-    for joint in range(len(arm.q)):
-        left = _left(robot, p, s, arm, row, dt, joint)
+def _check_large(name: str, robot: Robot, loop: Loop) -> None:
+    for joint in range(len(loop.arm.q)):
+        left = _left(robot, loop, joint)
         if not left <= _LEFT:  # NaN is left as well
             needed = (
-                f"such that the arm comes back: {_LONGEST * dt:g} s after a stop from full speed "
-                f"joint {joint + 1} is off by {left:.2g} of its largest error on the way; raise "
-                "its gains, or bound its integral"
+                f"such that the arm comes back: {_LONGEST * loop.dt:g} s after a stop from full "
+                f"speed joint {joint + 1} is off by {left:.2g} of its largest error on the way; "
+                "raise its gains, or bound its integral"
             )
             raise ParameterError("slave_sim.controller.kind", name, needed)
 
@@ -183,39 +207,29 @@ def dash(lower: float, upper: float, start: float, speed: float, dt: float) -> A
     return start + side * share * speed * dt * np.cumsum(pace)
 
 
-def _left(robot: Robot, p: Any, s: Any, arm: Arm, row: Any, dt: float, joint: int) -> float:
+def _left(robot: Robot, loop: Loop, joint: int) -> float:
     """Share of a joint's largest error that is left in rest after its setpoint has dashed."""
-    p, s, arm, row = _copies(p, s, arm, row)
-    setpoint, step = row["slave_setpoint_js"], bound(simulation_step, p, s, arm, row, dt)
+    loop = loop.copied()
+    setpoint, arm, step = loop.row.slave_setpoint_js, loop.arm, loop.step()
 
     def largest(places: Array) -> float:
         found = 0.0
         for place in places:
-            row["now_ns"] += round(dt * 1e9)
             setpoint[joint] = place
             step()
-            raise_pending()
             found = max(found, abs(float(arm.setpoint[joint] - arm.q[joint])))
         return found if np.isfinite(arm.q[joint]) else np.nan
 
     path = dash(
-        robot.lower[joint], robot.upper[joint], setpoint[joint], p["speed_limit"][joint], dt
-    )
+        robot.lower[joint], robot.upper[joint], setpoint[joint],
+        loop.p.speed_limit[joint], loop.dt,
+    )  # fmt: skip
     most = largest(path)
     for rest in range(_LAST, _LONGEST + 1, _LAST):
         left = largest(np.full(_LAST, path[-1])) / most
         if rest >= _SHORTEST and left <= _LEFT:
             break
     return left
-
-
-def _copies(p: Any, s: Any, arm: Arm, row: Any) -> tuple[Any, Any, Arm, Any]:
-    """Copies of an arm."""
-    p, s, row = (_copy(record) for record in (p, s, row))
-    p["has_world"] = s["is_near"] = 0  # a loop is judged in free air
-    p["is_ideal"], p["has_noise"], p["is_estimated"] = 1, 0, 0
-    arm = Arm(*(np.array(part) if isinstance(part, np.ndarray) else part for part in arm))
-    return p, s, arm, row
 
 
 def _copy(record: Any) -> Any:

@@ -1,16 +1,18 @@
 """Step of the slave: one tick of the arm's server, on records of parameters, state and signals."""
 
-from typing import Any, NamedTuple
-
-from teleop_core.graph.signals import Field, copy
+from teleop_core.graph.signals import copy
 from teleop_core.graph.topics import NO_COMMAND_NS
-from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, pose_from_transform
+from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import (
     AT_LIMITS,
     AT_ONCE,
     WITH_ARM,
     CommandStatus,
+    SlaveNumbers,
+    SlaveRow,
+    SlaveState,
     advance_move,
     advance_setpoint,
     come_to_rest,
@@ -19,11 +21,9 @@ from teleop_core.slave.commands import (
     plan_move,
     take_command,
 )
-from teleop_core.slave.interpolation import WAY_FIELDS, advance_on_way
+from teleop_core.slave.interpolation import advance_on_way
 from teleop_core.slave.operation.states import Event, State, change
 from teleop_core.slave.operation.watch import (
-    OPERATION_PARAMETERS,
-    OPERATION_STATE,
     begin_tick,
     find_rest,
     is_blind,
@@ -41,48 +41,8 @@ _ENABLED, _FAULT = int(State.ENABLED), int(State.FAULT)
 _ARRIVED, _HOME, _BLIND = int(Event.ARRIVED), int(Event.HOME), int(CommandStatus.BLIND)
 
 
-def slave_records(n: int) -> tuple[Any, Any]:
-    """Parameter and state record of an arm's server with ``n`` joints."""
-    joints = ("lower", "upper", "effort_limit", "speed_limit", "start", "braking", "acceleration",
-              "lag", "rest_speed", "near")  # fmt: skip
-    scalars = ("filter_gain", "filter_zero", "filter_pole", "start_speed",
-               "tool_speed", "tool_acceleration")  # fmt: skip
-    rows = [(name, "f8", (n,)) for name in joints]
-    numbers = [(name, "f8") for name in scalars]
-    numbers += [(name, "i8") for name in ("is_filtered", "timeout_ns", "interpolation")]
-    moved = ("command", "filtered", "setpoint", "target", *WAY_FIELDS, "step", "move_from",
-             "move_to", "drive", "asked", "measured", "speed")  # fmt: skip
-    state: list[Field] = [(name, "f8", (n,)) for name in moved]
-    state += [("full_ns", "i8", (n,)), ("tool_step", "f8"), ("twist", "f8", (6,))]
-    stamps = (
-        "command_stamp_ns", "arrival_ns", "seen_ns", "refused", "refused_before", "in_row",
-        "is_stream", "gap_ns", "moved_ticks", "move_ticks", "ticks", "span", "motion", "driven_ns",
-        "asked_ns",
-    )  # fmt: skip
-    whole = [*state, *((name, "i8") for name in stamps), *OPERATION_STATE]
-    return records([*rows, *numbers, *OPERATION_PARAMETERS])[0], records(whole)[0]
-
-
-class ArmModel(NamedTuple):
-    """What the server knows of its arm, pointers and plain arrays, and rooms for kernels."""
-
-    fk: Any
-    jacobian: Any
-    geometry: Array
-    setpoint: Array  # rooms for joints (n,)
-    joints: Array
-    effort: Array
-    T: Array
-    speeds: Array  # rooms for what follows a twist: joint speeds (n,), and so on
-    is_free: Array
-    twist: Array
-    J: Array
-    A: Array
-    b: Array
-
-
 @inner
-def _moves(p: Any, s: Any) -> bool:
+def _moves(p: SlaveNumbers, s: SlaveState) -> bool:
     """Whether setpoint or arm move in this tick."""
     moving = 0
     for i in range(s.setpoint.shape[0]):
@@ -91,7 +51,7 @@ def _moves(p: Any, s: Any) -> bool:
 
 
 @inner
-def _is_still(s: Any) -> bool:
+def _is_still(s: SlaveState) -> bool:
     """Whether the setpoint stands still."""
     moves = 0
     for i in range(s.step.shape[0]):
@@ -100,7 +60,7 @@ def _is_still(s: Any) -> bool:
 
 
 @inner
-def _begin_where_it_is(p: Any, s: Any, arm: Any, row: Any) -> None:
+def _begin_where_it_is(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow) -> None:
     """Let the setpoint of an arm that is not at home begin where it is; it homes from there."""
     off = 0
     for i in range(s.setpoint.shape[0]):
@@ -118,7 +78,7 @@ def _begin_where_it_is(p: Any, s: Any, arm: Any, row: Any) -> None:
 
 
 @inner
-def _take_measured(p: Any, s: Any, arm: Any, row: Any) -> None:
+def _take_measured(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow) -> None:
     """Take what the arm says of itself, if it is new, and look for what is wrong with it.
 
     It was sampled together with the setpoint that is still in force.
@@ -148,7 +108,9 @@ def _take_measured(p: Any, s: Any, arm: Any, row: Any) -> None:
 
 
 @inner
-def _go_on(p: Any, s: Any, arm: Any, row: Any, before: Array, dt: float) -> None:
+def _go_on(
+    p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, before: Array, dt: float
+) -> None:
     """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
     if s.state == _ENABLED and s.is_busy and not s.must_plan:
         advance_move(s)
@@ -166,7 +128,7 @@ def _go_on(p: Any, s: Any, arm: Any, row: Any, before: Array, dt: float) -> None
 
 
 @kernel
-def slave_step(p: Any, s: Any, arm: Any, row: Any, dt: float) -> None:
+def slave_step(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, dt: float) -> None:
     """One tick of the arm's server: write the slave's setpoint, measured pose and operation.
 
     What is measured is of the last tick, and judged against the setpoint of that one.

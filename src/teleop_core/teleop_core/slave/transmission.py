@@ -1,24 +1,45 @@
 """Transmission: drives between efforts asked and given, play and tendons behind the encoders."""
 
-from typing import Any
+from typing import Annotated
 
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, PerJoint
 from teleop_core.kernels.geometry import Array
+from teleop_core.slave.arm import Arm
 
 LONGEST_DELAY = 30
 """Largest delay of efforts [ticks]."""
 
 
+class DriveNumbers(Fields):
+    """Fields of a parameter record with drives and transmission."""
+
+    play: PerJoint  # half width, between encoder and joint [rad or m]
+    drive_gain: PerJoint
+    effort_step: PerJoint  # [N·m or N]
+    bias: PerJoint  # [N·m or N]
+    speed_limit: PerJoint  # rated speed [rad/s or m/s]
+    delay_ticks: int
+
+
+class DriveState(Fields):
+    """Fields of a state record with the same."""
+
+    carried: PerJoint  # the joints as the motors left them [rad or m]
+    late: Annotated[Array, LONGEST_DELAY + 1, "joints"]  # the efforts asked for lately
+    driven: int
+
+
 @inner
-def follow_encoders(p: Any, s: Any, q: Array, coupling: Array, tip: Array) -> None:
+def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, tip: Array) -> None:
     """Write the true joint positions (n,) of motors at ``q`` (n,) [rad or m].
 
     A joint stays where it is until its motor has crossed the play, and is dragged then. By how
     much an earlier joint lags behind its motor moves those that its tendons pass by.
 
     Args:
-        p: Record with ``play`` (n,).
-        s: Record with ``carried`` (n,), the joints as the motors left them; written.
+        p: Parameters.
+        s: State; written.
         q: Where the motors are, seen through their gears.
         coupling: (n, n), below its diagonal.
         tip: Written.
@@ -33,13 +54,12 @@ def follow_encoders(p: Any, s: Any, q: Array, coupling: Array, tip: Array) -> No
 
 
 @inner
-def drive(p: Any, s: Any, arm: Any) -> None:
+def drive(p: DriveNumbers, s: DriveState, arm: Arm) -> None:
     """Make of the effort asked for the one that the motors give.
 
     Args:
-        p: Record with ``delay_ticks`` and, of each joint, ``drive_gain``, ``effort_step``, ``bias``
-            and ``speed_limit``.
-        s: Record with ``late``, the efforts asked for lately, and ``driven``; written.
+        p: Parameters.
+        s: State; written.
         arm: Its ``effort`` is written.
     """
     if p.delay_ticks > 0:  # in the first ticks the first effort, which holds the arm

@@ -2,12 +2,13 @@
 
 import math
 from enum import IntEnum
-from typing import Any
 
 from teleop_core.graph.signals import copy
 from teleop_core.kernels import inner
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.damped import eliminate, gram, weigh
+from teleop_core.slave.arm import ArmModel
+from teleop_core.slave.commands import SlaveNumbers, SlaveState
 
 
 class Motion(IntEnum):
@@ -27,7 +28,7 @@ _DAMPING = 1e-4
 
 
 @inner
-def joint_speeds(arm: Any, q: Array, twist: Array, speed: Array) -> None:
+def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
     """Write the joint speeds (n,) that follow a twist at damped best.
 
     ``dq = Jᵀ (J Jᵀ + damping I)⁻¹ v``, with the linear rows of J and v over a length. Near a
@@ -64,7 +65,7 @@ def _stoppable(room: float, most: float) -> float:
 
 
 @inner
-def _share_of_limits(p: Any, s: Any, dt: float) -> float:
+def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
     """Share of the wanted speeds that no joint is too fast for, or of the tip's, none too far."""
     share = 1.0
     for i in range(s.drive.shape[0]):
@@ -80,16 +81,15 @@ def _share_of_limits(p: Any, s: Any, dt: float) -> float:
 
 
 @inner
-def advance_velocity(p: Any, s: Any, arm: Any, now_ns: int, dt: float) -> None:
+def advance_velocity(p: SlaveNumbers, s: SlaveState, arm: ArmModel, now_ns: int, dt: float) -> None:
     """Move the setpoint at the wanted speed; without a fresh command it brakes to rest, and stays.
 
     All joints keep their speed limits, change their speed no faster than their drives can brake,
     and stop at the end of their ranges. A tip whose joints cannot keep up goes slower on its line.
 
     Args:
-        p: Parameters with ``timeout_ns``, ``speed_limit``, ``braking``, ``lower``, ``upper`` (n,).
-        s: State with ``motion``, ``drive`` (n,) [rad/s or m/s], ``twist`` (6,), ``driven_ns``, the
-            arrival of the command; its setpoint is written.
+        p: Parameters.
+        s: State; its setpoint is written.
         arm: As of :func:`joint_speeds`.
         now_ns: Time of the tick [ns].
         dt: Tick [s].

@@ -12,6 +12,7 @@ from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.hardware import Hardware
+from teleop_core.slave.commands import SlaveRow
 from teleop_core.slave.pair import ArmParameters, SimulatedArm, arm_step
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 
@@ -19,7 +20,9 @@ _FINE = 1e-4  # of an encoder step
 
 
 @kernel
-def _drive(server: Any, simulated: Any, row: Any, way: Array, begin_ns: int, dt: float) -> None:
+def _drive(
+    server: Any, simulated: Any, row: SlaveRow, way: Array, begin_ns: int, dt: float
+) -> None:
     """Command a way (N, n), a joint vector a tick, from the tick after ``begin_ns`` on."""
     for k in range(way.shape[0]):
         row.now_ns = begin_ns + (k + 1) * TICK_NS

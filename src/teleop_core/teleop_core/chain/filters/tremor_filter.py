@@ -13,24 +13,33 @@ import numpy as np
 from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
 from teleop_core.chain.filters.parameters import TremorFilterParameters
 from teleop_core.chain.mapping.plausibility import (
-    PLAUSIBILITY_PARAMETERS,
-    PLAUSIBILITY_STATE,
+    PlausibilityNumbers,
+    PlausibilityState,
     is_plausible,
     take_hand,
 )
+from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import MASTER_FILTERED_CP, MASTER_FILTERED_OUT, MASTER_MEASURED_CP
-from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import Vector3, record
 from teleop_core.kernels.geometry import Array
 
-_PARAMETERS = [*PLAUSIBILITY_PARAMETERS, ("pause_ns", "i8")]
-_STATE = [
-    *PLAUSIBILITY_STATE, ("origin", "f8", (3,)), ("value", "f8", (3,)), ("told", "f8", (3,)),
-    ("shift", "f8", (3,)), ("begun", "i8"), ("is_retuned", "i8"), ("is_other", "i8"),
-]  # fmt: skip
 _FADE = 0.2
 """Time constant with which the difference between old and new parameters goes away [s]."""
+
+
+class FilterState(PlausibilityState):
+    """State record of the tremor filter."""
+
+    origin: Vector3  # reading at which it began [m]
+    value: Vector3  # last reading, from there
+    told: Vector3  # last answer
+    shift: Vector3  # what is left of the difference between old and new parameters
+    begun: int
+    is_retuned: int
+    is_other: int
 
 
 class Part(NamedTuple):
@@ -42,7 +51,7 @@ class Part(NamedTuple):
 
 
 @inner
-def _begin(s: Any, memory: Array, pose: Array, filtered: Array) -> None:
+def _begin(s: FilterState, memory: Array, pose: Array, filtered: Array) -> None:
     """Begin anew at a reading: it passes, and nothing of before is remembered."""
     s.begun += 1
     s.is_retuned = s.is_other = 0
@@ -53,7 +62,7 @@ def _begin(s: Any, memory: Array, pose: Array, filtered: Array) -> None:
 
 
 @inner
-def _filter(s: Any, part: Any, i: int, value: float, elapsed_ns: int) -> float:
+def _filter(s: FilterState, part: Part, i: int, value: float, elapsed_ns: int) -> float:
     """Filtered value of a coordinate; a long period is split, on a straight line between values."""
     pieces = 1 + (elapsed_ns - 1) // LONGEST_NS
     period = 1e-9 * elapsed_ns / pieces
@@ -73,7 +82,7 @@ def _is_finite(values: Array) -> bool:
 
 
 @inner
-def _fade(s: Any, period: float, filtered: Array) -> None:
+def _fade(s: FilterState, period: float, filtered: Array) -> None:
     """Go on from where the old parameters left, and towards what the new ones say."""
     for i in range(3):
         if s.is_retuned > 0:
@@ -84,7 +93,7 @@ def _fade(s: Any, period: float, filtered: Array) -> None:
 
 
 @inner
-def _follow(s: Any, part: Any, pose: Array, elapsed_ns: int, filtered: Array) -> None:
+def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: Array) -> None:
     """Write the filtered position of a sample that follows another one."""
     if s.is_other > 0:
         _begin(s, part.memory, pose, filtered)
@@ -96,7 +105,9 @@ def _follow(s: Any, part: Any, pose: Array, elapsed_ns: int, filtered: Array) ->
 
 
 @kernel
-def tremor_filter_step(p: Any, s: Any, part: Any, row: Any, dt: float) -> None:
+def tremor_filter_step(
+    p: PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float
+) -> None:
     """One master sample: write master_filtered_cp and master_filtered_out.
 
     The position is filtered coordinate by coordinate, over the time between stamps; the orientation
@@ -134,7 +145,7 @@ class RunningTremorFilter(RunningStage):
 
     def __init__(self, parameters: TremorFilterParameters, dt: float = DT) -> None:
         super().__init__(TREMOR_FILTER, 0, dt)
-        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
+        self.parameters, self.state = record(PlausibilityNumbers), record(FilterState)
         self.kernel = tremor_filter_step
         self._part = Part(None, np.empty(0), np.zeros((3, MEMORY)))
         self._begin = self.signals.copy()

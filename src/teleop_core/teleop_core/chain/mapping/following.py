@@ -6,27 +6,40 @@ answer takes, for it may be followed still; then the slave goes its own way, and
 where it is.
 """
 
-from typing import Any
-
-from teleop_core.graph.signals import Field
+from teleop_core.graph.row import Row
 from teleop_core.graph.topics import NO_COMMAND_NS, SELDOM_NS
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields
 
-FOLLOWING_STATE: list[Field] = [
-    ("in_force_ns", "i8"), ("rose_ns", "i8"), ("lag_ns", "i8"), ("lost_ns", "i8"),
-    ("felt_ns", "i8"), ("felt_at_ns", "i8"), ("seen_ns", "i8"), ("seen_at_ns", "i8"),
-]  # fmt: skip
-"""Stamp in force; when it rose last, and how far behind the last command it was; since when the
-slave does not follow; stamp of the slave's force, and when that rose last; the same of where it
-was measured [ns]."""
+
+class FollowingNumbers(Fields):
+    """Fields of a parameter record with how long is waited."""
+
+    timeout_ns: int
+    pause_ns: int
+
+
+class FollowingState(Fields):
+    """Fields of a state record with what was heard of the slave."""
+
+    last_ns: int  # stamp of the last command
+    is_engaged: int
+    in_force_ns: int  # stamp in force
+    rose_ns: int  # when it rose last
+    lag_ns: int  # how far behind the last command it was then
+    lost_ns: int  # since when the slave does not follow
+    felt_ns: int  # stamp of its force
+    felt_at_ns: int  # when that rose last
+    seen_ns: int  # stamp of where it was measured
+    seen_at_ns: int  # when that rose last
 
 
 @inner
-def hear(s: Any, row: Any) -> None:
+def hear(s: FollowingState, row: Row) -> None:
     """Note when the slave was heard last, of a sample that has come.
 
     Args:
-        s: State record with :data:`FOLLOWING_STATE`; written.
+        s: State; written.
         row: Signals.
     """
     now_ns, stamp_ns = row.master_measured_cp_ns, row.slave_setpoint_cp_ns
@@ -43,19 +56,19 @@ def hear(s: Any, row: Any) -> None:
 
 
 @inner
-def is_felt(p: Any, s: Any, row: Any) -> bool:
+def is_felt(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
     """Whether the slave's force was heard of lately; one that does not change is sent seldom."""
     return bool(row.master_measured_cp_ns - s.felt_at_ns <= p.timeout_ns + SELDOM_NS)
 
 
 @inner
-def is_seen(p: Any, s: Any, row: Any) -> bool:
+def is_seen(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
     """Whether it was heard lately where the slave is."""
     return bool(row.master_measured_cp_ns - s.seen_at_ns <= p.timeout_ns)
 
 
 @inner
-def follows(p: Any, s: Any, row: Any) -> bool:
+def follows(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
     """Whether the slave had the last command in force, or newer ones keep coming into force.
 
     It does not after a pause of the master.
@@ -67,7 +80,7 @@ def follows(p: Any, s: Any, row: Any) -> bool:
 
 
 @inner
-def is_in_doubt(p: Any, s: Any, is_following: bool, row: Any) -> bool:
+def is_in_doubt(p: FollowingNumbers, s: FollowingState, is_following: bool, row: Row) -> bool:
     """Whether nobody knows where a slave is that does not follow: far away, or not heard of."""
     now_ns = row.master_measured_cp_ns
     if is_following:

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from teleop_core.base.parameters import parameter
+from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign, copy
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
@@ -18,7 +19,8 @@ from teleop_core.graph.topics import (
     Limit,
     limit_text,
 )
-from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import Fields, PerJoint, record
 from teleop_core.kernels.geometry import Array, rotation_vector_between, transform_from_pose
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.kinematics import IkStatus
@@ -51,6 +53,25 @@ class InverseKinematicsParameters(RobotParameters):
     )  # fmt: skip
 
 
+class SolverNumbers(Fields):
+    """Parameter record of the inverse kinematics."""
+
+    speed: PerJoint  # rated [rad/s or m/s]
+    longest_ns: int
+    timeout_ns: int
+    tolerance: Annotated[Array, 2]  # of place and turn [m, rad]
+
+
+class SolverState(Fields):
+    """State record of the inverse kinematics."""
+
+    last_ns: int
+    asked: int
+    limited: int
+    limit: int
+    joint: int
+
+
 class Solver(NamedTuple):
     """Solver of one robot with room to work in: plain arrays, which robot kernels take."""
 
@@ -71,7 +92,6 @@ _STATUS, _LIMIT, _JOINT, _RESIDUAL, _CUT = 0, 1, 2, 3, 5
 _NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
 _SINGULAR, _SLOW = int(Limit.SINGULARITY), int(Limit.SPEED)
 _FOLLOWED, _NEAR_SINGULAR = int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR)
-_STATE = [(name, "i8") for name in ("last_ns", "asked", "limited", "limit", "joint")]
 # A step [rad or m] that no speed limit is: a path still, but one that has all the time it needs.
 _ANY_STEP = 1e6
 # Full speed for this long [s] is what a command may ask for that comes alone, or first: the slave
@@ -98,7 +118,7 @@ def _joint_at_limit(q: Array, limits: Array) -> int:
 
 
 @inner
-def _explain(p: Any, solver: Any, reach: Array) -> None:
+def _explain(p: SolverNumbers, solver: Solver, reach: Array) -> None:
     """Write why the arm falls short, and by what the command lies beyond its reach.
 
     The pose is solved again as if there were time enough. If that reaches it, the arm only lags,
@@ -129,7 +149,7 @@ def _explain(p: Any, solver: Any, reach: Array) -> None:
 
 
 @inner
-def _has_own_way(s: Any, solver: Any, row: Any, timeout_ns: int) -> bool:
+def _has_own_way(s: SolverState, solver: Solver, row: Row, timeout_ns: int) -> bool:
     """Whether the slave does not follow: its setpoint is an old one, or moves by itself."""
     if row.slave_setpoint_js_ns > NO_COMMAND_NS:
         return bool(s.last_ns - row.slave_setpoint_js_ns > timeout_ns)
@@ -141,7 +161,7 @@ def _has_own_way(s: Any, solver: Any, row: Any, timeout_ns: int) -> bool:
 
 
 @inner
-def _goes_far(p: Any, solver: Any) -> bool:
+def _goes_far(p: SolverNumbers, solver: Solver) -> bool:
     """Whether the answer turns a joint farther than small motions of the tip need."""
     for i in range(solver.q.shape[0]):
         if abs(solver.q[i] - solver.seed[i]) > _FAR * p.speed[i]:
@@ -150,7 +170,7 @@ def _goes_far(p: Any, solver: Any) -> bool:
 
 
 @inner
-def _solve(p: Any, solver: Any, time: float, is_alone: bool) -> int:
+def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int:
     """Write the answer within ``time`` [s] of full speed, or all the way to a command alone.
 
     Next to a singularity a tremor of the first command would turn joints far for nothing: such
@@ -175,7 +195,9 @@ def _solve(p: Any, solver: Any, time: float, is_alone: bool) -> int:
 
 
 @kernel
-def inverse_kinematics_step(p: Any, s: Any, solver: Any, row: Any, dt: float) -> None:
+def inverse_kinematics_step(
+    p: SolverNumbers, s: SolverState, solver: Solver, row: Row, dt: float
+) -> None:
     """One slave pose: write slave_servo_jp and slave_reach.
 
     The answer is the neighbour of the last one; while the slave does not follow, of the slave's
@@ -217,9 +239,7 @@ class InverseKinematics(RunningStage):
         self.robot = load_robot_set(parameters.robot, parameters.geometry)
         n = self.robot.n
         super().__init__(INVERSE_KINEMATICS, n, dt)
-        numbers = [("speed", "f8", (n,)), ("longest_ns", "i8"), ("timeout_ns", "i8"),
-                   ("tolerance", "f8", (2,))]  # fmt: skip
-        self.parameters, self.state = records(numbers)[0], records(_STATE)[0]
+        self.parameters, self.state = record(SolverNumbers, n), record(SolverState)
         self._solver = Solver(
             self.robot.fk_pointer, self.robot.ik_pointer, self.robot.limits(dt).copy(),
             self.robot.geometry_row.copy(), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(n),

@@ -6,12 +6,14 @@ beyond which the limit is dragged along; that is what the hand feels and what th
 """
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
+from teleop_core.graph.row import Row
 from teleop_core.graph.topics import SLAVE_REACH, Limit
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, PoseRow, Quaternion, Vector3
 from teleop_core.kernels.geometry import (
     Array,
     invert_quaternion,
@@ -24,19 +26,44 @@ from teleop_core.kernels.geometry import (
 
 SENT = 8192
 """Commands that are remembered until the answer comes how far they could be followed."""
-SENT_FIELDS = [("stamp_ns", "i8"), ("moved", "f8", (3,)), ("turned", "f8", (4,))]
-LIMIT_FIELDS = [
-    # What was cut off all commands so far, which of them was answered last, how many were sent.
-    ("moved", "f8", (3,)), ("turned", "f8", (4,)), ("answered_ns", "i8"), ("sent", "i8"),
-    ("limit", "i8"), ("joint", "i8"), ("until_ns", "i8"),
-    # Where the hand met the limit, which way is out, and how far beyond it is: place [m] in the
-    # slave's axes, turn [rad] in those of the tool. The hand stands against the limit while a
-    # depth is positive.
-    ("anchor", "f8", (3,)), ("out", "f8", (3,)), ("depth", "f8"),
-    ("turn_anchor", "f8", (4,)), ("turn_out", "f8", (3,)), ("turn_depth", "f8"),
-    # Depths when something was cut off last: who gets farther out has left the limit.
-    ("met", "f8"), ("turn_met", "f8"),
-]  # fmt: skip
+
+
+class Sent(Fields):
+    """What was cut off all commands before one that was sent."""
+
+    stamp_ns: int
+    moved: Vector3
+    turned: Quaternion
+
+
+class LimitState(Fields):
+    """Fields of a state record with the limit that hand and slave meet.
+
+    Places [m] are in the slave's axes, turns [rad] in those of the tool. The hand stands against
+    the limit while a depth is positive.
+    """
+
+    command: PoseRow
+    hand: Vector3  # where the hand leads the slave [m]
+    tool: Quaternion  # how it turns it
+    alignment: Quaternion
+    moved: Vector3  # what was cut off all commands so far
+    turned: Quaternion
+    answered_ns: int  # which of them was answered last
+    sent: int  # how many there were
+    limit: int
+    joint: int
+    until_ns: int
+    anchor: Vector3  # where the hand met the limit
+    out: Vector3  # which way is out
+    depth: float  # how far beyond it is
+    turn_anchor: Quaternion
+    turn_out: Vector3
+    turn_depth: float
+    met: float  # depths when something was cut off last: who gets farther out has left the limit
+    turn_met: float
+
+
 _LIMIT, _JOINT, _CUT = (SLAVE_REACH.columns.index(name) for name in ("limit", "joint", "cut_x"))
 _NONE, _AT_JOINT, _BEYOND = int(Limit.NONE), int(Limit.JOINT), int(Limit.WORKSPACE)
 # A limit is told for this long after the last command that met it [ns].
@@ -50,16 +77,16 @@ _ROUNDING = 1e-9
 
 
 @inner
-def forget_limits(s: Any) -> None:
+def forget_limits(s: LimitState) -> None:
     """Stand against no limit, as when the hand lets go of the slave."""
     s.limit, s.joint, s.until_ns = _NONE, -1, 0
     s.depth = s.turn_depth = 0.0
 
 
 @inner
-def remember(s: Any, sent: Any, stamp_ns: int) -> None:
+def remember(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> None:
     """Note how far a command that is sent now is drawn back already."""
-    entry = sent[s.sent % sent.shape[0]]
+    entry = sent[s.sent % len(sent)]
     entry.stamp_ns = stamp_ns
     for i in range(3):
         entry.moved[i] = s.moved[i]
@@ -69,9 +96,9 @@ def remember(s: Any, sent: Any, stamp_ns: int) -> None:
 
 
 @inner
-def _found(s: Any, sent: Any, stamp_ns: int) -> int:
+def _found(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> int:
     """Place of the command with a stamp; -1 if it is too old to be known."""
-    count = sent.shape[0]
+    count = len(sent)
     for back in range(1, min(count, s.sent) + 1):
         at = (s.sent - back) % count
         if sent[at].stamp_ns <= stamp_ns:
@@ -80,7 +107,7 @@ def _found(s: Any, sent: Any, stamp_ns: int) -> int:
 
 
 @inner
-def draw_back(s: Any, sent: Any, gain: float, row: Any) -> None:
+def draw_back(s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> None:
     """Take the answer to an earlier command: move the present one as far as that one was cut.
 
     What was cut off since that command was sent is not cut twice.
@@ -110,7 +137,7 @@ def draw_back(s: Any, sent: Any, gain: float, row: Any) -> None:
 
 
 @inner
-def _move_back(s: Any, entry: Any, gain: float, reach: Array) -> None:
+def _move_back(s: LimitState, entry: Sent, gain: float, reach: Array) -> None:
     cut, square = np.empty(3), 0.0
     for i in range(3):
         cut[i] = entry.moved[i] + reach[_CUT + i] - s.moved[i]
@@ -129,7 +156,7 @@ def _move_back(s: Any, entry: Any, gain: float, reach: Array) -> None:
 
 
 @inner
-def _turn_back(s: Any, entry: Any, reach: Array) -> None:
+def _turn_back(s: LimitState, entry: Sent, reach: Array) -> None:
     wanted, cut = np.empty(4), np.empty(3)
     for i in range(4):
         wanted[i] = entry.turned[i]
@@ -153,7 +180,7 @@ def _turn_back(s: Any, entry: Any, reach: Array) -> None:
 
 
 @inner
-def align(s: Any) -> None:
+def align(s: LimitState) -> None:
     """Let the hand's present orientation mean that of the command."""
     inverse = np.empty(4)
     invert_quaternion(s.tool, inverse)
@@ -161,7 +188,7 @@ def align(s: Any) -> None:
 
 
 @inner
-def _anchor_turn(s: Any) -> None:
+def _anchor_turn(s: LimitState) -> None:
     """Put the anchor where the hand's orientation is, less the depth."""
     x, y, z = s.turn_out[0], s.turn_out[1], s.turn_out[2]
     back = -s.turn_depth
@@ -169,7 +196,7 @@ def _anchor_turn(s: Any) -> None:
 
 
 @inner
-def measure_depth(s: Any, most: float, now_ns: int) -> None:
+def measure_depth(s: LimitState, most: float, now_ns: int) -> None:
     """Measure how far the hand stands against the limit now; beyond it no limit is told.
 
     Args:

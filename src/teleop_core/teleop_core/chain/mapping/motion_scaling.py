@@ -1,18 +1,25 @@
 """Motion scaling: from the master's pose to the slave's, with modes, clutch and fixture."""
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from teleop_core.base.parameters import values_of
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import FIXTURES
-from teleop_core.chain.mapping.following import FOLLOWING_STATE, follows, hear, is_in_doubt
+from teleop_core.chain.mapping.following import (
+    FollowingNumbers,
+    FollowingState,
+    follows,
+    hear,
+    is_in_doubt,
+)
 from teleop_core.chain.mapping.limits import (
-    LIMIT_FIELDS,
     SENT,
-    SENT_FIELDS,
+    LimitState,
+    Sent,
     align,
     draw_back,
     forget_limits,
@@ -29,26 +36,28 @@ from teleop_core.chain.mapping.parameters import (
     tool_maps,
 )
 from teleop_core.chain.mapping.plausibility import (
-    PLAUSIBILITY_PARAMETERS,
-    PLAUSIBILITY_STATE,
+    PlausibilityNumbers,
+    PlausibilityState,
     has_lost_buttons,
     is_plausible,
     take_hand,
 )
 from teleop_core.chain.mapping.reflection import (
-    REFLECTION_PARAMETERS,
-    REFLECTION_STATE,
+    Law,
+    ReflectionNumbers,
+    ReflectionState,
     make_law,
     reflect,
 )
 from teleop_core.chain.mapping.walls import (
-    WALL_PARAMETERS,
-    WALL_STATE,
     WALLS,
+    WallNumbers,
+    WallState,
     damped_wall,
     forget_wall,
     wall_force,
 )
+from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, STATE, assign, copy
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
@@ -63,7 +72,8 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
 )
-from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import Integers, Quaternion, Vector3, record, record_array
 from teleop_core.kernels.geometry import (
     Array,
     multiply_quaternions,
@@ -72,20 +82,34 @@ from teleop_core.kernels.geometry import (
 )
 from teleop_core.kernels.parts import numbers_of
 
-_PARAMETERS = [
-    ("gain", "f8", (2,)), ("stylus_tool", "f8", (4,)), ("slave_master", "f8", (4,)),
-    ("axis", "i8", (3,)), ("sign", "f8", (3,)),
-    ("size", "f8", (3,)), *WALL_PARAMETERS, ("timeout_ns", "i8"), ("pause_ns", "i8"),
-    ("rotation_gain", "f8"), ("reach_stiffness", "f8"), ("reach_depth", "f8"),
-    *REFLECTION_PARAMETERS, *PLAUSIBILITY_PARAMETERS,
-]  # fmt: skip
-_STATE = [
-    ("buttons", "f8", (3,)), ("is_fine", "i8"), ("is_engaged", "i8"), ("must_latch", "i8"),
-    ("is_fixture_on", "i8"), ("last_ns", "i8"),
-    ("center", "f8", (3,)), ("master", "f8", (3,)), ("stylus", "f8", (3,)), ("command", "f8", (7,)),
-    ("alignment", "f8", (4,)), ("hand", "f8", (3,)), ("tool", "f8", (4,)), *LIMIT_FIELDS,
-    *WALL_STATE, *PLAUSIBILITY_STATE, ("aligned", "i8"), *REFLECTION_STATE, *FOLLOWING_STATE,
-]  # fmt: skip
+
+class ScalingNumbers(WallNumbers, ReflectionNumbers, PlausibilityNumbers, FollowingNumbers):
+    """Parameter record of the motion scaling."""
+
+    gain: Annotated[Array, 2]  # coarse, fine
+    stylus_tool: Quaternion
+    slave_master: Quaternion
+    axis: Annotated[Integers, 3]
+    sign: Vector3
+    size: Vector3  # of the fixture [m]
+    rotation_gain: float
+    reach_stiffness: float  # [N/m]
+    reach_depth: float  # [m]
+
+
+class ScalingState(LimitState, WallState, PlausibilityState, ReflectionState, FollowingState):
+    """State record of the motion scaling."""
+
+    buttons: Vector3
+    is_fine: int
+    must_latch: int
+    is_fixture_on: int
+    center: Vector3  # of the fixture [m]
+    master: Vector3
+    stylus: Vector3
+    aligned: int
+
+
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
 _CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
@@ -97,7 +121,7 @@ _LONG = 1e-3
 
 
 @kernel
-def to_slave_axes(p: Any, master: Array, slave: Array) -> None:
+def to_slave_axes(p: ScalingNumbers, master: Array, slave: Array) -> None:
     """Write a vector (3,) of the master's base in the slave's axes."""
     x, y, z = (
         p.sign[0] * master[p.axis[0]], p.sign[1] * master[p.axis[1]], p.sign[2] * master[p.axis[2]]
@@ -106,14 +130,14 @@ def to_slave_axes(p: Any, master: Array, slave: Array) -> None:
 
 
 @kernel
-def mapped_orientation(p: Any, stylus: Array, tool: Array) -> None:
+def mapped_orientation(p: ScalingNumbers, stylus: Array, tool: Array) -> None:
     """Write the slave tool's quaternion that matches a stylus quaternion, before alignment."""
     multiply_quaternions(p.slave_master, stylus, tool)
     multiply_quaternions(tool, p.stylus_tool, tool)
 
 
 @inner
-def _take_tool(p: Any, s: Any, pose: Array, turn: Array) -> None:
+def _take_tool(p: ScalingNumbers, s: ScalingState, pose: Array, turn: Array) -> None:
     """Take the orientation that the hand asks for, and, if only a share of it counts, its turn."""
     if p.rotation_gain == 1.0:
         mapped_orientation(p, pose[3:7], s.tool)
@@ -126,14 +150,14 @@ def _take_tool(p: Any, s: Any, pose: Array, turn: Array) -> None:
 
 
 @inner
-def _toggle_mode(s: Any, buttons: Array) -> None:
+def _toggle_mode(s: ScalingState, buttons: Array) -> None:
     """Change the mode at the rising edge of its button."""
     if buttons[2] > s.buttons[2]:
         s.is_fine = 1 - s.is_fine
 
 
 @inner
-def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
+def _toggle_fixture(s: ScalingState, buttons: Array, position: Array) -> None:
     """Put the fixture around the present position, or take it away, at the rising edge."""
     if buttons[1] > s.buttons[1]:
         s.is_fixture_on = 1 - s.is_fixture_on
@@ -142,7 +166,7 @@ def _toggle_fixture(s: Any, buttons: Array, position: Array) -> None:
 
 
 @inner
-def _latch(s: Any, stylus: Array) -> None:
+def _latch(s: ScalingState, stylus: Array) -> None:
     """Hold the command and measure further motion from here: no step, whatever happened before.
 
     The fixture goes with the hand, so that it stays where it is around the slave.
@@ -155,7 +179,7 @@ def _latch(s: Any, stylus: Array) -> None:
 
 
 @inner
-def _move(p: Any, s: Any, gain: float, position: Array, turn: Array) -> None:
+def _move(p: ScalingNumbers, s: ScalingState, gain: float, position: Array, turn: Array) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = np.empty(3)
     for i in range(3):
@@ -178,7 +202,9 @@ def _move(p: Any, s: Any, gain: float, position: Array, turn: Array) -> None:
 
 
 @inner
-def _wall(p: Any, s: Any, fixture: Any, period: float, stylus: Array, force: Array) -> None:
+def _wall(
+    p: ScalingNumbers, s: ScalingState, fixture: "Shape", period: float, stylus: Array, force: Array
+) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
     length = 0.0
     if s.is_fixture_on:
@@ -195,7 +221,7 @@ def _wall(p: Any, s: Any, fixture: Any, period: float, stylus: Array, force: Arr
 
 
 @inner
-def _push_back(p: Any, s: Any, force: Array) -> None:
+def _push_back(p: ScalingNumbers, s: ScalingState, force: Array) -> None:
     """Add the push of the slave's limit, in the master's base, to the force (3,) [N]."""
     push = p.reach_stiffness * s.depth
     if push > 0.0:
@@ -204,7 +230,7 @@ def _push_back(p: Any, s: Any, force: Array) -> None:
 
 
 @inner
-def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
+def _report(p: ScalingNumbers, s: ScalingState, gain: float, is_following: bool, row: Row) -> None:
     """Write teleop_state; the fixture in the slave's base, where it holds the slave in."""
     state = row.teleop_state
     state[_FOLLOWING] = 1.0 if is_following else 0.0
@@ -226,7 +252,13 @@ def _report(p: Any, s: Any, gain: float, is_following: bool, row: Any) -> None:
 
 @inner
 def _refuse(
-    p: Any, s: Any, sent: Any, is_following: bool, is_doubtful: bool, stylus: Array, row: Any
+    p: ScalingNumbers,
+    s: ScalingState,
+    sent: Sequence[Sent],
+    is_following: bool,
+    is_doubtful: bool,
+    stylus: Array,
+    row: Row,
 ) -> None:
     """Answer a sample that no hand can have made: hold, push with nothing, begin anew after it."""
     s.must_latch = 1
@@ -245,14 +277,20 @@ def _refuse(
 
 @kernel
 def motion_scaling_step(
-    p: Any, s: Any, sent: Any, fixture: Any, law: Any, row: Any, dt: float
+    p: ScalingNumbers,
+    s: ScalingState,
+    sent: Sequence[Sent],
+    fixture: "Shape",
+    law: Law,
+    row: Row,
+    dt: float,
 ) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
 
     Args:
         p: Parameter record.
         s: State record; written.
-        sent: Records of :data:`~teleop_core.chain.mapping.limits.SENT_FIELDS`; written.
+        sent: Records of :class:`~teleop_core.chain.mapping.limits.Sent`; written.
         fixture: :class:`Shape`.
         law: :class:`~teleop_core.chain.mapping.reflection.Law`; written.
         row: Signals.
@@ -326,8 +364,8 @@ class MotionScaling(RunningStage):
     def __init__(self, parameters: MotionScalingParameters, dt: float = DT) -> None:
         super().__init__(MOTION_SCALING, 0, dt)
         self.changes_itself = True  # its mode, by a button
-        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
-        self._sent = records(SENT_FIELDS, SENT)
+        self.parameters, self.state = record(ScalingNumbers), record(ScalingState)
+        self._sent = record_array(Sent, SENT)
         self._values = parameters
         self.kernel = motion_scaling_step
         self._shape = Shape(None, np.empty(0), np.zeros(3), np.zeros(3))

@@ -7,10 +7,11 @@ from where it is then. So a teleport moves nothing, and neither do random poses.
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from teleop_core.base.parameters import parameter
+from teleop_core.graph.row import Row
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, PoseRow, Vector3
 from teleop_core.kernels.geometry import Array
 
 
@@ -46,33 +47,49 @@ class PlausibilityParameters(HandLimits):
     )  # fmt: skip
 
 
-PLAUSIBILITY_PARAMETERS = [
-    ("hand_speed", "f8"), ("hand_acceleration", "f8"), ("hand_turn", "f8"), ("hand_reach", "f8"),
-    ("silence_ns", "i8"),
-]  # fmt: skip
-PLAUSIBILITY_STATE = [
-    ("raw", "f8", (7,)), ("raw_rate", "f8", (3,)), ("raw_ns", "i8"), ("implausible", "i8"),
-    ("is_doubted", "i8"), ("is_lost", "i8"), ("in_row", "i8"), ("buttons_ns", "i8"),
-]  # fmt: skip
+class PlausibilityNumbers(Fields):
+    """Fields of a parameter record with what a hand can do."""
+
+    hand_speed: float  # [m/s]
+    hand_acceleration: float  # [m/s²]
+    hand_turn: float  # [rad/s]
+    hand_reach: float  # [m]
+    silence_ns: int  # of buttons
+    pause_ns: int  # after which anything is plausible
+
+
+class PlausibilityState(Fields):
+    """Fields of a state record with the last readings."""
+
+    raw: PoseRow
+    raw_rate: Vector3
+    raw_ns: int
+    implausible: int
+    is_doubted: int
+    is_lost: int
+    in_row: int
+    buttons_ns: int
+
+
 # Samples that come faster than this [s] are taken to be so far apart: stamps may be uneven.
 _SHORTEST = 1e-3
 # So many messages no farther apart than this are a stream [ns].
 _STREAM, _STREAM_NS = 20, 100_000_000
 
 
-def take_hand(p: Any, hand: HandLimits) -> None:
-    """Write what a hand can do into a record with :data:`PLAUSIBILITY_PARAMETERS`."""
+def take_hand(p: PlausibilityNumbers, hand: HandLimits) -> None:
+    """Write what a hand can do into a parameter record."""
     p["hand_speed"], p["hand_acceleration"] = hand.speed, hand.acceleration
     p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
 
 
 @inner
-def is_plausible(p: Any, s: Any, pose: Array, stamp_ns: int) -> bool:
+def is_plausible(p: PlausibilityNumbers, s: PlausibilityState, pose: Array, stamp_ns: int) -> bool:
     """Whether a hand can have come from the last sample to this one; counts those that cannot.
 
     Args:
-        p: Record with :data:`PLAUSIBILITY_PARAMETERS`, and ``pause_ns``, after which anything is.
-        s: Record with :data:`PLAUSIBILITY_STATE`; written.
+        p: Parameters.
+        s: State; written.
         pose: Sample (7,).
         stamp_ns: Its stamp [ns].
     """
@@ -111,7 +128,7 @@ def _turn(before: Array, after: Array) -> float:
 
 
 @inner
-def has_lost_buttons(p: Any, s: Any, row: Any) -> bool:
+def has_lost_buttons(p: PlausibilityNumbers, s: PlausibilityState, row: Row) -> bool:
     """Whether the buttons came as a stream and are silent now: nobody can tell a pressed clutch.
 
     Masters that send them where they change only have no stream of them.

@@ -1,25 +1,38 @@
 """Reflection: what the hand feels of the slave, and the tank that pays for it."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from teleop_core.chain.architectures import MEMORY, Architecture
 from teleop_core.chain.mapping.following import is_felt, is_seen
-from teleop_core.graph.signals import Field
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, Integers, Vector3
 from teleop_core.kernels.geometry import Array
 
-REFLECTION_PARAMETERS: list[Field] = [
-    ("is_reflected", "i8"), ("reflected_most", "f8"), ("has_tank", "i8")
-]  # fmt: skip
-REFLECTION_STATE: list[Field] = [
-    ("heard", "f8"), ("seen", "f8"), ("tank", "f8"),
-    ("push", "f8", (3,)), ("pushed_at", "f8", (3,)), ("pushed_way", "f8"),
-]  # fmt: skip
-"""Share of the force and of the slave's place that counts, energy in the tank [J], the last push
-[N], where it began [m], and how far the hand went with it [m]."""
+
+class ReflectionNumbers(Fields):
+    """Fields of a parameter record with what comes back."""
+
+    is_reflected: int
+    reflected_most: float  # [N]
+    has_tank: int
+    axis: Annotated[Integers, 3]  # axes of master and slave
+    sign: Vector3
+
+
+class ReflectionState(Fields):
+    """Fields of a state record with what the hand feels."""
+
+    heard: float  # share of the force that counts
+    seen: float  # share of the slave's place that counts
+    tank: float  # energy [J]
+    push: Vector3  # the last one [N]
+    pushed_at: Vector3  # where it began [m]
+    pushed_way: float  # how far the hand went with it [m]
+
+
 # Time [s] over which what comes from afar sets in, or fades where nothing comes any more.
 _FADE = 0.1
 # Of a tank: push that an empty one allows [N], and a step of the device's reading [m].

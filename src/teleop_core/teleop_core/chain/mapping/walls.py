@@ -12,16 +12,29 @@ bends it switches on and off, and contacts that the damper alone makes passive g
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import Fields, Vector3
 from teleop_core.kernels.geometry import Array
 
-WALL_PARAMETERS = [
-    ("stiffness", "f8"), ("max_force", "f8"), ("damping", "f8"), ("is_damped", "i8"),
-]  # fmt: skip
-WALL_STATE = [("felt", "f8", (3,)), ("rate", "f8", (3,))]
-"""Of the last sample: place [m], and its smoothed rate [m/s]."""
+
+class WallNumbers(Fields):
+    """Fields of a parameter record with the wall of a fixture."""
+
+    stiffness: float  # [N/m]
+    max_force: float  # [N]
+    damping: float  # [N·s/m]
+    is_damped: int
+
+
+class WallState(Fields):
+    """Fields of a state record with the last sample."""
+
+    felt: Vector3  # place [m]
+    rate: Vector3  # its smoothed rate [m/s]
+
+
 # The rate is that of the readings through a first-order lag that takes the time in which the hand
 # goes this far [m], within bounds [s]. A step of the reading within a period would else be a blow,
 # which throws the light device back; so slow motion needs a wide window, fast motion a short one
@@ -102,7 +115,13 @@ def _along(rate: Array, depth: Array, length: float) -> float:
 
 @kernel
 def damped_wall(
-    p: Any, s: Any, place: Array, depth: Array, length: float, period: float, force: Array
+    p: WallNumbers,
+    s: WallState,
+    place: Array,
+    depth: Array,
+    length: float,
+    period: float,
+    force: Array,
 ) -> None:
     """Write the push (3,) [N] of a wall that gives back less than it took, if it is soft enough.
 
@@ -113,8 +132,8 @@ def damped_wall(
     What it has beyond takes the energy that steps of the reading and bending of the device give.
 
     Args:
-        p: Record with :data:`WALL_PARAMETERS`.
-        s: Record with :data:`WALL_STATE`; written.
+        p: Parameters.
+        s: State; written.
         place: Reading of the hand (3,) [m].
         depth: Vector (3,) [m] from the nearest point of the fixture to it.
         length: Its length [m]; 0 inside.
@@ -164,7 +183,7 @@ def passive_stiffness(
 
 
 @inner
-def forget_wall(s: Any, place: Array) -> None:
+def forget_wall(s: WallState, place: Array) -> None:
     """Begin at rest at a reading (3,) [m]."""
     for i in range(3):
         s.felt[i], s.rate[i] = place[i], 0.0

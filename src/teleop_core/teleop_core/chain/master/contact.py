@@ -1,21 +1,27 @@
 """Contact: the energy that a stretch of the device's force took from the hand and gave back."""
 
 import math
-from typing import Any
 
 from teleop_core.graph.topics import MASTER_CONTACT
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, Vector3
 from teleop_core.kernels.geometry import Array
 
-CONTACT_STATE = [("tip", "f8", (3,)), ("is_touched", "i8")]
 _NUMBER, _TAKEN, _RETURNED, _FRICTION = (
     MASTER_CONTACT.columns.index(name) for name in ("number", "taken", "returned", "friction")
 )
 
 
+class ContactState(Fields):
+    """Fields of a state record with the present contact."""
+
+    tip: Vector3  # where the tip of the stylus was [m]
+    is_touched: int
+
+
 @inner
 def account(
-    s: Any, force: Array, friction: float, moved: float, place: Array, contact: Array
+    s: ContactState, force: Array, friction: float, moved: float, place: Array, contact: Array
 ) -> None:
     """Add the energy of a tick to the present contact; a new one begins where force begins.
 
@@ -25,7 +31,7 @@ def account(
     of what is given back a part never reaches the hand.
 
     Args:
-        s: Record with :data:`CONTACT_STATE`; written.
+        s: State; written.
         force: What the device applied during the tick (3,) [N].
         friction: Dry friction of the device [N].
         moved: Way of the device against friction during the tick [m].

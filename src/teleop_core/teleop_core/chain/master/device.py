@@ -7,6 +7,7 @@ import numpy as np
 
 from teleop_core.base.parameters import parameter
 from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import Fields, Quaternion, Vector3
 from teleop_core.kernels.geometry import (
     Array,
     compose,
@@ -97,8 +98,26 @@ class Handle(NamedTuple):
     residual: Array
 
 
+class ReadingNumbers(Fields):
+    """Fields of a parameter record with how finely the device reads."""
+
+    resolution: float  # of its place [m]
+    gimbal: float  # bound of the noise of its attitude [rad]
+
+
+class ReadingState(Fields):
+    """Fields of a state record with what was read last."""
+
+    reading: Vector3  # [m]
+    rate: Vector3  # [m/s]
+    attitude: Quaternion
+    turning: Vector3  # [rad/s]
+
+
 @kernel
-def read_phantom(p: Any, position: Array, attitude: Array, noise: Array, pose: Array) -> None:
+def read_phantom(
+    p: ReadingNumbers, position: Array, attitude: Array, noise: Array, pose: Array
+) -> None:
     """Write the pose (7,) that the Phantom reads: place in steps, attitude with noise (3,)."""
     wobble = np.empty(3)
     for i in range(3):
@@ -111,7 +130,7 @@ def read_phantom(p: Any, position: Array, attitude: Array, noise: Array, pose: A
 
 
 @kernel
-def read_handle(handle: Any, position: Array, attitude: Array, pose: Array) -> None:
+def read_handle(handle: Handle, position: Array, attitude: Array, pose: Array) -> None:
     """Write the pose (7,) that a jointed handle reads: its joints in encoder steps, through fk.
 
     The hand moves the tip; the joints that go with it come from the inverse kinematics, next to
@@ -134,7 +153,7 @@ def read_handle(handle: Any, position: Array, attitude: Array, pose: Array) -> N
 
 
 @inner
-def measure_twist(s: Any, pose: Array, twist: Array, dt: float) -> None:
+def measure_twist(s: ReadingState, pose: Array, twist: Array, dt: float) -> None:
     """Write the twist (6,) from the readings of two samples through a 5 ms low-pass."""
     share = dt / (dt + 5e-3)
     for i in range(3):

@@ -2,12 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from teleop_core.base.parameters import parameter
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, Vector3
 from teleop_core.kernels.geometry import Array
 
 _STEPS = 2
@@ -34,8 +34,35 @@ class HandParameters:
     )  # fmt: skip
 
 
+class HandNumbers(Fields):
+    """Fields of a parameter record with the mechanics of hand and device."""
+
+    mass: float  # of the hand [kg]
+    stiffness: float  # of its grip [N/m]
+    damping: float  # of its grip [N·s/m]
+    friction: float  # dry, of the device [N]
+    device_mass: float  # [kg]
+    device_damping: float  # [N·s/m]
+    device_stiffness: Vector3  # [N/m]
+    joined_share: Vector3
+    lightness: Vector3  # [1/kg]
+    hand_lightness: Vector3  # [1/kg]
+    center: Vector3  # of the workspace [m]
+    half: Vector3  # of its sides [m]
+
+
+class HandState(Fields):
+    """Fields of a state record with where both are."""
+
+    position: Vector3  # of the device [m]
+    speed: Vector3  # [m/s]
+    hand: Vector3  # where the hand is [m]
+    hand_speed: Vector3
+    wanted: Vector3  # where it wants to be [m]
+
+
 @inner
-def move_hand(p: Any, s: Any, wanted: Array, force: Array, dt: float) -> None:
+def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: float) -> None:
     """Move hand and device on by one tick under the motors' force (3,) [N].
 
     Two masses on each axis: the hand, which a spring and a damper pull along its path, and the
@@ -64,7 +91,9 @@ def move_hand(p: Any, s: Any, wanted: Array, force: Array, dt: float) -> None:
 
 
 @inner
-def _push_on(p: Any, s: Any, aim_speed: Array, force: Array, h: float, time: float) -> None:
+def _push_on(
+    p: HandNumbers, s: HandState, aim_speed: Array, force: Array, h: float, time: float
+) -> None:
     """Make one step of ``h`` [s] that ends ``time`` [s] after the tick's begin."""
     free, pulled = np.empty(3), np.empty(3)
     square = 0.0
@@ -84,7 +113,7 @@ def _push_on(p: Any, s: Any, aim_speed: Array, force: Array, h: float, time: flo
         s.hand[i] += h * s.hand_speed[i]
 
 
-def join(p: Any, dt: float) -> None:
+def join(p: HandNumbers, dt: float) -> None:
     """Write what the implicit step needs of the matrix that joins hand and device.
 
     Args:
@@ -98,12 +127,3 @@ def join(p: Any, dt: float) -> None:
     own = p["mass"] + h * p["damping"] + joined
     p["joined_share"], p["hand_lightness"] = joined / own, 1.0 / own
     p["lightness"] = 1.0 / (p["device_mass"] + joined - joined * joined / own)
-
-
-HAND_PARAMETERS = [
-    *((name, "f8") for name in ("mass", "stiffness", "damping", "friction", "device_mass",
-      "device_damping")),
-    *((name, "f8", (3,)) for name in ("device_stiffness", "joined_share", "lightness",
-      "hand_lightness")),
-]  # fmt: skip
-"""Fields of the parameter record that :func:`move_hand` and :func:`join` use."""

@@ -2,23 +2,26 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from teleop_core.base.parameters import parameter
-from teleop_core.chain.master.contact import CONTACT_STATE, account, distance
+from teleop_core.chain.master.contact import ContactState, account, distance
 from teleop_core.chain.master.device import (
     DeviceParameters,
+    Handle,
+    ReadingNumbers,
+    ReadingState,
     make_handle,
     measure_twist,
     read_handle,
     read_phantom,
 )
-from teleop_core.chain.master.hand import HAND_PARAMETERS, HandParameters, join, move_hand
-from teleop_core.chain.master.rendering import RENDERING_PARAMETERS, RENDERING_STATE, render
+from teleop_core.chain.master.hand import HandNumbers, HandParameters, HandState, join, move_hand
+from teleop_core.chain.master.rendering import RenderingNumbers, RenderingState, render
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT, rest_pose
 from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
@@ -34,7 +37,8 @@ from teleop_core.graph.topics import (
     OPERATION,
     SLAVE_OPERATION,
 )
-from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import PoseRow, record
 from teleop_core.kernels.geometry import (
     Array,
     rotation,
@@ -76,25 +80,33 @@ class HapticMasterParameters:
     hand: HandParameters = field(default_factory=HandParameters)
 
 
-_PARAMETERS = [
-    *((name, "f8") for name in ("resolution", "gimbal", "force_range")),
-    ("center", "f8", (3,)), ("half", "f8", (3,)), ("silence_ns", "i8"),
-    *HAND_PARAMETERS, *RENDERING_PARAMETERS,
-]  # fmt: skip
-_STATE = [
-    *((name, "f8", (3,)) for name in ("position", "speed", "hand", "hand_speed", "wanted",
-      "reading", "rate", "turning")),
-    ("attitude", "f8", (4,)), ("next_noise", "i8"), ("aim", "f8", (7,)), ("told_ns", "i8"),
-    ("heard_ns", "i8"), ("free_ns", "i8"), ("is_held", "i8"), ("is_stopped", "i8"),
-    ("doubted_ns", "i8"), ("doubted", "f8"),
-    *RENDERING_STATE, *CONTACT_STATE,
-]  # fmt: skip
+class MasterNumbers(HandNumbers, ReadingNumbers, RenderingNumbers):
+    """Parameter record of the haptic master."""
+
+    force_range: float  # beyond which a force is not given [N]
+    silence_ns: int
+
+
+class MasterState(HandState, ReadingState, RenderingState, ContactState):
+    """State record of the haptic master."""
+
+    next_noise: int
+    aim: PoseRow  # where the operator wants the stylus
+    told_ns: int
+    heard_ns: int
+    free_ns: int
+    is_held: int
+    is_stopped: int
+    doubted_ns: int
+    doubted: float  # force that was out of range [N]
+
+
 _STATE_OF_SLAVE, _FAULT = OPERATION.index("state"), int(State.FAULT)
 _MOST = MASTER_CONTACT.columns.index("largest_force")
 
 
 @inner
-def _is_sound(p: Any, s: Any, force: Array, now_ns: int) -> bool:
+def _is_sound(p: MasterNumbers, s: MasterState, force: Array, now_ns: int) -> bool:
     """Whether the force (6,) can be given: within its range now, and in the last second."""
     square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
     if not square <= p.force_range * p.force_range:  # NaN is not
@@ -105,7 +117,7 @@ def _is_sound(p: Any, s: Any, force: Array, now_ns: int) -> bool:
 
 
 @inner
-def _holds(p: Any, s: Any, row: Any) -> bool:
+def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
     """Whether a hand holds the stylus; takes where it is wanted from who does.
 
     A hand that is suddenly elsewhere, or after a silence, is another grip: it brings the stylus
@@ -127,7 +139,9 @@ def _holds(p: Any, s: Any, row: Any) -> bool:
 
 
 @kernel
-def haptic_master_step(p: Any, s: Any, handle: Any, noises: Any, row: Any, dt: float) -> None:
+def haptic_master_step(
+    p: MasterNumbers, s: MasterState, handle: Handle, noises: Array, row: Row, dt: float
+) -> None:
     """One tick: feel master_servo_cf, move, and write what the device measures and the contact.
 
     Args:
@@ -181,7 +195,7 @@ class HapticMaster(RunningStage):
 
     def __init__(self, parameters: HapticMasterParameters, dt: float = DT) -> None:
         super().__init__(HAPTIC_MASTER, 0, dt)
-        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
+        self.parameters, self.state = record(MasterNumbers), record(MasterState)
         self._noises = np.zeros((BLOCK, 6))
         self._fixed = parameters
         self.kernel = haptic_master_step

@@ -1,18 +1,19 @@
 """Operator: who holds the stylus, moves it and presses its buttons, and sees what a person gets."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from teleop_core.base.errors import PartError, TeleopError
 from teleop_core.chain.operators import OPERATORS, Seen, Setting
-from teleop_core.chain.operators.follower import MOST, WANTED
+from teleop_core.chain.operators.follower import MOST, Wanted
 from teleop_core.chain.operators.parameters import PRESS_TIME, OperatorParameters
 from teleop_core.chain.operators.remote import RemoteHand
 from teleop_core.chain.operators.rest import REST_POSITION, rest_pose
 from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, STATE, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
@@ -24,21 +25,38 @@ from teleop_core.graph.topics import (
     SLAVE_MEASURED_CP,
     TELEOP_STATE,
 )
-from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import Fields, Vector3, record, record_array
 from teleop_core.kernels.geometry import Array, rotate_by_vector
 
 BLOCK = 1000
 """Ticks for which the wanted motion and the tremor are drawn at once, at most."""
-_PARAMETERS = [("tremor", "f8"), ("frequency", "f8"), ("patience_ns", "i8")]
-_STATE = [
-    ("phase", "f8", (3,)), ("wander", "f8", (3,)), ("next", "i8"), ("next_noise", "i8"),
-    ("has_begun", "i8"), ("first_ns", "i8"),
-]  # fmt: skip
+
+
+class OperatorNumbers(Fields):
+    """Parameter record of the operator."""
+
+    tremor: float  # amplitude [m]
+    frequency: float  # of the tremor [Hz]
+    patience_ns: int
+
+
+class OperatorState(Fields):
+    """State record of the operator."""
+
+    phase: Vector3  # of the tremor [rad]
+    wander: Vector3
+    next: int
+    next_noise: int
+    has_begun: int
+    first_ns: int
+
+
 _IS_FOLLOWING = STATE["is_following"]
 
 
 @inner
-def _begins(p: Any, s: Any, row: Any) -> bool:
+def _begins(p: OperatorNumbers, s: OperatorState, row: Row) -> bool:
     """Whether the operator moves the hand: since the slave first followed, or lost patience.
 
     A state that is older than the first sample is about another master.
@@ -54,7 +72,7 @@ def _begins(p: Any, s: Any, row: Any) -> bool:
 
 
 @inner
-def tremble(p: Any, s: Any, noise: Array, tremor: Array, dt: float) -> None:
+def tremble(p: OperatorNumbers, s: OperatorState, noise: Array, tremor: Array, dt: float) -> None:
     """Write the wanted tremor (3,) [m]: one line per axis whose frequency wanders in its band."""
     for i in range(3):
         # Ornstein-Uhlenbeck process of unit variance and half a second of memory.
@@ -65,7 +83,14 @@ def tremble(p: Any, s: Any, noise: Array, tremor: Array, dt: float) -> None:
 
 
 @kernel
-def operator_step(p: Any, s: Any, wanted: Any, noises: Any, row: Any, dt: float) -> None:
+def operator_step(
+    p: OperatorNumbers,
+    s: OperatorState,
+    wanted: Sequence[Wanted],
+    noises: Array,
+    row: Row,
+    dt: float,
+) -> None:
     """One tick: write where the hand is wanted, its tremor and the buttons.
 
     Until the slave follows the hand rests, as a person's would: none of its motion is lost.
@@ -110,9 +135,9 @@ class RunningOperator(RunningStage):
 
     def __init__(self, parameters: OperatorParameters, dt: float = DT) -> None:
         super().__init__(OPERATOR, 0, dt)
-        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
+        self.parameters, self.state = record(OperatorNumbers), record(OperatorState)
         # The first record of what is wanted is that of the present tick.
-        self._wanted, self._noises = records(WANTED, BLOCK + 1), np.zeros((BLOCK, 6))
+        self._wanted, self._noises = record_array(Wanted, BLOCK + 1), np.zeros((BLOCK, 6))
         self._fixed = parameters
         self.kernel = operator_step
         self.arguments = (self.parameters, self.state, self._wanted, self._noises)

@@ -1,21 +1,32 @@
 """Rendering: what the device makes of a commanded force, by its peak and its warmth."""
 
 import math
-from typing import Any
 
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields
 from teleop_core.kernels.geometry import Array
 
 # The peak force falls to the continuous one while the motors take up the last quarter of the heat
 # that they bear.
 _LAST = 0.25
 
-RENDERING_PARAMETERS = [("peak_force", "f8"), ("continuous", "f8"), ("warming", "f8")]
-RENDERING_STATE = [("heat", "f8")]
+
+class RenderingNumbers(Fields):
+    """Fields of a parameter record with the forces that the motors bear."""
+
+    peak_force: float  # [N]
+    continuous: float  # [N]
+    warming: float  # share of a tick in which the motors warm
+
+
+class RenderingState(Fields):
+    """Fields of a state record with their warmth."""
+
+    heat: float  # mean square of the force [N²]
 
 
 @inner
-def largest_force(p: Any, s: Any) -> float:
+def largest_force(p: RenderingNumbers, s: RenderingState) -> float:
     """Force that the device can apply in this tick [N].
 
     The heat of the motors is the mean square of the force, taken by a first-order lag: a balance of
@@ -24,8 +35,8 @@ def largest_force(p: Any, s: Any) -> float:
     to what is left, so that a command that stays ends at the continuous force.
 
     Args:
-        p: Record with :data:`RENDERING_PARAMETERS`.
-        s: Record with :data:`RENDERING_STATE`.
+        p: Parameters.
+        s: State.
     """
     bearable = p.continuous * p.continuous
     if p.continuous >= p.peak_force:
@@ -39,12 +50,12 @@ def largest_force(p: Any, s: Any) -> float:
 
 
 @inner
-def render(p: Any, s: Any, command: Array, force: Array) -> float:
+def render(p: RenderingNumbers, s: RenderingState, command: Array, force: Array) -> float:
     """Write the force (3,) [N] that the device applies for a command (3,) [N], and warm it.
 
     Args:
-        p: Record with :data:`RENDERING_PARAMETERS`.
-        s: Record with :data:`RENDERING_STATE`; written.
+        p: Parameters.
+        s: State; written.
         command: What is asked for.
         force: What is applied: in the direction of the command.
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from teleop_core.base.parameters import parameter
-from teleop_core.graph.signals import Field
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Field
 from teleop_core.kernels.geometry import Array
 
 DEADBAND_PARAMETERS: list[Field] = [

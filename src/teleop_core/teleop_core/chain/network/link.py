@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from teleop_core.chain.network import CHANCES, MEMORY
-from teleop_core.graph.signals import Field
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Field
 from teleop_core.kernels.geometry import Array
 
 LONGEST = 16384

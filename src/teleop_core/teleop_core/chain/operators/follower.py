@@ -10,37 +10,56 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.kernels import bound, inner, kernel, records
+from teleop_core.kernels import bound, inner, kernel
+from teleop_core.kernels.fields import Fields, PoseRow, Quaternion, Vector3, record, record_array
 from teleop_core.kernels.geometry import Array, turn_between, turn_by
 
 MOST = 4
 """Ticks for which it can be asked at once: what is wanted is so much later at most."""
-WANTED = [("wanted", "f8", (3,)), ("attitude", "f8", (4,)), ("buttons", "f8", (3,)),
-          ("tremor", "f8", (3,))]  # fmt: skip
-"""Fields of what a hand wants in a tick: place [m] and attitude of the stylus, quaternion, in the
-master's base; clutch, fixture, mode, 1 pressed; and tremor [m]."""
-_BOUNDS = [
-    ("rate", "f8"), ("speed", "f8"), ("acceleration", "f8"), ("turn_speed", "f8"),
-    ("turn_acceleration", "f8"), ("low", "f8", (3,)), ("high", "f8", (3,)),
-]  # fmt: skip
-_STATE = [
-    ("time", "f8"), ("next", "f8"), ("tick", "f8"), ("pose", "f8", (7,)),
-    ("velocity", "f8", (3,)), ("turning", "f8", (3,)), ("target", "f8", (7,)),
-    ("buttons", "f8", (3,)),
-]  # fmt: skip
+
+
+class Wanted(Fields):
+    """What a hand wants in a tick, in the master's base."""
+
+    wanted: Vector3  # place of the stylus [m]
+    attitude: Quaternion
+    buttons: Vector3  # clutch, fixture, mode: 1 pressed
+    tremor: Vector3  # [m]
+
+
+class Bounds(Fields):
+    """How a stylus may follow."""
+
+    rate: float  # twice the inverse of the delay [1/s]
+    speed: float  # largest ones [m/s, m/s², rad/s, rad/s²]
+    acceleration: float
+    turn_speed: float
+    turn_acceleration: float
+    low: Vector3  # corners of the room [m]
+    high: Vector3
+
+
+class FollowerState(Fields):
+    """Where a stylus is that follows."""
+
+    time: float  # [s]
+    next: float  # time of the next tick [s]
+    tick: float  # length of each [s]
+    pose: PoseRow
+    velocity: Vector3
+    turning: Vector3
+    target: PoseRow
+    buttons: Vector3
 
 
 @kernel
-def follow(b: Any, s: Any, rows: Any) -> None:
+def follow(b: Bounds, s: FollowerState, rows: Any) -> None:
     """Follow the target for some ticks, and write where the stylus is in each.
 
     Args:
-        b: Bounds: ``rate`` [1/s], twice the inverse of the delay; largest speeds and accelerations
-            [m/s, m/s², rad/s, rad/s²]; and the room's corners ``low`` and ``high`` (3,) [m] in the
-            master's base.
-        s: State: ``time`` [s], ``pose`` (7,), its velocities, the ``target`` (7,), the ``buttons``
-            (3,), the time of the ``next`` tick and the length of each, ``tick`` [s]; written.
-        rows: Records (N,) of :data:`WANTED`; written, but for the tremor.
+        b: Bounds.
+        s: State; written.
+        rows: Records (N,) of :class:`Wanted`; written, but for the tremor.
     """
     gap, turn = np.empty(3), np.empty(3)
     for k in range(rows.shape[0]):
@@ -114,14 +133,14 @@ class Follower:
         start: Array,
         room: tuple[Array, Array],
     ) -> None:
-        self._bounds, self._state = records(_BOUNDS)[0], records(_STATE)[0]
+        self._bounds, self._state = record(Bounds), record(FollowerState)
         b, s = self._bounds, self._state
         b["rate"] = 2.0 / delay
         b["speed"], b["turn_speed"] = speed
         b["acceleration"], b["turn_acceleration"] = acceleration
         b["low"], b["high"] = room
         s["pose"] = s["target"] = start
-        self._rows = [records(WANTED, count) for count in range(MOST + 1)]
+        self._rows = [record_array(Wanted, count) for count in range(MOST + 1)]
         self._follow = [bound(follow, b, s, rows) for rows in self._rows]
 
     @property
@@ -158,7 +177,7 @@ class Follower:
             count: How many, 1 to :data:`MOST`.
 
         Returns:
-            Records (count,) of :data:`WANTED`, which the next call writes again.
+            Records (count,) of :class:`Wanted`, which the next call writes again.
         """
         self._state["next"], self._state["tick"] = first, tick
         self._follow[count]()

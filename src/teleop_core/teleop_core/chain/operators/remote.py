@@ -226,7 +226,7 @@ class RemoteHand:
             count: How many ticks, 1 to 4.
 
         Returns:
-            Records (count,) of :data:`teleop_core.chain.operators.follower.WANTED`: places and
+            Records (count,) of :class:`teleop_core.chain.operators.follower.Wanted`: places and
             attitudes in the master's base. The next call writes them again.
         """
         if self._wanted is not self._seen:

@@ -6,13 +6,13 @@ alone ends it.
 """
 
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 
 from teleop_core.base.errors import UnknownNameError
 from teleop_core.graph.topics import STATE_COMMANDS
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields
 
 
 class State(IntEnum):
@@ -86,24 +86,27 @@ _RESET, _STOP, _MOVE, _ARRIVED = (
 )  # fmt: skip
 _RESUME, _LAPSED = int(Event.RESUME), int(Event.LAPSED)
 
-STATE_FIELDS = [
-    (name, "i8")
-    for name in (
-        "state", "is_homed", "is_busy", "is_homing", "must_plan", "is_stopped", "is_pressed",
-        "is_moving", "must_home", "fault", "fault_joint",
-    )
-] + [("fault_value", "f8"), ("fault_bound", "f8")]  # fmt: skip
-"""Fields of a state record that :func:`change` reads and writes.
 
-``must_plan``: a move is to be planned, to the start where it homes.
-``is_stopped``: an emergency stop is latched. ``is_pressed``: its cause is still there.
-``is_moving``: the arm is not at rest. ``must_home``: a pause interrupted homing, which resume
-begins anew.
-"""
+class OperatingState(Fields):
+    """Fields of a state record that :func:`change` reads and writes."""
+
+    state: int
+    is_homed: int
+    is_busy: int
+    is_homing: int
+    must_plan: int  # a move is to be planned, to the start where it homes
+    is_stopped: int  # an emergency stop is latched
+    is_pressed: int  # its cause is still there
+    is_moving: int  # the arm is not at rest
+    must_home: int  # a pause interrupted homing, which resume begins anew
+    fault: int
+    fault_joint: int
+    fault_value: float
+    fault_bound: float
 
 
 @inner
-def change(s: Any, event: int) -> int:
+def change(s: OperatingState, event: int) -> int:
     """Take an event: write the state record, return the :class:`Answer`."""
     state, follower = s.state, TABLE[s.state, event]
     if follower < 0:
@@ -129,7 +132,7 @@ def change(s: Any, event: int) -> int:
 
 
 @inner
-def _take(s: Any, event: int, answer: int) -> int:
+def _take(s: OperatingState, event: int, answer: int) -> int:
     """What an event does beside the state."""
     if event == _HOME or (event == _RESUME and s.must_home):
         s.is_busy, s.is_homing, s.must_plan, s.is_homed, s.must_home = 1, 1, 1, 0, 0

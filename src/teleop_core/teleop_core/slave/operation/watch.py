@@ -1,30 +1,64 @@
 """Watch: finds the faults of an arm, plays its script of commands, tells how it is."""
 
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, IntegerPerJoint, Integers, PerJoint, Vector3
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.operation.faults import FAULTS, Fault, Reaction
 from teleop_core.slave.operation.parameters import MOST_EVENTS
-from teleop_core.slave.operation.states import STATE_FIELDS, Event, State, change
+from teleop_core.slave.operation.states import Event, OperatingState, State, change
 
-OPERATION_STATE = [
-    *STATE_FIELDS, ("must_brake", "i8"), ("told", "i8"), ("played", "i8"), ("first_ns", "i8"),
-    ("heard_ns", "i8"), ("pressed_ns", "i8"), ("left_ns", "i8"), ("is_resting", "i8"),
-    ("still_ns", "i8"), ("left_at", "f8", (3,)), ("rest_time", "f8"), ("travel", "f8"),
-    ("sampled_ns", "i8"), ("heard_of_ns", "i8"),
-]  # fmt: skip
-"""Scalars of a state record; beside them it has ``full_ns`` (n,)."""
-OPERATION_PARAMETERS = [
-    ("brakes", "i8"), ("heartbeat_ns", "i8"), ("outage_ns", "i8"), ("effort_ns", "i8"),
-    ("silence_ns", "i8"), ("pressing_ns", "i8"), ("tip_error", "f8"), ("overspeed", "f8"),
-    ("reported", "i8", (len(Fault),)), ("event_count", "i8"), ("event", "i8", (MOST_EVENTS,)),
-    ("event_ns", "i8", (MOST_EVENTS,)),
-]  # fmt: skip
-"""Scalars and tables of a parameter record; beside them it has ``lag`` (n,) [rad or m]."""
+
+class ServerParameters(Fields):
+    """Fields of the parameter record of an arm's server that commands and faults are judged by."""
+
+    lower: PerJoint  # limits of the joints [rad or m]
+    upper: PerJoint
+    effort_limit: PerJoint  # rated efforts [N·m or N]
+    speed_limit: PerJoint  # rated speeds [rad/s or m/s]
+    lag: PerJoint  # how far a joint may be from its setpoint [rad or m]
+    timeout_ns: int
+    brakes: int
+    heartbeat_ns: int
+    outage_ns: int
+    effort_ns: int
+    silence_ns: int
+    pressing_ns: int
+    tip_error: float
+    overspeed: float
+    reported: Annotated[Integers, len(Fault)]
+    event_count: int
+    event: Annotated[Integers, MOST_EVENTS]
+    event_ns: Annotated[Integers, MOST_EVENTS]
+
+
+class ServerState(OperatingState):
+    """Fields of its state record that faults are found in."""
+
+    setpoint: PerJoint  # [rad or m], as the next two
+    target: PerJoint
+    measured: PerJoint
+    speed: PerJoint  # [rad/s or m/s]
+    full_ns: IntegerPerJoint  # for how long a drive has given all
+    must_brake: int
+    told: int
+    played: int
+    first_ns: int
+    heard_ns: int
+    pressed_ns: int
+    left_ns: int
+    is_resting: int
+    still_ns: int
+    left_at: Vector3
+    rest_time: float
+    travel: float
+    sampled_ns: int
+    heard_of_ns: int
+
 
 _REACTIONS = {Reaction.HOLD: 0, Reaction.BRAKE: 1, Reaction.PAUSE: 2, Reaction.REPORT: 3}
 _REACTION = np.array(
@@ -48,7 +82,9 @@ _FULL = 0.999
 
 
 @inner
-def fail(p: Any, s: Any, fault: int, joint: int, value: float, bound: float) -> None:
+def fail(
+    p: ServerParameters, s: ServerState, fault: int, joint: int, value: float, bound: float
+) -> None:
     """Take note of a fault, and do what it asks for; a fault in force is not overwritten."""
     reaction = _REPORT if p.reported[fault] else _REACTION[fault]
     if reaction == _REPORT:
@@ -70,7 +106,7 @@ def fail(p: Any, s: Any, fault: int, joint: int, value: float, bound: float) -> 
 
 
 @inner
-def begin_tick(p: Any, s: Any, now_ns: int) -> None:
+def begin_tick(p: ServerParameters, s: ServerState, now_ns: int) -> None:
     """Play the commands whose time has come; a stop button that fell silent is pressed."""
     if s.first_ns == 0:
         s.first_ns = now_ns
@@ -93,18 +129,18 @@ def begin_tick(p: Any, s: Any, now_ns: int) -> None:
 
 
 @inner
-def is_braked(p: Any, s: Any) -> bool:
+def is_braked(p: ServerParameters, s: ServerState) -> bool:
     """Whether the drives are off and brakes hold the arm."""
     return bool(s.must_brake or (p.brakes and s.state in (_DISABLED, _FAULT)))
 
 
 @inner
-def watch_joints(p: Any, s: Any, effort: Array, passed_ns: int) -> None:
+def watch_joints(p: ServerParameters, s: ServerState, effort: Array, passed_ns: int) -> None:
     """Find joints that are too far off, too fast, or at the end of what their drives can give.
 
     Args:
         p: Parameters.
-        s: State with ``setpoint``, ``measured`` and ``speed`` (n,); written.
+        s: State; written.
         effort: What the drives gave (n,) [N·m or N].
         passed_ns: Time since the last time [ns].
     """
@@ -122,7 +158,7 @@ def watch_joints(p: Any, s: Any, effort: Array, passed_ns: int) -> None:
 
 
 @inner
-def watch_tip(p: Any, s: Any, setpoint: Array, measured: Array) -> None:
+def watch_tip(p: ServerParameters, s: ServerState, setpoint: Array, measured: Array) -> None:
     """Find a tip, poses (7,), that is too far from its setpoint."""
     square = 0.0
     for i in range(3):
@@ -132,7 +168,7 @@ def watch_tip(p: Any, s: Any, setpoint: Array, measured: Array) -> None:
 
 
 @inner
-def watch_limits(p: Any, s: Any, now_ns: int) -> None:
+def watch_limits(p: ServerParameters, s: ServerState, now_ns: int) -> None:
     """Find commands that press a joint into the end of its range."""
     pressed = -1
     for i in range(s.target.shape[0]):
@@ -146,7 +182,7 @@ def watch_limits(p: Any, s: Any, now_ns: int) -> None:
 
 
 @inner
-def measure_rest(s: Any, place: Array, now_ns: int) -> None:
+def measure_rest(s: ServerState, place: Array, now_ns: int) -> None:
     """Measure how long and how far the tip, at ``place`` (7,), moves after it may move no more."""
     if s.state == _ENABLED:
         s.left_ns, s.is_resting = 0, 0
@@ -166,7 +202,7 @@ def measure_rest(s: Any, place: Array, now_ns: int) -> None:
 
 
 @inner
-def find_rest(s: Any, moves: bool, now_ns: int) -> None:
+def find_rest(s: ServerState, moves: bool, now_ns: int) -> None:
     """Take note whether the arm moves; it rests after :data:`REST_NS` without motion.
 
     A joint that swings about its place stands still for a moment at each of its turns.
@@ -180,7 +216,7 @@ def find_rest(s: Any, moves: bool, now_ns: int) -> None:
 
 
 @inner
-def watch_feedback(p: Any, s: Any, now_ns: int) -> None:
+def watch_feedback(p: ServerParameters, s: ServerState, now_ns: int) -> None:
     """Find an arm that has not said for too long where it is."""
     silence_ns = now_ns - s.heard_of_ns
     if silence_ns > p.silence_ns:
@@ -188,13 +224,13 @@ def watch_feedback(p: Any, s: Any, now_ns: int) -> None:
 
 
 @inner
-def is_blind(p: Any, s: Any, now_ns: int) -> bool:
+def is_blind(p: ServerParameters, s: ServerState, now_ns: int) -> bool:
     """Whether the arm has not said lately, within the command timeout, where it is."""
     return bool(now_ns - s.heard_of_ns > p.timeout_ns)
 
 
 @inner
-def tell(p: Any, s: Any, row: Array) -> None:
+def tell(p: ServerParameters, s: ServerState, row: Array) -> None:
     """Write the numbers of :data:`~teleop_core.graph.topics.OPERATION`."""
     row[0], row[1], row[2], row[3] = s.state, s.is_homed, s.is_busy, s.is_stopped
     row[4], row[5], row[6], row[7] = s.fault, s.fault_joint, s.fault_value, s.fault_bound

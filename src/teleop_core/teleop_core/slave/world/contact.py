@@ -7,32 +7,42 @@ integrator.
 """
 
 import math
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
-from teleop_core.graph.signals import Field
 from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields, PerJoint, Vector3
 from teleop_core.kernels.geometry import Array
+from teleop_core.slave.arm import Arm
 
-WORLD_PARAMETERS: list[Field] = [
-    ("has_world", "i8"), ("world_stiffness", "f8"), ("world_damping", "f8"),
-    ("world_friction", "f8"), ("world_center", "f8", (3,)),
-]  # fmt: skip
 _NEAR = 5e-3
 """A tip that is farther outside [m] does not get there within a tick."""
 
 
-def world_state(n: int) -> list[Field]:
-    """Fields of the state of a contact of an arm with ``n`` joints, at the start of the tick."""
-    return [
-        ("is_near", "i8"), ("gap", "f8"), ("normal", "f8", (3,)), ("stuck", "f8", (3,)),
-        ("touch_q", "f8", (n,)), ("touch_J", "f8", (3, n)),
-    ]  # fmt: skip
+class WorldNumbers(Fields):
+    """Fields of a parameter record with what the object is made of, and where it is."""
+
+    has_world: int
+    world_stiffness: float
+    world_damping: float
+    world_friction: float
+    world_center: Vector3
+
+
+class ContactState(Fields):
+    """Fields of a state record with the contact at the start of the tick."""
+
+    is_near: int
+    gap: float
+    normal: Vector3
+    stuck: Vector3
+    touch_q: PerJoint
+    touch_J: Annotated[Array, 3, "joints"]  # noqa: N815
 
 
 @inner
-def _push(p: Any, s: Any, moved: Array, speed: Array, force: Array) -> None:
+def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: Array) -> None:
     """Write the force (3,) [N] on a tip that moved (3,) [m] since the tick began, at a speed (3,).
 
     Along the normal a spring with the damper of Hunt and Crossley, which pulls nobody back; across
@@ -62,12 +72,12 @@ def _push(p: Any, s: Any, moved: Array, speed: Array, force: Array) -> None:
 
 
 @inner
-def add_push(p: Any, s: Any, q: Array, dq: Array, effort: Array) -> None:
+def add_push(p: WorldNumbers, s: ContactState, q: Array, dq: Array, effort: Array) -> None:
     """Add what the object does to the joints: the transposed Jacobian times its push.
 
     Args:
-        p: Record with :data:`WORLD_PARAMETERS`.
-        s: Record with :func:`world_state`.
+        p: Parameters.
+        s: State.
         q: Joints of the links (n,) [rad or m].
         dq: Their speeds (n,).
         effort: Written (n,) [N·m or N].
@@ -84,7 +94,7 @@ def add_push(p: Any, s: Any, q: Array, dq: Array, effort: Array) -> None:
 
 
 @inner
-def _slide(s: Any, q: Array) -> None:
+def _slide(s: ContactState, q: Array) -> None:
     """Take the bristle along with the tip to joints (n,), as far as it went since the last tick."""
     for k in range(3):
         for i in range(q.shape[0]):
@@ -92,7 +102,7 @@ def _slide(s: Any, q: Array) -> None:
 
 
 @inner
-def _lay_flat(s: Any) -> None:
+def _lay_flat(s: ContactState) -> None:
     """Keep of the bristle what lies in the surface; nothing where the tip is off it."""
     out, kept = 0.0, 1.0 if s.gap < 0.0 else 0.0
     for k in range(3):
@@ -102,7 +112,7 @@ def _lay_flat(s: Any) -> None:
 
 
 @inner
-def _begin_at(s: Any, arm: Any, q: Array, dq: Array, speed: Array) -> None:
+def _begin_at(s: ContactState, arm: Arm, q: Array, dq: Array, speed: Array) -> None:
     """Take surface and Jacobian as they are now, for the tick; write the tip's speed (3,)."""
     arm.jacobian(arm.tip, arm.tip_geometry, arm.J)
     for k in range(3):
@@ -115,7 +125,7 @@ def _begin_at(s: Any, arm: Any, q: Array, dq: Array, speed: Array) -> None:
 
 
 @inner
-def _keep_bend(p: Any, s: Any, force: Array) -> None:
+def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
     """Leave the bristle the bend that friction carries of the push (3,) [N]; the rest slipped."""
     push = 0.0
     for k in range(3):
@@ -125,12 +135,12 @@ def _keep_bend(p: Any, s: Any, force: Array) -> None:
 
 
 @inner
-def touch(p: Any, s: Any, arm: Any, q: Array, dq: Array, felt: Array) -> None:
+def touch(p: WorldNumbers, s: ContactState, arm: Arm, q: Array, dq: Array, felt: Array) -> None:
     """Find where the tip is against the object, and write what it feels (6,) [N, N·m].
 
     Args:
-        p: Record with :data:`WORLD_PARAMETERS`.
-        s: Record with :func:`world_state`; written.
+        p: Parameters.
+        s: State; written.
         arm: With ``T`` of the true tip, its joints ``tip``, ``jacobian``, ``distance`` and
             ``shape``; its rooms ``offset``, ``normal`` and ``J`` are written.
         q: Joints of the links (n,) [rad or m], which move the tip from here on.

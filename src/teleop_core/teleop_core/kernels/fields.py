@@ -1,0 +1,83 @@
+"""Fields: what a record has, as a class, so that type checkers and editors know its names.
+
+A class names the fields of a kind of record and gives each a type::
+
+    class Spring(Fields):
+        stiffness: float
+        is_on: int
+        anchor: Vector3
+        pull: PerJoint
+
+``record(Spring, joints)`` makes one with all fields zero. Kernels say ``s: Spring``: a field that
+is not there is an error of the type checker, and of numba. A record of several parts inherits from
+their classes. ``int`` and ``float`` have 64 bits; a truth value is an ``int``.
+"""
+
+from inspect import get_annotations
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, get_args, get_origin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from teleop_core.kernels import records
+from teleop_core.kernels.geometry import Array
+
+__all__ = ["Field", "Fields", "fields_of", "record", "record_array"]
+
+Field = tuple[str, str] | tuple[str, str, tuple[int, ...]]
+"""Name and type of a field, and its shape if it is an array."""
+Integers = NDArray[np.int64]
+PerJoint = Annotated[Array, "joints"]
+"""One number for each joint."""
+IntegerPerJoint = Annotated[Integers, "joints"]
+Vector3 = Annotated[Array, 3]
+Quaternion = Annotated[Array, 4]
+Wrench = Annotated[Array, 6]
+PoseRow = Annotated[Array, 7]
+"""Position [m], and quaternion w, x, y, z."""
+
+
+class Fields:
+    """Base of the classes that name the fields of a record; see the module."""
+
+    if TYPE_CHECKING:  # what records have besides
+        dtype: np.dtype[Any]
+
+        def __getitem__(self, name: str) -> Any: ...
+
+        def __setitem__(self, name: str, value: object) -> None: ...
+
+
+R = TypeVar("R", bound=Fields)
+
+
+def fields_of(kind: type[Fields], joints: int = 0) -> list[Field]:
+    """Names and types of the fields of a class, those of its bases first.
+
+    Args:
+        kind: The class.
+        joints: Number of joints, for arrays with one number for each.
+    """
+    found: dict[str, Field] = {}
+    for base in reversed(kind.__mro__):
+        for name, hint in get_annotations(base).items():
+            found[name] = _field(name, hint, joints)
+    return list(found.values())
+
+
+def _field(name: str, hint: Any, joints: int) -> Field:
+    if get_origin(hint) is not Annotated:
+        return name, "i8" if hint is int else "f8"
+    array, *shape = get_args(hint)
+    sizes = tuple(joints if size == "joints" else size for size in shape)
+    return name, "i8" if array == Integers else "f8", sizes
+
+
+def record(kind: type[R], joints: int = 0) -> R:
+    """One record of a kind, zero everywhere."""
+    return cast(R, records(fields_of(kind, joints))[0])
+
+
+def record_array(kind: type[R], count: int, joints: int = 0) -> Any:
+    """Records (count,) of a kind, zero everywhere; each is an ``R``."""
+    return records(fields_of(kind, joints), count)

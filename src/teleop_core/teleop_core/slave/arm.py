@@ -1,0 +1,55 @@
+"""Arm: what kernels know of an arm, its server's and its simulator's, and rooms to work in."""
+
+from typing import Any, NamedTuple
+
+from teleop_core.kernels.geometry import Array
+
+
+class ArmModel(NamedTuple):
+    """What the server knows of its arm, pointers and plain arrays, and rooms for kernels."""
+
+    fk: Any
+    jacobian: Any
+    geometry: Array
+    setpoint: Array  # rooms for joints (n,)
+    joints: Array
+    effort: Array
+    T: Array
+    speeds: Array  # rooms for what follows a twist: joint speeds (n,), and so on
+    is_free: Array
+    twist: Array
+    J: Array
+    A: Array
+    b: Array
+
+
+class Arm(NamedTuple):
+    """Model, control law and motion of the arm: pointers and plain arrays, which kernels take."""
+
+    tip_fk: Any  # of the links as they were made
+    jacobian: Any  # of the same
+    distance: Any  # of the object that the tip can touch
+    acceleration: Any
+    gravity: Any
+    control: Any
+    tip_geometry: Array
+    coupling: Array
+    dynamics: Array
+    model: Array  # the dynamics that the control law knows
+    gains: Array
+    memory: Array  # of the control law
+    q: Array  # joint positions (n,) at the encoders, unrounded
+    dq: Array
+    effort: Array
+    setpoint: Array
+    measured: Array
+    feedforward: Array  # (n,); (2 n + n²,) for laws that take the model
+    limit: Array
+    joints: Array  # room for joints
+    tip: Array  # true joint positions (n,), behind the transmission
+    T: Array
+    shape: Array  # numbers of the object
+    offset: Array  # rooms for what the tip feels: (3,), (3,) and (6, n)
+    normal: Array
+    J: Array
+    noises: Array  # of the force sensor in the coming ticks (N, 6)
