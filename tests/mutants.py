@@ -178,11 +178,9 @@ def changed(mutant: Mutant) -> dict[str, str]:
 def tree(mutant: Mutant) -> Path:
     """Directory that holds the mutant's package, made or brought up to date."""
     texts, copy = changed(mutant), PLACE / mutant.name / "teleop_core"
-    is_new = not copy.exists()
     for file in PACKAGE.rglob("*"):
         name = str(file.relative_to(PACKAGE))
-        is_kernel = file.parent.name == "__pycache__" and ".nb" in file.name
-        if file.is_dir() or (file.parent.name == "__pycache__" and not (is_new and is_kernel)):
+        if file.is_dir() or file.parent.name == "__pycache__":
             continue
         _put(texts[name].encode() if name in texts else file.read_bytes(), copy / name)
     if not (config := copy.parent / "config").exists():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from teleop_core.kernels import IS_COMPILED, SUPPORTED, check_version
+from teleop_core.kernels import IS_COMPILED, SUPPORTED, check_version, store
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="nothing is kept of what is not compiled")
 
@@ -312,3 +312,51 @@ def test_kernels_kept_for_a_class_that_is_gone_are_compiled_anew(tmp_path):
         write_all(tmp_path, {file: text.format(name) for file, text in files.items()})
         assert run(tmp_path) == ([3.0], 0)
         assert run(tmp_path) == ([3.0], 1)
+
+
+def in_store(folder: Path, place: Path) -> tuple[list[float], int]:
+    """What the script prints where the store is at a place, and how many kernels it found there."""
+    env = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "TELEOP_KERNELS": str(place)}
+    env.pop("NUMBA_CACHE_DIR", None)
+    done = subprocess.run(
+        [sys.executable, "outer.py"], cwd=folder, capture_output=True, text=True, check=True,
+        env=env,
+    )  # fmt: skip
+    values, hits = done.stdout.splitlines()
+    return [float(value) for value in values.split()], int(hits)
+
+
+def test_a_second_copy_of_a_source_finds_what_the_first_one_compiled(tmp_path):
+    first, second = tmp_path / "first", tmp_path / "second"
+    for folder in (first, second):
+        folder.mkdir()
+        write_all(folder, CALLS)
+    assert in_store(first, tmp_path / "kept") == ([70.0, 7.0], 0)
+    assert in_store(second, tmp_path / "kept") == ([70.0, 7.0], 1)
+    assert not list(tmp_path.glob("*/__pycache__/*.nb?"))
+
+
+def test_a_copy_that_differs_takes_nothing_of_the_other_and_leaves_it_there(tmp_path):
+    first, second = tmp_path / "first", tmp_path / "second"
+    for folder in (first, second):
+        folder.mkdir()
+        write_all(folder, CALLS)
+    write(second / "inner.py", CALLS["inner.py"].replace("2.0 * x", "5.0 * x"))
+    in_store(first, tmp_path / "kept")
+    assert in_store(second, tmp_path / "kept") == ([160.0, 16.0], 0)
+    assert in_store(first, tmp_path / "kept") == ([70.0, 7.0], 1)
+
+
+def test_what_nobody_used_for_long_is_removed_from_the_store(tmp_path, monkeypatch):
+    folder = write_all(tmp_path, CALLS)
+    place = tmp_path / "kept"
+    in_store(folder, place)
+    monkeypatch.setenv("TELEOP_KERNELS", str(place))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    old = sorted(place.rglob("factor-*.nbi"))
+    assert old
+    for file in old:
+        os.utime(file, (1e9, 1e9))
+    assert store.prune() >= 2 * len(old)
+    assert not list(place.rglob("factor-*"))
+    assert in_store(folder, place)[0] == [70.0, 7.0]

@@ -30,6 +30,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from multiprocessing import get_context
 
     from teleop_core.commands.progress import shown_progress
+    from teleop_core.kernels.store import prune
 
     phases = list(_phases(is_all=arguments.all))
     total, done, compiled = sum(map(len, phases)), 0, 0
@@ -40,6 +41,7 @@ def _run(arguments: argparse.Namespace) -> int:
             for made in as_completed(waiting):
                 compiled, done = compiled + made.result(), done + 1
                 progress(done, total)
+    prune()
     print(f"{compiled} kernels compiled" if compiled else "all kernels are there")
     return 0
 

@@ -5,6 +5,7 @@ count literals as plain numbers, or to say in one line what is wrong with a func
 """
 
 import gc
+import os
 import sys
 import warnings
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from types import FunctionType
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
@@ -31,6 +33,7 @@ from numba.extending import overload
 from numba.np import arrayobj
 
 from teleop_core import __version__
+from teleop_core.kernels import store
 from teleop_core.kernels.callables import entry_of
 from teleop_core.kernels.dependencies import digest, source_digest
 from teleop_core.kernels.mistakes import kernel_error
@@ -196,10 +199,16 @@ _BROKEN = (OSError, EOFError, UnpicklingError, AttributeError, ImportError)
 class _Cache(FunctionCache):
     """Cache on disk that is as good as none where its files are broken or cannot be written."""
 
+    shipped_name = ""
+    """Name of its files beside a source, which a wheel gives them."""
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was kept for a signature, here or in the wheel; None without."""
         try:
             found = super().load_overload(sig, target_context)
+            if found is not None:
+                with suppress(OSError):  # the store keeps what is used
+                    os.utime(self._cache_file._index_path)
         except _BROKEN:
             with suppress(OSError):
                 self.flush()
@@ -211,9 +220,8 @@ class _Cache(FunctionCache):
         _, (triple, *_), code = self._index_key(sig, target_context.codegen())
         own, file = self._cache_file, self._py_func.__code__.co_filename
         source = Path(__file__ if self._py_func in _generated else file)
-        name = own._index_name.removesuffix(".nbi")
         for tier, folder in places(source):
-            shipped = IndexDataCacheFile(str(folder), name, own._source_stamp)
+            shipped = IndexDataCacheFile(str(folder), self.shipped_name, own._source_stamp)
             with suppress(*_BROKEN):
                 data = shipped.load((sig, (triple, tier, ""), code))
                 if data is not None:
@@ -223,7 +231,15 @@ class _Cache(FunctionCache):
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled for a signature, if the disk lets us."""
         with suppress(OSError):
+            Path(self._cache_file._index_path).parent.mkdir(parents=True, exist_ok=True)
             super().save_overload(sig, data)
+
+    def keep(self, function: FunctionType, name: str, stamp: tuple[str, ...]) -> "_Cache":
+        """Keep a function in the store, or under a name beside its source where there is none."""
+        self.shipped_name = name
+        place = store.place(function, stamp) or Path(self.cache_path) / name
+        self._cache_file = IndexDataCacheFile(str(place.parent), place.name, stamp)
+        return self
 
 
 def _cache(function: Any) -> Any:
@@ -231,16 +247,15 @@ def _cache(function: Any) -> Any:
     own = [source_digest(file) for file in (__file__, digest.__code__.co_filename)]
     config: Any = numba.config
     checked = str(config.BOUNDSCHECK)  # NUMBA_BOUNDSCHECK=1 makes other code
-    stamp = (numba.__version__, __version__, checked, *own, digest(function))
+    versions = (numba.__version__, np.__version__, __version__)
+    stamp = (*versions, checked, *own, digest(function))
     if function in _generated:
         cache: Any = _Cache(_cache)  # beside this package's own
         name = f"generated.{function.__qualname__}-py{sys.version_info[0]}{sys.version_info[1]}"
         cache._py_func = function
-        cache._cache_file = IndexDataCacheFile(cache.cache_path, name, stamp)
-        return cache
+        return cache.keep(function, name, stamp)
     try:
         cache = _Cache(function)
     except RuntimeError:  # typed in, or given to python -c
         return NullCache()
-    cache._cache_file._source_stamp = stamp
-    return cache
+    return cache.keep(function, cache._cache_file._index_name.removesuffix(".nbi"), stamp)

@@ -1,0 +1,66 @@
+"""Store: where compiled kernels are kept for this user, by what they were made from.
+
+A kernel that one copy of a source compiled serves every other copy with the same text: a second
+clone, another environment, a fresh checkout of a test run. Old versions stay until nobody has
+asked for them for :data:`KEPT_DAYS`.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+import numba
+
+from teleop_core.kernels.dependencies import hexdigest
+
+KEPT_DAYS = 30
+"""Days after which :func:`prune` removes what was not used."""
+_TAG = f"py{sys.version_info[0]}{sys.version_info[1]}"
+
+
+def folder() -> Path | None:
+    """Folder of the store; None where kernels are kept as numba does, beside their source.
+
+    ``TELEOP_KERNELS`` names another folder; empty, or with ``NUMBA_CACHE_DIR``, there is no store.
+    """
+    config: Any = numba.config
+    named = os.environ.get("TELEOP_KERNELS")
+    if config.CACHE_DIR or named == "":
+        return None
+    if named:
+        return Path(named)
+    with suppress(RuntimeError):  # nobody's home is known
+        caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        return Path(caches) / "teleop_core" / "kernels"
+    return None
+
+
+def place(function: FunctionType, stamp: Iterable[str]) -> Path | None:
+    """Where the store keeps a function that was made from what a stamp says; None without store.
+
+    Functions of one name in one file differ by their line.
+    """
+    kept = folder()
+    if kept is None:
+        return None
+    line = function.__code__.co_firstlineno
+    key = hexdigest((*stamp, function.__module__ or "", function.__qualname__, str(line)))
+    return kept / key[:2] / f"{function.__name__}-{key[2:]}.{_TAG}"
+
+
+def prune(days: float = KEPT_DAYS) -> int:
+    """Remove what was not used for some days; returns how many files that were."""
+    kept, removed = folder(), 0
+    oldest = time.time() - 86400.0 * days
+    for index in kept.glob("*/*.nbi") if kept is not None else ():
+        with suppress(OSError):
+            if index.stat().st_mtime < oldest:
+                for file in index.parent.glob(f"{index.stem}.*"):
+                    file.unlink()
+                    removed += 1
+    return removed
