@@ -19,7 +19,11 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, fields
 from teleop_core.slave.controllers.motion_estimates import (
+    EXPECTED,
     MEMORY,
+    SET_ACCELERATION,
+    SET_SPEED,
+    SPEED,
     approach,
     beyond,
     closeness,
@@ -31,8 +35,11 @@ from teleop_core.slave.controllers.motion_estimates import (
     linear_range,
 )
 
-# What was learned, as differences from what is known at the start.
-_INERTIA, _VISCOUS, _FRICTION, _LOAD = range(MEMORY, MEMORY + 4)
+# Columns of the table of gains.
+_INERTIA, _POLE, _VISCOUS, _FADING, _FRICTION, _TRAVEL, _DEAD_BAND, _RANGE = range(8)
+_RATE, _SPEED_SCALE, _ACCELERATION_SCALE, _SPAN = range(8, 12)
+# What was learned, as differences from what is known at the start: columns of the memory.
+_MORE_INERTIA, _MORE_VISCOUS, _MORE_FRICTION, _LOAD = range(MEMORY, MEMORY + 4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,37 +86,35 @@ def adaptive_control(
     Nothing is learned while the drive is saturated or the setpoint too far for it.
     """
     for i in range(effort.shape[0]):
-        inertia, pole, viscous = gains[i, 0], gains[i, 1], gains[i, 2]
-        row = memory[i]
-        follow_motion(row, setpoint[i], measured[i], gains[i, 3], dt)
-        direction = friction_of_setpoint(row, setpoint[i], 1.0, gains[i, 5])
+        gain, row = gains[i], memory[i]
+        inertia, pole, viscous = gain[_INERTIA], gain[_POLE], gain[_VISCOUS]
+        follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
+        direction = friction_of_setpoint(row, setpoint[i], 1.0, gain[_TRAVEL])
         off = setpoint[i] - measured[i]
-        error, share = approach(off, gains[i, 11]), closeness(off, gains[i, 11])
-        rate = share * row[4] - row[1]
-        speed, acceleration = share * row[4] + pole * error, share * row[5] + pole * rate
+        error, share = approach(off, gain[_RANGE]), closeness(off, gain[_RANGE])
+        wanted = share * row[SET_SPEED]
+        rate = wanted - row[SPEED]
+        speed, acceleration = wanted + pole * error, share * row[SET_ACCELERATION] + pole * rate
         slip = rate + pole * error
-        friction = (gains[i, 4] + row[_FRICTION]) * direction
+        friction = (gain[_FRICTION] + row[_MORE_FRICTION]) * direction
         held = friction + row[_LOAD] + feedforward[i]
-        moving = (inertia + row[_INERTIA]) * acceleration + (viscous + row[_VISCOUS]) * speed
+        moving = (inertia + row[_MORE_INERTIA]) * acceleration
+        moving += (viscous + row[_MORE_VISCOUS]) * speed
         asked = moving + held + 2.0 * pole * inertia * slip
         effort[i] = min(max(asked, -limit[i]), limit[i])
-        row[6] = (effort[i] - held - viscous * row[1]) / inertia
+        row[EXPECTED] = (effort[i] - held - viscous * row[SPEED]) / inertia
         if effort[i] == asked and share == 1.0:
-            change = gains[i, 7] * beyond(slip, pole * gains[i, 6]) * dt
-            row[_INERTIA] = learn(
-                row[_INERTIA], change * acceleration / gains[i, 9] ** 2, gains[i, 10]
-            )
-            row[_VISCOUS] = learn(row[_VISCOUS], change * speed / gains[i, 8] ** 2, viscous)
-            row[_FRICTION] = learn(row[_FRICTION], change * direction, gains[i, 4])
+            change = gain[_RATE] * beyond(slip, pole * gain[_DEAD_BAND]) * dt
+            more = change * acceleration / gain[_ACCELERATION_SCALE] ** 2
+            row[_MORE_INERTIA] = learn(row[_MORE_INERTIA], more, gain[_SPAN])
+            more = change * speed / gain[_SPEED_SCALE] ** 2
+            row[_MORE_VISCOUS] = learn(row[_MORE_VISCOUS], more, viscous)
+            row[_MORE_FRICTION] = learn(row[_MORE_FRICTION], change * direction, gain[_FRICTION])
             row[_LOAD] = learn(row[_LOAD], change, limit[i])
 
 
 def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array) -> Array:
     """Table (n, 12) of what is known of each joint, and of how it learns.
-
-    Columns: inertia, pole, viscous friction, fading, dry friction, its travel, dead band, rate of
-    load, scales of speed and acceleration (limits of the drive), bound of the inertia,
-    linear range.
 
     Raises:
         ParameterError: The list has another length than the robot has joints.
@@ -118,13 +123,15 @@ def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array)
     drives, pole = drives_and_poles(robot, "adaptive", p.bandwidth)
     fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
     friction, count = p.friction_share * known_friction(robot), drives.encoder_step
-    columns = (
-        drives.inertia, pole, viscous, fading, friction, p.friction_counts * count,
-        p.dead_band * count, p.rate * pole**2 * drives.inertia, drives.speed_limit,
-        drives.effort_limit / drives.inertia, p.span * drives.inertia,
-        linear_range(robot, pole, 3.0),
-    )  # fmt: skip
-    return np.stack(columns, axis=1)
+    table = np.empty((robot.n, 12))
+    table[:, _INERTIA], table[:, _POLE], table[:, _VISCOUS] = drives.inertia, pole, viscous
+    table[:, _FADING], table[:, _FRICTION] = fading, friction
+    table[:, _TRAVEL], table[:, _DEAD_BAND] = p.friction_counts * count, p.dead_band * count
+    table[:, _RANGE] = linear_range(robot, pole, 3.0)
+    table[:, _RATE], table[:, _SPAN] = p.rate * pole**2 * drives.inertia, p.span * drives.inertia
+    table[:, _SPEED_SCALE] = drives.speed_limit
+    table[:, _ACCELERATION_SCALE] = drives.effort_limit / drives.inertia
+    return table
 
 
 ADAPTIVE = Controller(

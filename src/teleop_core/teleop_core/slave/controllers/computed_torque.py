@@ -18,7 +18,11 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, fields
 from teleop_core.slave.controllers.motion_estimates import (
+    EXPECTED,
     MEMORY,
+    SET_ACCELERATION,
+    SET_SPEED,
+    SPEED,
     approach,
     begin_motion,
     beyond,
@@ -28,7 +32,9 @@ from teleop_core.slave.controllers.motion_estimates import (
     linear_range,
 )
 
-_INTEGRAL, _WANTED = MEMORY, MEMORY + 1
+# Columns of the table of gains.
+_POLE, _FADING, _VISCOUS, _DEAD_BAND, _RANGE = range(5)
+_INTEGRAL, _WANTED = MEMORY, MEMORY + 1  # columns of the memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,30 +64,31 @@ def computed_torque_control(
     """
     n = effort.shape[0]
     for i in range(n):
-        row, pole = memory[i], gains[i, 0]
-        follow_motion(row, setpoint[i], measured[i], gains[i, 1], dt)
+        row, pole = memory[i], gains[i, _POLE]
+        follow_motion(row, setpoint[i], measured[i], gains[i, _FADING], dt)
         off = setpoint[i] - measured[i]
-        error, share = approach(off, gains[i, 4]), closeness(off, gains[i, 4])
-        wanted = 3.0 * pole * (share * row[4] - row[1] + pole * error) + share * row[5]
+        error, share = approach(off, gains[i, _RANGE]), closeness(off, gains[i, _RANGE])
+        rate = share * row[SET_SPEED] - row[SPEED]
+        wanted = 3.0 * pole * (rate + pole * error) + share * row[SET_ACCELERATION]
         row[_WANTED] = wanted + row[_INTEGRAL]
-        row[6] = wanted
+        row[EXPECTED] = wanted
     for i in range(n):
-        row, pole, error = memory[i], gains[i, 0], setpoint[i] - measured[i]
-        share = closeness(error, gains[i, 4])
-        asked = feedforward[n + i] + gains[i, 2] * share * row[4]
+        row, pole, error = memory[i], gains[i, _POLE], setpoint[i] - measured[i]
+        share = closeness(error, gains[i, _RANGE])
+        asked = feedforward[n + i] + gains[i, _VISCOUS] * share * row[SET_SPEED]
         for j in range(n):
             asked += feedforward[2 * n + n * i + j] * memory[j, _WANTED]
         effort[i] = min(max(asked, -limit[i]), limit[i])
         if share == 1.0 and (effort[i] == asked or asked * error < 0.0):
-            row[_INTEGRAL] += pole * pole * pole * beyond(error, gains[i, 3]) * dt
+            row[_INTEGRAL] += pole * pole * pole * beyond(error, gains[i, _DEAD_BAND]) * dt
         # A saturated joint accelerates by less than was wanted of it.
-        row[6] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
+        row[EXPECTED] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
 
 
 def computed_torque_gains(
     parameters: ComputedTorqueParameters, robot: Robot, viscous: Array
 ) -> Array:
-    """Pole, fading, viscous friction, dead band and linear range of each joint, (n, 5).
+    """Table (n, 5): pole, friction, dead band and linear range of each joint.
 
     Raises:
         ParameterError: The list has another length than the robot has joints.
@@ -89,8 +96,11 @@ def computed_torque_gains(
     p = parameters
     drives, pole = drives_and_poles(robot, "computed_torque", p.bandwidth)
     fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
-    linear = linear_range(robot, pole, 3.0)
-    return np.stack((pole, fading, viscous, p.dead_band * drives.encoder_step, linear), axis=1)
+    table = np.empty((robot.n, 5))
+    table[:, _POLE], table[:, _FADING], table[:, _VISCOUS] = pole, fading, viscous
+    table[:, _DEAD_BAND] = p.dead_band * drives.encoder_step
+    table[:, _RANGE] = linear_range(robot, pole, 3.0)
+    return table
 
 
 COMPUTED_TORQUE = Controller(

@@ -19,7 +19,12 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, fields
 from teleop_core.slave.controllers.motion_estimates import (
+    EXPECTED,
     MEMORY,
+    SET_ACCELERATION,
+    SET_SPEED,
+    SPEED,
+    UNEXPLAINED,
     approach,
     beyond,
     closeness,
@@ -31,6 +36,8 @@ from teleop_core.slave.controllers.motion_estimates import (
     linear_range,
 )
 
+# Columns of the table of gains.
+_INERTIA, _POLE, _VISCOUS, _FADING, _FRICTION, _TRAVEL, _DEAD_BAND, _RANGE = range(8)
 _HELD = MEMORY  # what the arm weighs at the start, beyond what is compensated
 
 
@@ -62,25 +69,28 @@ def disturbance_observer_control(
     expected of the joint is what the limit left, so the observer does not wind up.
     """
     for i in range(effort.shape[0]):
-        inertia, pole, viscous, fading = gains[i, 0], gains[i, 1], gains[i, 2], gains[i, 3]
-        row = memory[i]
-        follow_motion(row, setpoint[i], measured[i], fading, dt)
-        friction = friction_of_setpoint(row, setpoint[i], gains[i, 4], gains[i, 5])
-        off = beyond(setpoint[i] - measured[i], gains[i, 6])
-        error, share = approach(off, gains[i, 7]), closeness(off, gains[i, 7])
-        speed = share * row[4]
-        wanted = share * row[5] + 2.0 * pole * (speed - row[1]) + pole * pole * error - row[2]
+        gain, row = gains[i], memory[i]
+        inertia, pole, viscous = gain[_INERTIA], gain[_POLE], gain[_VISCOUS]
+        follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
+        friction = friction_of_setpoint(row, setpoint[i], gain[_FRICTION], gain[_TRAVEL])
+        off = beyond(setpoint[i] - measured[i], gain[_DEAD_BAND])
+        error, share = approach(off, gain[_RANGE]), closeness(off, gain[_RANGE])
+        speed = share * row[SET_SPEED]
+        wanted = (
+            share * row[SET_ACCELERATION]
+            + 2.0 * pole * (speed - row[SPEED])
+            + pole * pole * error
+            - row[UNEXPLAINED]
+        )
         known = feedforward[i] + friction + row[_HELD]
         effort[i] = min(max(inertia * wanted + viscous * speed + known, -limit[i]), limit[i])
-        row[6] = (effort[i] - known - viscous * row[1]) / inertia
+        row[EXPECTED] = (effort[i] - known - viscous * row[SPEED]) / inertia
 
 
 def disturbance_observer_gains(
     parameters: DisturbanceObserverParameters, robot: Robot, viscous: Array
 ) -> Array:
-    """Inertia, pole, viscous friction, fading, dry friction, its travel, dead band, linear range.
-
-    The table is (n, 8).
+    """Table (n, 8): inertia, pole, friction, dead band and linear range of each joint.
 
     Raises:
         ParameterError: The list has another length than the robot has joints.
@@ -92,11 +102,12 @@ def disturbance_observer_gains(
     )  # fmt: skip
     friction = p.friction_share * known_friction(robot)
     count = drives.encoder_step
-    columns = (
-        drives.inertia, pole, viscous, fading, friction, p.friction_counts * count,
-        p.dead_band * count, linear_range(robot, pole, 1.0),
-    )  # fmt: skip
-    return np.stack(columns, axis=1)
+    table = np.empty((robot.n, 8))
+    table[:, _INERTIA], table[:, _POLE], table[:, _VISCOUS] = drives.inertia, pole, viscous
+    table[:, _FADING], table[:, _FRICTION] = fading, friction
+    table[:, _TRAVEL], table[:, _DEAD_BAND] = p.friction_counts * count, p.dead_band * count
+    table[:, _RANGE] = linear_range(robot, pole, 1.0)
+    return table
 
 
 DISTURBANCE_OBSERVER = Controller(

@@ -19,7 +19,11 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, fields
 from teleop_core.slave.controllers.motion_estimates import (
+    EXPECTED,
     MEMORY,
+    SET_ACCELERATION,
+    SET_SPEED,
+    SPEED,
     approach,
     beyond,
     closeness,
@@ -32,6 +36,8 @@ from teleop_core.slave.controllers.motion_estimates import (
 )
 from teleop_core.slave.controllers.pid import critically_damped_gains
 
+# Columns of the table of gains.
+_KP, _KI, _KD, _INERTIA, _VISCOUS, _FADING, _FRICTION, _TRAVEL, _DEAD_BAND, _RANGE = range(10)
 _INTEGRAL = MEMORY
 
 
@@ -63,30 +69,31 @@ def friction_compensation_control(
     the error would push it further.
     """
     for i in range(effort.shape[0]):
-        row, inertia, viscous = memory[i], gains[i, 3], gains[i, 4]
-        follow_motion(row, setpoint[i], measured[i], gains[i, 5], dt)
-        friction = friction_of_setpoint(row, setpoint[i], gains[i, 6], gains[i, 7])
+        gain, row = gains[i], memory[i]
+        inertia, viscous = gain[_INERTIA], gain[_VISCOUS]
+        follow_motion(row, setpoint[i], measured[i], gain[_FADING], dt)
+        friction = friction_of_setpoint(row, setpoint[i], gain[_FRICTION], gain[_TRAVEL])
         off = setpoint[i] - measured[i]
-        error, share = approach(off, gains[i, 9]), closeness(off, gains[i, 9])
-        speed = share * row[4]
-        free = gains[i, 0] * error + gains[i, 2] * (speed - row[1])
-        free += inertia * share * row[5] + viscous * speed + friction + feedforward[i]
-        integral = row[_INTEGRAL] + gains[i, 1] * beyond(error, gains[i, 8]) * dt
+        error, share = approach(off, gain[_RANGE]), closeness(off, gain[_RANGE])
+        speed = share * row[SET_SPEED]
+        free = gain[_KP] * error + gain[_KD] * (speed - row[SPEED])
+        free += (
+            inertia * share * row[SET_ACCELERATION] + viscous * speed + friction + feedforward[i]
+        )
+        integral = row[_INTEGRAL] + gain[_KI] * beyond(error, gain[_DEAD_BAND]) * dt
         is_inside = abs(free + integral) <= limit[i] or (free + integral) * error < 0.0
         if share == 1.0 and is_inside:
             row[_INTEGRAL] = integral
         effort[i] = min(max(free + row[_INTEGRAL], -limit[i]), limit[i])
         # The load that the integral holds is not what accelerates.
         known = friction + feedforward[i] + row[_INTEGRAL]
-        row[6] = (effort[i] - known - viscous * row[1]) / inertia
+        row[EXPECTED] = (effort[i] - known - viscous * row[SPEED]) / inertia
 
 
 def friction_compensation_gains(
     parameters: FrictionCompensationParameters, robot: Robot, viscous: Array
 ) -> Array:
-    """Kp, Ki, Kd, inertia, viscous, fading, dry friction, its travel, dead band, range.
-
-    The table is (n, 10).
+    """Table (n, 10): PID gains, inertia, friction, dead band and linear range of each joint.
 
     Raises:
         ParameterError: The list has another length than the robot has joints.
@@ -96,11 +103,12 @@ def friction_compensation_gains(
     kp, ki, kd = critically_damped_gains(drives.inertia, viscous, pole)
     fading = fading_of(robot, pole, p.filter_ratio, stiffness=3.0, damping=3.0)
     friction, count = p.friction_share * known_friction(robot), drives.encoder_step
-    columns = (
-        kp, ki, kd, drives.inertia, viscous, fading, friction, p.friction_counts * count,
-        p.dead_band * count, linear_range(robot, pole, 3.0),
-    )  # fmt: skip
-    return np.stack(columns, axis=1)
+    table = np.empty((robot.n, 10))
+    table[:, _KP], table[:, _KI], table[:, _KD] = kp, ki, kd
+    table[:, _INERTIA], table[:, _VISCOUS], table[:, _FADING] = drives.inertia, viscous, fading
+    table[:, _FRICTION], table[:, _TRAVEL] = friction, p.friction_counts * count
+    table[:, _DEAD_BAND], table[:, _RANGE] = p.dead_band * count, linear_range(robot, pole, 3.0)
+    return table
 
 
 FRICTION_COMPENSATION = Controller(

@@ -5,14 +5,7 @@ second degree, which follows a constant acceleration without lag; that of the jo
 acceleration the law expects of its own effort, and so finds what else accelerates it. Both have the
 same memory, so that their difference is that of motions of the same age.
 
-Every law keeps the first :data:`MEMORY` numbers of a joint for this:
-
-====  ========================================================================================
-0-2   position, speed, and acceleration that the expected one does not explain, of the joint
-3-5   position, speed and acceleration of the setpoint
-6     expected acceleration of the joint, which the law writes
-7-8   last setpoint and friction of its motion, see :func:`friction_of_setpoint`
-====  ========================================================================================
+Every law keeps the first :data:`MEMORY` numbers of a joint for this, by the names below.
 
 Source:
     Morrison 1969, Introduction to Sequential Smoothing and Prediction, chapter 13; Brookner 1998,
@@ -32,6 +25,13 @@ from teleop_core.slave.controllers import Begin, Shift
 
 MEMORY = 9
 """Numbers of each joint that :func:`follow_motion` and :func:`friction_of_setpoint` keep."""
+PLACE, SPEED, UNEXPLAINED = 0, 1, 2
+"""Of the joint: position, speed, and acceleration beside the expected one."""
+SET_PLACE, SET_SPEED, SET_ACCELERATION = 3, 4, 5
+"""Of its setpoint: position, speed, acceleration."""
+EXPECTED = 6
+"""Expected acceleration of the joint, which the law writes."""
+_LAST_SETPOINT, _BENT = 7, 8
 EFFORT_SHARE = 0.02
 FRICTION_SHARE = 0.5
 """What one encoder count may change of an effort: shares of the drive's limit, of dry friction."""
@@ -69,8 +69,8 @@ def follow_motion(
     memory: Array, setpoint: float, measured: float, fading: float, dt: float
 ) -> None:
     """Take the next setpoint and the next measured position of a joint into their estimates."""
-    follow(memory, 0, measured, memory[6], fading, dt)
-    follow(memory, 3, setpoint, 0.0, fading, dt)
+    follow(memory, PLACE, measured, memory[EXPECTED], fading, dt)
+    follow(memory, SET_PLACE, setpoint, 0.0, fading, dt)
 
 
 @kernel
@@ -93,9 +93,9 @@ def friction_of_setpoint(memory: Array, setpoint: float, most: float, travel: fl
     Source:
         Dahl 1968; Dupont, Hayward, Armstrong and Altpeter 2002 (elasto-plastic presliding).
     """
-    bent = memory[8] + (setpoint - memory[7]) / travel
-    memory[7], memory[8] = setpoint, min(max(bent, -1.0), 1.0)
-    return most * memory[8]
+    bent = memory[_BENT] + (setpoint - memory[_LAST_SETPOINT]) / travel
+    memory[_LAST_SETPOINT], memory[_BENT] = setpoint, min(max(bent, -1.0), 1.0)
+    return most * memory[_BENT]
 
 
 @kernel
@@ -128,7 +128,7 @@ def beyond(value: float, room: float) -> float:
 
 def begin_motion(memory: Array, measured: Array, _effort: Array) -> None:
     """Let the estimates of all joints (n, m) begin at rest at ``measured`` (n,)."""
-    memory[:, 0] = memory[:, 3] = memory[:, 7] = measured
+    memory[:, PLACE] = memory[:, SET_PLACE] = memory[:, _LAST_SETPOINT] = measured
 
 
 def holding(column: int) -> tuple[Begin, Shift]:

@@ -20,6 +20,11 @@ class PdParameters:
     )
 
 
+# Columns of the table of gains, and of the memory.
+_KP, _KD = range(2)
+_LAST, _SPEED = range(2)
+
+
 @kernel
 def pd_control(
     gains: Array,
@@ -37,9 +42,10 @@ def pd_control(
     holds the last position and the filtered speed.
     """
     for i in range(effort.shape[0]):
-        memory[i, 1] += ((measured[i] - memory[i, 0]) / dt - memory[i, 1]) / 2.0
-        memory[i, 0] = measured[i]
-        pull = gains[i, 0] * (setpoint[i] - measured[i]) - gains[i, 1] * memory[i, 1]
+        row = memory[i]
+        row[_SPEED] += ((measured[i] - row[_LAST]) / dt - row[_SPEED]) / 2.0
+        row[_LAST] = measured[i]
+        pull = gains[i, _KP] * (setpoint[i] - measured[i]) - gains[i, _KD] * row[_SPEED]
         effort[i] = min(max(pull + feedforward[i], -limit[i]), limit[i])
 
 
@@ -56,7 +62,7 @@ def pd_gains(parameters: PdParameters, robot: Robot, viscous: Array) -> Array:
 
 def begin(memory: Array, measured: Array, effort: Array) -> None:
     """Start at rest; without an integrator nothing holds gravity that is not compensated."""
-    memory[:, 0] = measured
+    memory[:, _LAST] = measured
 
 
 PD = Controller("pd", PdParameters, pd_gains, pd_control, 2, begin)

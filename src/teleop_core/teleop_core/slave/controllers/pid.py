@@ -63,6 +63,11 @@ def critically_damped_gains(
     return kp, ki, kd
 
 
+# Columns of the table of gains, and of the memory.
+_KP, _KI, _KD, _WEIGHT = range(4)
+_INTEGRAL, _LAST, _SPEED, _LAGGED = range(4)
+
+
 @kernel
 def pid_step(
     setpoint: float,
@@ -91,16 +96,16 @@ def pid_step(
     Returns:
         Effort [N·m or N].
     """
-    memory[2] += ((measured - memory[1]) / dt - memory[2]) / 2.0
-    memory[1] = measured
+    memory[_SPEED] += ((measured - memory[_LAST]) / dt - memory[_SPEED]) / 2.0
+    memory[_LAST] = measured
     error = setpoint - measured
-    free = gains[0] * error - gains[2] * memory[2] + feedforward
-    integral = memory[0] + gains[1] * error * dt
+    free = gains[_KP] * error - gains[_KD] * memory[_SPEED] + feedforward
+    integral = memory[_INTEGRAL] + gains[_KI] * error * dt
     effort = free + integral
     if abs(effort) <= limit or effort * error < 0.0:
-        memory[0] = integral
+        memory[_INTEGRAL] = integral
     else:
-        effort = free + memory[0]
+        effort = free + memory[_INTEGRAL]
     return min(max(effort, -limit), limit)
 
 
@@ -130,15 +135,15 @@ def weighted_setpoint(
         room: What the drive can give beside the feedforward [N·m or N].
         dt: Tick [s], > 0.
     """
-    pull, weight, near = gains[1] * dt, gains[3], setpoint
+    pull, weight, near = gains[_KI] * dt, gains[_WEIGHT], setpoint
     if weight == 1.0 or pull == 0.0:  # without an integral the lag would stand still
-        memory[3] = setpoint
+        memory[_LAGGED] = setpoint
         return setpoint
-    linear = room / (max(weight, THIRD) * gains[0] + 1e-300)
+    linear = room / (max(weight, THIRD) * gains[_KP] + 1e-300)
     if abs(setpoint - measured) > linear:
         near = measured + approach(setpoint - measured, linear)
-    memory[3] += (near - memory[3]) * (pull / (gains[0] + pull))
-    return weight * near + (1.0 - weight) * memory[3]
+    memory[_LAGGED] += (near - memory[_LAGGED]) * (pull / (gains[_KP] + pull))
+    return weight * near + (1.0 - weight) * memory[_LAGGED]
 
 
 @kernel
@@ -177,13 +182,13 @@ def pid_gains(parameters: PidParameters, robot: Robot, viscous: Array) -> Array:
 
 def begin(memory: Array, measured: Array, effort: Array) -> None:
     """Let the integrators hold the arm where it is."""
-    memory[:, 0] = effort
-    memory[:, 1] = memory[:, 3] = measured
+    memory[:, _INTEGRAL] = effort
+    memory[:, _LAST] = memory[:, _LAGGED] = measured
 
 
 def shift(memory: Array, effort: Array) -> None:
     """Let the integrators take over what the feedforward no longer gives."""
-    memory[:, 0] += effort
+    memory[:, _INTEGRAL] += effort
 
 
 PID = Controller("pid", PidParameters, pid_gains, pid_control, 4, begin, shift)

@@ -39,6 +39,11 @@ class SourcePidParameters:
     kd: tuple[float, ...] = parameter((), lower=0.0, doc="N·m·s/rad or N·s/m of each joint")
 
 
+# Columns of the table of gains, and of the memory.
+_KP, _KI, _KD = range(3)
+_INTEGRAL, _LAST = range(2)
+
+
 @kernel
 def source_pid_control(
     gains: Array,
@@ -57,11 +62,13 @@ def source_pid_control(
     for i in range(effort.shape[0]):
         error = setpoint[i] - measured[i]
         # Without integral action nothing holds what the arm weighed at the start either.
-        integral = memory[i, 0] + gains[i, 1] * dt * error if gains[i, 1] > 0.0 else 0.0
-        memory[i, 0] = min(max(integral, -limit[i]), limit[i])
-        change = (error - memory[i, 1]) / dt
-        memory[i, 1] = error
-        effort[i] = gains[i, 0] * error + memory[i, 0] + gains[i, 2] * change + feedforward[i]
+        integral = memory[i, _INTEGRAL] + gains[i, _KI] * dt * error if gains[i, _KI] > 0.0 else 0.0
+        memory[i, _INTEGRAL] = min(max(integral, -limit[i]), limit[i])
+        change = (error - memory[i, _LAST]) / dt
+        memory[i, _LAST] = error
+        effort[i] = (
+            gains[i, _KP] * error + memory[i, _INTEGRAL] + gains[i, _KD] * change + feedforward[i]
+        )
 
 
 def loaded_axes(robot: Robot) -> NDArray[np.bool_]:
@@ -96,7 +103,7 @@ def source_pid_gains(parameters: SourcePidParameters, robot: Robot, viscous: Arr
 
 def begin(memory: Array, measured: Array, effort: Array) -> None:
     """Start at rest: what holds the arm is in the integrals, as far as there are any."""
-    memory[:, 0] = effort
+    memory[:, _INTEGRAL] = effort
 
 
 def shift(memory: Array, effort: Array) -> None:
