@@ -129,6 +129,26 @@ def _group_cost(
 
 
 @inner
+def arm_cost(q: Array, K: Array, seed: Array, limits: Array) -> float:
+    """Least cost of all branches with the first group's joints of ``q``, those turned to the seed.
+
+    The last entry of ``q`` says whether they can reach.
+    """
+    is_path, n = math.isfinite(limits[2, 0]), seed.shape[0]
+    turn(q, seed, limits, 0, n)
+    cost = _group_cost(q, K, seed, limits, 1, not is_path)
+    return cost if is_path or q[n] > 0.5 else cost + _INEXACT
+
+
+@inner
+def branch_cost(q: Array, seed: Array, limits: Array) -> float:
+    """Cost of a branch with free steps: largest move, inside limits before outside."""
+    n = seed.shape[0]
+    turn(q, seed, limits, 0, n)
+    return cost_of(q, seed, limits, 0, n, True) + (0.0 if q[n] > 0.5 else _INEXACT)
+
+
+@inner
 def _is_better(
     q: Array, best: Array, K: Array, seed: Array, limits: Array, do_limits_count: bool
 ) -> bool:
@@ -158,13 +178,13 @@ def choose(
     n, is_path, best, least, is_exact = q.shape[0], math.isfinite(limits[2, 0]), -1, math.inf, False
     for k in range(count):
         trial = found[k]
-        turn(trial, seed, limits, 0, n)
         is_exact = is_exact or trial[n] > 0.5
         if is_path:
+            turn(trial, seed, limits, 0, n)
             if best < 0 or _is_better(trial, found[best], K, seed, limits, is_beside):
                 best = k
             continue
-        cost = cost_of(trial, seed, limits, 0, n, True) + (0.0 if trial[n] > 0.5 else _INEXACT)
+        cost = branch_cost(trial, seed, limits)
         if cost < least:
             best, least = k, cost
     for i in range(n):

@@ -18,9 +18,11 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.branches import BESIDE
+from teleop_core.robots.branches import BESIDE, OUTSIDE
 from teleop_core.robots.closed_form import (
     angle_of,
+    arm_cost,
+    branch_cost,
     choose,
     constants_at,
     kept,
@@ -118,43 +120,73 @@ def _last_angle(M: Array, K: Array, at: int, cx: float, sx: float, cy: float, sy
     return math.atan2(sine, cosine)
 
 
+@inner
+def _wrist(G: Array, K: Array, arm: Array, M: Array, N: Array, seed: Array, q: Array) -> float:
+    """Write both branches of an arm (7,), joints 1 to 3, into q (2, 7); the wrist's least spread.
+
+    ``M`` and ``N`` are memory; the wrist's angles stand in M at last.
+    """
+    for i in range(3):
+        for j in range(3):
+            M[i, j] = G[i, j]
+    undo_turn(arm[3], M, 3)
+    undo_between(K, _F1, M, N, 3)
+    undo_turn(arm[4], N, 3)
+    undo_between(K, _F2, N, M, 3)
+    undo_turn(arm[5], M, 3)
+    undo_between(K, _F3, M, N, 3)
+    spread, is_wrist = wrist_angles(N, K, _F4, angle_of(K, 6, 3, seed), M)
+    for j in range(2):
+        q[j, 6] = arm[2] * is_wrist
+        for i in range(3):
+            set_angle(K, 6, i, arm[3 + i], q[j])
+            set_angle(K, 6, 3 + i, M[j, i], q[j])
+    return min(spread, math.pi - spread)
+
+
 @kernel
-def _branches(T: Array, geometry: Array, seed: Array, found: Array) -> tuple[int, float]:
-    """Write all branches into ``found`` (8, 7), and whether each reaches the pose.
+def _branches(
+    T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array
+) -> tuple[int, float]:
+    """Write branches into ``found`` (9, 7), and whether each reaches the pose.
+
+    Unless all are wanted, the arms of the least moves come first, and none that cannot win: with
+    free steps those that move more than a whole branch inside the limits does, in a path all after
+    the first that reaches. Row 8 is memory.
 
     Returns:
         How many, and the least half difference [rad] of a wrist's two angles y.
     """
-    K, work = geometry[constants_at(6) :], np.empty((30, 7))
+    K, work = geometry[constants_at(6) :], np.empty((29, 7))
     G, M, N, A, B = work[7:11], work[11:15], work[15:19], work[19:21], work[21:23]
-    h, pairs, angles = work[23], work[24:28], work[28:30]
+    h, arms, trial, is_path = work[23], work[24:28], found[8], math.isfinite(limits[2, 0])
     wanted_motion(T, K, 6, M, G)
     _equations(G, K, A, B, h)
     h[2], h[3] = angle_of(K, 6, 0, seed), angle_of(K, 6, 2, seed)
-    count, least = pair_of_angles(A, B, h, K[RULE : RULE + 4], h[2:4], work[:7], pairs), math.inf
-    for k in range(count):
-        first, third = pairs[k, 0], pairs[k, 1]
-        second = _joint2(G, K, first, third, angle_of(K, 6, 1, seed))
-        for i in range(3):
-            for j in range(3):
-                M[i, j] = G[i, j]
-        undo_turn(first, M, 3)
-        undo_between(K, _F1, M, N, 3)
-        undo_turn(second, N, 3)
-        undo_between(K, _F2, N, M, 3)
-        undo_turn(third, M, 3)
-        undo_between(K, _F3, M, N, 3)
-        spread, is_wrist = wrist_angles(N, K, _F4, angle_of(K, 6, 3, seed), angles)
-        least = min(least, spread, math.pi - spread)
-        for j in range(2):
-            q = found[2 * k + j]
-            q[6] = pairs[k, 2] * is_wrist
-            set_angle(K, 6, 0, first, q)
-            set_angle(K, 6, 1, second, q)
-            set_angle(K, 6, 2, third, q)
-            for i in range(3):
-                set_angle(K, 6, 3 + i, angles[j, i], q)
-    return 2 * count, least
+    count = pair_of_angles(A, B, h, K[RULE : RULE + 4], h[2:4], work[:7], arms)
+    for k in range(count):  # whether it reaches, joints 1 to 3, cost
+        arms[k, 3], arms[k, 5] = arms[k, 0], arms[k, 1]
+        arms[k, 4] = _joint2(G, K, arms[k, 3], arms[k, 5], angle_of(K, 6, 1, seed))
+        for i in range(6):
+            set_angle(K, 6, i, arms[k, 3 + i % 3], trial)
+        trial[6] = arms[k, 2]
+        arms[k, 6] = 0.0 if do_all else arm_cost(trial, K, seed, limits)
+    done, least, best = 0, math.inf, math.inf
+    for _ in range(count):
+        arm = arms[0]
+        for k in range(1, count):
+            arm = arms[k] if arms[k, 6] < arm[6] else arm
+        if arm[6] >= best and best < OUTSIDE:
+            break
+        least = min(least, _wrist(G, K, arm, M, N, seed, found[done : done + 2]))
+        for k in range(done, done + 2 if not do_all else done):
+            if is_path:
+                best = -1.0 if arm[2] > 0.5 else best
+            else:
+                best = min(best, branch_cost(found[k], seed, limits))
+        done += 2
+        arm[6] = math.inf
+    return done, least
 
 
 @kernel
@@ -162,8 +194,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`."""
     if not is_askable(T, seed):
         return -1
-    found = np.empty((12, 7))
-    count, least = _branches(T, geometry, seed, found)
+    found = np.empty((13, 7))
+    count, least = _branches(T, geometry, seed, limits, False, found)
     K = geometry[constants_at(6) :]
     reach, _ = choose(found, count, seed, limits, K, least < BESIDE, q)
     return int(settled(T, seed, limits, geometry, reach, found, count, q, residual))
@@ -175,6 +207,6 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
 
     On a singularity, where a joint is free, it is zero and branches may coincide.
     """
-    found = np.empty((8, 7))
-    count = _branches(T, geometry, np.zeros(6), found)[0]
+    found = np.empty((9, 7))
+    count = _branches(T, geometry, np.zeros(6), np.empty((3, 6)), True, found)[0]
     return int(kept(T, found, count, geometry, solutions))

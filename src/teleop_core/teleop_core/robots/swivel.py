@@ -39,7 +39,8 @@ from teleop_core.robots.swivel_arcs import MARGIN, blend, swivels
 
 _F1, _F2, _F3, _F4, _F5 = (39, 51, 63, 75, 87)
 _SPEED = 0.3  # share of a joint's largest step by which psi goes back to its margin in a path
-_ROUNDS = 12  # of the search for the least move
+_ROUNDS = 8  # of the search for the least move
+_BESIDE = 0.3  # [rad] from the seed up to which that is the answer
 
 
 @inner
@@ -210,6 +211,15 @@ def _least_move(T: Array, seed: Array, limits: Array, geometry: Array, q: Array)
 
 
 @inner
+def _is_beside(q: Array, seed: Array) -> bool:
+    """Whether no joint has moved so far that another branch may be nearer."""
+    most = 0.0
+    for i in range(7):
+        most = max(most, abs(q[i] - seed[i]))
+    return most < _BESIDE
+
+
+@inner
 def _has_room(q: Array, limits: Array) -> bool:
     """Whether no joint is within the margin of its limits."""
     room = math.inf
@@ -225,10 +235,10 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         return -1
     found, work, K = np.empty((13, 8)), np.empty((60, 4)), geometry[constants_at(7) :]
     is_free, posture = not math.isfinite(limits[2, 0]), seed
-    if not is_free and _least_move(T, seed, limits, geometry, q):
-        if _has_room(q, limits):
+    if _least_move(T, seed, limits, geometry, q):
+        if _has_room(q, limits) and _is_beside(q, seed):
             return int(settled(T, seed, limits, geometry, 2, found, 0, q, residual))
-        posture = q.copy()
+        posture = seed if is_free else q.copy()
     least = _branches(T, geometry, posture, limits, is_free, found, work)
     reach, best = choose(found, 8, posture, limits, K, least < BESIDE, q)
     if not is_free and reach == 2:
