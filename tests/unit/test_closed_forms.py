@@ -17,7 +17,7 @@ from random_arms import (
     urdf,
     wrist_axes,
 )
-from teleop_core.robots import IkStatus, dh_kernels, load_robot
+from teleop_core.robots import IkStatus, dh_kernels, load_robot, swivel
 from teleop_core.robots.chains import chain_of
 
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
@@ -233,6 +233,20 @@ def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(seed, load):
             assert np.isin(answer.status, REACHED).all()
             assert answer.residual.max() < 1e-9
             assert ((answer.q >= arm.lower) & (answer.q <= arm.upper)).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(seed, load):
+    rng = np.random.default_rng(40 + seed)
+    middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.02, 0.5, 7)
+    arm = load(swivel_axes(rng), [(float(m - h), float(m + h))
+                                  for m, h in zip(middle, half, strict=True)])  # fmt: skip
+    found, work = np.empty((13, 8)), np.empty((60, 4))
+    for q in rng.uniform(arm.lower, arm.upper, (100, 7)):
+        swivel._branches(arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(), True, found,
+                         work)  # fmt: skip
+        off = (found[:8, :7] - middle + math.pi) % (2.0 * math.pi) - math.pi
+        assert ((abs(off) <= half + 1e-9).all(axis=1) & (found[:8, 7] > 0.5)).any()
 
 
 @pytest.mark.parametrize("limits", [IIWA14_LIMITS, [(-0.9, 0.7)] * 7], ids=["iiwa 14", "narrow"])
