@@ -90,7 +90,7 @@ def test_a_search_from_200_starts_finds_no_further_solution(kind, make, word, si
 TWO_ROUNDS = [WIDE, WIDE, (-1.0, 5.5), WIDE, (-6.0, 0.5), WIDE]
 
 
-@pytest.mark.parametrize("limits", [TWO_ROUNDS, [(-1.5, 2.2)] * 6], ids=["two rounds", "half one"])
+@pytest.mark.parametrize("limits", [TWO_ROUNDS, [(-0.3, 4.5)] * 6], ids=["two rounds", "one side"])
 def test_the_nearest_branch_inside_the_limits_answers_whole_turns_included(limits, load):
     arm = load(UR5E, limits)
     rng = np.random.default_rng(8)
