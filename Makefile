@@ -118,6 +118,7 @@ bench-setup: $(VENV)/.tested
 bench: bench-setup
 	$(BIN)/python benchmarks/session.py
 	$(BIN)/python benchmarks/kinematics.py
+	$(BIN)/python benchmarks/urdf_arms.py
 	$(BIN)/python benchmarks/live.py --seconds $(SECONDS_LIVE)
 
 # Starts and ends of live sessions under load, COUNT of each kind; about a quarter of an hour.

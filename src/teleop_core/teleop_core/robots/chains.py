@@ -26,7 +26,7 @@ def chain_of(robot: Robot) -> Chain | None:
         row = robot_from_table(table).geometry_row
     n = robot.n
     fixed = np.tile(np.eye(4), (n + 1, 1, 1))
-    fixed[:, :3] = row[n + 7 :].reshape(n + 1, 3, 4)
+    fixed[:, :3] = row[n + 7 : n + 7 + 12 * (n + 1)].reshape(n + 1, 3, 4)
     return Chain(kinds=row[:n].copy(), fixed=fixed, row=row)
 
 

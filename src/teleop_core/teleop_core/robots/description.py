@@ -30,6 +30,8 @@ def text(robot: "Robot") -> str:
         lines.append("  {:14} {:9.4f} … {:8.4f}   home {:8.4f}   start {:8.4f}".format(*row, start))
     lines += [f"room at {name}: {room_text(robot, q)}" for name, q in postures(robot).items()]
     lines.append(f"drives: {drives(robot)}")
+    if robot.solution:
+        lines.append(f"inverse kinematics: {robot.solution}")
     if _OF_CHAINS not in robot.geometry:
         lines.append("geometry: " + ", ".join(f"{k} = {v:g}" for k, v in robot.geometry.items()))
     tip = np.array2string(robot.solve_fk(robot.home).T, precision=4, suppress_small=True)

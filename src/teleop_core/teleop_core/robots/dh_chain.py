@@ -8,10 +8,10 @@ import numpy as np
 from teleop_core.base.errors import ShapeError
 from teleop_core.kernels.geometry import Array, checked_array, rotation, transform
 from teleop_core.kernels.portable import product
-from teleop_core.robots import dh_kernels
+from teleop_core.robots.decomposition import SEARCH, Solution
 from teleop_core.robots.dh_drives import drives_of
 from teleop_core.robots.drives import Drives
-from teleop_core.robots.kinematics import DIRECTIONS, Kernels
+from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
 
 # Elementary motions of one row, left to right: what, along or about which axis, by which symbol.
@@ -137,6 +137,7 @@ def chain_robot(
     reach: float,
     task: Sequence[str],
     drives: Drives,
+    solution: Solution = SEARCH,
 ) -> Robot:
     """Robot whose joints move about or along z, with constant transforms between them.
 
@@ -148,6 +149,7 @@ def chain_robot(
         reach: Length [m] by which distances count against angles; 1 m where it is 0.
         task: Directions that the arm is to control, of :data:`DIRECTIONS`.
         drives: Drive table.
+        solution: How its inverse kinematics are solved.
     """
     numbers = {
         f"fixed{i}_{r}{c}": float(matrix[r, c])
@@ -168,13 +170,10 @@ def chain_robot(
             "reach": reach if reach > 0.0 else 1.0,
             **{f"controls_{direction}": float(direction in task) for direction in DIRECTIONS},
             **numbers,
+            **{f"solution{i}": value for i, value in enumerate(solution.constants)},
         },
-        kernels=Kernels(
-            fk=dh_kernels.fk,
-            jacobian=dh_kernels.jacobian,
-            ik=dh_kernels.ik,
-            ik_all=dh_kernels.ik_all,
-        ),
+        kernels=solution.kernels,
+        solution=solution.text,
         drives=drives,
         task_mask=tuple(direction in task for direction in DIRECTIONS),
     )

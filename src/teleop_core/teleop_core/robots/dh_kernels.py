@@ -114,7 +114,7 @@ def _weighted_jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 
 @inner
-def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
+def descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
     """Lower the error from ``q`` (n,), inside a box (2, n), until it is zero or least.
 
     Returns:
@@ -176,13 +176,28 @@ def _search(T: Array, seed: Array, box: Array, geometry: Array, q: Array) -> Non
     trial, nearest = np.empty(q.shape[0]), math.inf
     for number in range(_STARTS):
         _start(number, box, trial)
-        if _descend(T, box, geometry, _ROUNDS, trial) > ZERO:
+        if descend(T, box, geometry, _ROUNDS, trial) > ZERO:
             continue
         distance = _distance(trial, seed)
         if distance < nearest:
             nearest = distance
             for i in range(q.shape[0]):
                 q[i] = trial[i]
+
+
+@inner
+def is_hardly_moving(q: Array, geometry: Array) -> bool:
+    """Whether small moves of the tip need large joint moves at ``q`` (n,)."""
+    J, A = np.empty((6, q.shape[0])), np.empty((6, 6))
+    _weighted_jacobian(q, geometry, J)
+    gram(J, np.ones(q.shape[0]), 0.0, A)
+    for r in range(6):
+        A[r, r] += 1.0 - geometry[q.shape[0] + 1 + r]
+    factorise(A)
+    pivot = A[0, 0]
+    for r in range(1, 6):
+        pivot = min(pivot, A[r, r])
+    return pivot < _NEAR
 
 
 @inner
@@ -199,15 +214,7 @@ def _status(q: Array, T: Array, box: Array, geometry: Array, residual: Array) ->
             if q[i] <= box[0, i] or q[i] >= box[1, i]:
                 return _LIMITED
         return _UNREACHABLE
-    J, A, pivot = np.empty((6, n)), np.empty((6, 6)), math.inf
-    _weighted_jacobian(q, geometry, J)
-    gram(J, np.ones(n), 0.0, A)
-    for r in range(6):
-        A[r, r] += 1.0 - geometry[n + 1 + r]
-    factorise(A)
-    for r in range(6):
-        pivot = min(pivot, A[r, r])
-    return _NEAR_SINGULAR if pivot < _NEAR else _FOLLOWED
+    return _NEAR_SINGULAR if is_hardly_moving(q, geometry) else _FOLLOWED
 
 
 @kernel
@@ -229,7 +236,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         box[0, i] = max(limits[0, i], near - limits[2, i])
         box[1, i] = min(limits[1, i], near + limits[2, i])
         q[i] = near
-    square = _descend(T, box, geometry, _PATH_ROUNDS if is_path else _ROUNDS, q)
+    square = descend(T, box, geometry, _PATH_ROUNDS if is_path else _ROUNDS, q)
     if square > ZERO and not is_path:
         _search(T, seed, box, geometry, q)
     return int(_status(q, T, box, geometry, residual))
@@ -248,7 +255,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
         box[0, i] = -box[1, i]
     for number in range(_ALL_STARTS):
         _start(number, box, trial)
-        is_new = _descend(T, box, geometry, _ROUNDS, trial) <= ZERO
+        is_new = descend(T, box, geometry, _ROUNDS, trial) <= ZERO
         for k in range(count):
             is_new = is_new and _distance(trial, solutions[k]) > _SAME
         if is_new and count < solutions.shape[0]:

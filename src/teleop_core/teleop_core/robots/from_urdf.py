@@ -32,6 +32,7 @@ from teleop_core.robots.chain_dynamics import (
     chain_row,
     inertia_matrix,
 )
+from teleop_core.robots.decomposition import solution_of
 from teleop_core.robots.dh_chain import DhJoint, chain_robot
 from teleop_core.robots.dh_drives import drives_of, least_inertia, parse_drives
 from teleop_core.robots.drives import ENTRIES, Drives
@@ -84,7 +85,8 @@ def load_urdf(
             controller feeds their gravity forward.
 
     Returns:
-        The robot, its base the root link, with numeric inverse kinematics. Home is zero, or the
+        The robot, its base the root link, with inverse kinematics in closed form if it is of a
+        class of :mod:`~teleop_core.robots.decomposition`, else by search. Home is zero, or the
         middle of limits without zero; continuous joints turn two rounds (assumed: ±2π).
 
     Raises:
@@ -127,6 +129,7 @@ def load_urdf(
         reach=reach,
         task=_task(task),
         drives=drives,
+        solution=solution_of(kinds, fixed, reach, _task(task)),
     )
     if dynamics == "independent":
         return robot

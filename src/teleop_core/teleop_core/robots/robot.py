@@ -76,6 +76,7 @@ class Robot:
         dynamics: Rigid-body model; None for axes that do not act on each other.
         hardware: What the real arm does beside its model; None where nobody knows.
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
+        solution: How inverse kinematics are solved, in words; empty for robots that do not say.
 
     Raises:
         ShapeError: Limits, home, start or drives are not vectors (n,).
@@ -93,6 +94,7 @@ class Robot:
     dynamics: Dynamics | None = None
     hardware: Hardware | None = None
     task_mask: tuple[bool, ...] = (True,) * 6
+    solution: str = ""
     start: _Start = _Start()
     # Writable copies for the kernels, which are compiled for such arrays alone.
     _row: Array = field(init=False)

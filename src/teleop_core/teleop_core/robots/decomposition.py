@@ -1,0 +1,266 @@
+"""Decomposition: which arms have a closed form, recognised from where their axes lie.
+
+Classes, in the order in which they are looked for, from the base and, turned round, from the tip:
+
+- *spherical wrist*: six turning joints, the last three axes meet in a point;
+- *three parallel axes*: six turning joints, axes 2, 3 and 4 are parallel;
+- *spherical shoulder and wrist*: seven turning joints, axes 1, 2, 3 meet, and 5, 6, 7 do.
+
+Axes meet or are parallel within :data:`TOLERANCE`; what a file's rounding leaves, a step on the
+chain as it is takes away. Arms that control fewer directions of the tip, that slide, or that are of
+another class are solved by search (:mod:`teleop_core.robots.dh_kernels`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kernels.portable import arctangent, dot, inverse_motion, length, product
+from teleop_core.robots import dh_kernels, parallel_axes, spherical_wrist, swivel
+from teleop_core.robots.kinematics import Kernels
+
+TOLERANCE = 1e-5
+"""Angle [rad] up to which axes are parallel, and share of the reach within which they meet."""
+_LEAST = 1e-3  # share of the reach, or sine, under which an arm of a class counts as degenerate
+_PARALLEL, _MEETING, _SKEW = 0.0, 1.0, 2.0
+_Z = np.array([0.0, 0.0, 1.0])
+_FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """How an arm is solved: in words, by which kernels, with which constants behind its row."""
+
+    text: str
+    kernels: Kernels
+    constants: tuple[float, ...] = ()
+
+
+SEARCH = Solution(
+    text="search: damped least squares from the seed, then from 24 starts",
+    kernels=Kernels(
+        fk=dh_kernels.fk,
+        jacobian=dh_kernels.jacobian,
+        ik=dh_kernels.ik,
+        ik_all=dh_kernels.ik_all,
+    ),
+)
+
+
+@dataclass(kw_only=True)
+class _Chain:
+    """Turning joints about z with constant transforms around them, from base to tip or back.
+
+    ``signs`` say which way the arm's own joints turn; ``order`` is -1 for a chain from the tip.
+    """
+
+    order: float
+    signs: list[float]
+    fixed: list[Array]
+    reach: float
+
+    def frames(self) -> list[Array]:
+        """Frame of each joint at zero in the chain's base."""
+        out = [self.fixed[0]]
+        for between in self.fixed[1:-1]:
+            out.append(product(out[-1], between))
+        return out
+
+    def slide(self, joint: int, distance: float) -> None:
+        """Move a joint's frame along its axis."""
+        self._move(joint, transform(np.eye(3), distance * _Z))
+
+    def spin(self, joint: int, angle: float) -> None:
+        """Turn a joint's frame about its axis."""
+        self._move(joint, transform(rotation("z", angle), np.zeros(3)))
+
+    def flip(self, joint: int) -> None:
+        """Turn a joint's axis round."""
+        self._move(joint, _FLIP)
+        self.signs[joint] = -self.signs[joint]
+
+    def _move(self, joint: int, by: Array) -> None:
+        self.fixed[joint] = product(self.fixed[joint], by)
+        self.fixed[joint + 1] = product(inverse_motion(by), self.fixed[joint + 1])
+
+    def slide_next_to(self, joint: int, other: int) -> None:
+        """Move a joint's frame to the point of its axis that is nearest to another axis."""
+        frames = self.frames()
+        w, v = frames[joint][:3, 2], frames[other][:3, 2]
+        gap = frames[other][:3, 3] - frames[joint][:3, 3]
+        share = float(dot(w, v))
+        if 1.0 - share * share > TOLERANCE**2:
+            self.slide(joint, float(dot(gap, w) - share * dot(gap, v)) / (1.0 - share * share))
+
+    def constants(self, groups: Sequence[float], beside: Sequence[float]) -> tuple[float, ...]:
+        """Numbers of a closed form, as :mod:`teleop_core.robots.closed_form` reads them."""
+        inverse = [inverse_motion(self.fixed[0]), inverse_motion(self.fixed[-1])]
+        matrices = [*inverse, *self.fixed[1:-1]]
+        rows = np.concatenate([matrix[:3].ravel() for matrix in matrices]).tolist()
+        in_order = groups if self.order > 0.0 else groups[::-1]
+        return (self.order, *self.signs, *in_order, *rows, *beside)
+
+
+def _from_base(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> _Chain:
+    signs, matrices = list(kinds), [matrix.copy() for matrix in fixed]
+    return _Chain(order=1.0, signs=signs, fixed=matrices, reach=reach)
+
+
+def _from_tip(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> _Chain:
+    signs = [-kind for kind in kinds[::-1]]
+    back = [inverse_motion(matrix) for matrix in fixed[::-1]]
+    return _Chain(order=-1.0, signs=signs, fixed=back, reach=reach)
+
+
+def solution_of(
+    kinds: Sequence[float], fixed: Sequence[Array], reach: float, task: Sequence[str]
+) -> Solution:
+    """How to solve the inverse kinematics of a chain.
+
+    Args:
+        kinds: Of each joint 1 for a turn, 2 for a slide; negative against its axis.
+        fixed: Transforms (4, 4) before, between and after the joints, which move about z.
+        reach: Length of the chain [m].
+        task: Directions that the arm is to control.
+
+    Returns:
+        The first class that fits, else :data:`SEARCH`.
+    """
+    if len(task) < 6 or reach <= 0.0 or any(abs(kind) > 1.5 for kind in kinds):
+        return SEARCH
+    for recognise in _CLASSES.get(len(kinds), ()):
+        for chain in (_from_base(kinds, fixed, reach), _from_tip(kinds, fixed, reach)):
+            found = recognise(chain)
+            if found is not None:
+                return found
+    return SEARCH
+
+
+def _is_parallel(a: Array, b: Array) -> bool:
+    return float(length(np.cross(a, b))) <= TOLERANCE
+
+
+def _do_meet(chain: _Chain, joints: Sequence[int]) -> bool:
+    """Whether three neighbouring axes meet in a point; brings their frames' origins there."""
+    frames = chain.frames()
+    axes = [frames[joint][:3, 2] for joint in joints]
+    if _is_parallel(axes[0], axes[1]) or _is_parallel(axes[1], axes[2]):
+        return False
+    first, middle, last = joints
+    chain.slide_next_to(middle, first)
+    centre = chain.frames()[middle][:3, 3]
+    for joint in (first, last):
+        frame = chain.frames()[joint]
+        chain.slide(joint, float(dot(frame[:3, 2], centre - frame[:3, 3])))
+    points = [chain.frames()[joint][:3, 3] for joint in joints]
+    return all(float(length(p - centre)) <= TOLERANCE * chain.reach for p in points)
+
+
+def _null_rule(rows: Array) -> tuple[float, float, float] | None:
+    """Null vector (2,) of two rows (2, 2) that are one, and the larger row; None if two."""
+    sizes = length(rows)
+    large = int(sizes[1] > sizes[0])
+    a, b = rows[large], rows[1 - large]
+    if abs(a[0] * b[1] - a[1] * b[0]) > TOLERANCE * sizes[large] ** 2:
+        return None
+    share = -float(dot(a, b) / dot(a, a))
+    return (share, 1.0, large) if large == 0 else (1.0, share, large)
+
+
+def _spherical_wrist(chain: _Chain) -> Solution | None:
+    """Six joints whose last three axes meet."""
+    if not _do_meet(chain, (3, 4, 5)):
+        return None
+    chain.slide_next_to(1, 0)
+    F1, F2, t3 = chain.fixed[1], chain.fixed[2], chain.fixed[3][:3, 3]
+    t1, t2, over = F1[:3, 3], F2[:3, 3], 1.0 / chain.reach
+    k = product(F2[:3, :3].T, t2)
+    # Factors of joint 1 and of joint 3 in both equations, up to a turn and a scale each.
+    one = np.array([F1[:2, 2], -over * t1[:2]])
+    three = np.array([F2[2, :2], over * k[:2]])
+    if length(t3[:2]) * over < _LEAST or min(abs(one).max(), abs(three).max()) < _LEAST:
+        return None
+    rule = _null_rule(three)
+    kind, other = _PARALLEL, one
+    if rule is None:
+        rule = _null_rule(one)
+        kind, other = _MEETING, three
+    if rule is None:
+        rule, kind = (0.0, 0.0, 0.0), _SKEW
+    elif length(rule[0] * other[0] + rule[1] * other[1]) < _LEAST:
+        return None  # the wrist centre moves on a plane or a sphere
+    x, y = t3[:2].tolist()
+    B = [-row for r in three for row in (r[0] * x + r[1] * y, r[1] * x - r[0] * y)]
+    h0 = F2[2, 2] * t3[2] + t2[2] + dot(F1[:3, 2], t1)
+    h1 = 0.5 * over * (dot(t3, t3) + dot(t2, t2) + 2.0 * k[2] * t3[2] - dot(t1, t1))
+    where = "wrist" if chain.order > 0.0 else "shoulder"
+    return Solution(
+        text=f"spherical {where}, closed form, 8 solutions",
+        kernels=_closed(spherical_wrist.ik, spherical_wrist.ik_all),
+        constants=chain.constants(
+            (1, 1, 1, 2, 2, 2), (kind, *rule, *B, over, float(h0), float(h1))
+        ),
+    )
+
+
+def _parallel_axes(chain: _Chain) -> Solution | None:
+    """Six joints whose axes 2, 3 and 4 are parallel."""
+    frames = chain.frames()
+    axes = [frame[:3, 2] for frame in frames]
+    if not (_is_parallel(axes[1], axes[2]) and _is_parallel(axes[1], axes[3])):
+        return None
+    for joint in (2, 3):
+        if dot(axes[1], axes[joint]) < 0.0:
+            chain.flip(joint)
+        frames = chain.frames()
+        height = dot(axes[1], frames[joint][:3, 3] - frames[1][:3, 3])
+        chain.slide(joint, -float(height))
+        turn = chain.fixed[joint]
+        chain.spin(joint, -float(arctangent(turn[1, 0], turn[0, 0])))
+    chain.slide_next_to(5, 4)
+    F1, C4, C5, over = chain.fixed[1], chain.fixed[4], chain.fixed[5], 1.0 / chain.reach
+    r, a, t5, m = C4[2, :3], C5[:3, 2], C5[:3, 3], F1[:3, 2]
+    rows = np.array([a[:2], over * t5[:2]])
+    arms = min(float(length(chain.fixed[joint][:2, 3])) * over for joint in (2, 3))
+    if min(arms, float(length(r[:2])), float(length(m[:2])), abs(rows).max()) < _LEAST:
+        return None
+    rule = _null_rule(rows)
+    kind = _PARALLEL if rule else _SKEW
+    x, y = r[:2].tolist()
+    B = [-v for q in rows for v in (x * q[0] + y * q[1], y * q[0] - x * q[1])]
+    h1 = over * (r[2] * t5[2] + C4[2, 3] + dot(m, F1[:3, 3]))
+    return Solution(
+        text="three parallel axes, closed form, 8 solutions",
+        kernels=_closed(parallel_axes.ik, parallel_axes.ik_all),
+        constants=chain.constants(
+            (1, 3, 3, 3, 2, 2),
+            (kind, *(rule or (0.0, 0.0, 0.0)), *B, over, float(r[2] * a[2]), float(h1)),
+        ),
+    )
+
+
+def _shoulder_and_wrist(chain: _Chain) -> Solution | None:
+    """Seven joints of which the first three axes meet, and the last three."""
+    if not (_do_meet(chain, (0, 1, 2)) and _do_meet(chain, (4, 5, 6))):
+        return None
+    F3, t4, over = chain.fixed[3], chain.fixed[4][:3, 3], 1.0 / chain.reach
+    k = product(F3[:3, :3].T, F3[:3, 3])
+    if min(float(length(k[:2])), float(length(t4[:2]))) * over < TOLERANCE:
+        return None  # joint 4 does not change the distance from shoulder to wrist
+    return Solution(
+        text="spherical shoulder and wrist, closed form over the swivel, 8 branches",
+        kernels=_closed(swivel.ik, swivel.ik_all),
+        constants=chain.constants((2, 2, 2, 1, 3, 3, 3), ()),
+    )
+
+
+def _closed(ik: object, ik_all: object) -> Kernels:
+    return Kernels(fk=dh_kernels.fk, jacobian=dh_kernels.jacobian, ik=ik, ik_all=ik_all)  # type: ignore[arg-type]
+
+
+_CLASSES: dict[int, tuple[Callable[[_Chain], Solution | None], ...]] = {
+    6: (_spherical_wrist, _parallel_axes),
+    7: (_shoulder_and_wrist,),
+}

@@ -1,0 +1,210 @@
+"""Subproblems of closed-form inverse kinematics: angles that solve linear equations in sines.
+
+Every arm that decomposes comes down to two kinds of question. *One angle*: a cos x + b sin x = d,
+with two answers (subproblems 1, 3 and 4 of Paden and Kahan). *A pair of angles*: two equations that
+are linear in (cos x, sin x) and in (cos y, sin y), with two to four pairs (subproblems 5 and 6).
+Where nothing solves an equation, the answer is the angle that comes nearest, marked as not exact.
+
+Source:
+    Murray, Li and Sastry 1994, section 3.3; Elias and Wen 2022, Canonical subproblems for robot
+    inverse kinematics. The elimination by null vectors is derived.
+"""
+
+import math
+
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
+
+# Relative to its squared amplitude, so much may be missing for an equation to count as solved.
+_SLACK = 1e-9
+# Amplitude under which an equation does not fix its angle, which keeps the seed's value then.
+_FREE = 1e-12
+_STEPS = 60  # of a bracketed Newton search
+
+
+@inner
+def one_angle(a: float, b: float, d: float, seed: float) -> tuple[float, float, float]:
+    """Base and spread of the two angles x = base ± spread with a cos x + b sin x = d.
+
+    Returns:
+        Base [rad], spread [rad] in [0, pi], and 1.0 if they solve the equation, else 0.0: then
+        both are the angle that comes nearest. Without a and b the base is the seed.
+    """
+    square = a * a + b * b
+    if square <= _FREE * _FREE:
+        return seed, 0.0, 1.0 if abs(d) <= _FREE else 0.0
+    size = math.sqrt(square)
+    rest = (size - d) * (size + d)
+    spread = math.atan2(math.sqrt(max(rest, 0.0)), d)
+    return math.atan2(b, a), spread, 1.0 if rest >= -_SLACK * square else 0.0
+
+
+@inner
+def turn_between(x0: float, y0: float, x1: float, y1: float, seed: float) -> float:
+    """Angle [rad] that turns the direction of (x0, y0) into that of (x1, y1); seed without one."""
+    if min(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1) <= _FREE * _FREE:
+        return seed
+    return math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
+
+
+@inner
+def _value(p: Array, degree: int, t: float) -> tuple[float, float]:
+    """Value and slope of a polynomial; p[i] belongs to t^i."""
+    value, slope = p[degree], 0.0
+    for i in range(degree - 1, -1, -1):
+        slope = slope * t + value
+        value = value * t + p[i]
+    return value, slope
+
+
+@inner
+def _root(p: Array, degree: int, low: float, high: float) -> float:
+    """Root between two places with values of opposite sign, by Newton steps kept in the bracket."""
+    is_rising = _value(p, degree, low)[0] < 0.0
+    t = 0.5 * (low + high)
+    for _ in range(_STEPS):
+        value, slope = _value(p, degree, t)
+        if (value < 0.0) == is_rising:
+            low = t
+        else:
+            high = t
+        after = t - value / slope if slope != 0.0 else low
+        if not low < after < high:
+            after = 0.5 * (low + high)
+        if abs(after - t) <= 1e-16:
+            break
+        t = after
+    return t
+
+
+@inner
+def _roots(p: Array, work: Array, most: int) -> int:
+    """Write real roots of p (5,) in [-1, 1], and its extrema, into rows of ``work`` (6, 7).
+
+    The roots of each derivative bracket those of the one before it (Rolle). Row 0 gets the roots
+    of p, row 1 those of its slope; rows 2 to 5 are memory.
+
+    Returns:
+        10 times the number of extrema, plus the number of roots.
+    """
+    count, before = 0, 0
+    for degree in range(1, most + 1):
+        order = most - degree
+        q = work[5]
+        for i in range(degree + 1):
+            factor = 1.0
+            for k in range(order):
+                factor *= i + order - k
+            q[i] = factor * p[i + order]
+        before = count
+        for i in range(before):
+            work[1, i] = work[0, i]
+        count, low = 0, -1.0
+        for i in range(before + 1):
+            high = work[1, i] if i < before else 1.0
+            if (_value(q, degree, low)[0] < 0.0) != (_value(q, degree, high)[0] < 0.0):
+                work[0, count] = _root(q, degree, low, high)
+                count += 1
+            low = high
+    return 10 * before + count
+
+
+@inner
+def _append(found: Array, count: int, angle: float, is_exact: float) -> int:
+    if count < found.shape[0]:
+        found[count, 0], found[count, 2] = angle, is_exact
+        count += 1
+    return count
+
+
+@kernel
+def circle_roots(f: Array, work: Array, found: Array) -> int:
+    """Angles x where f0 + f1 cos x + f2 sin x + f3 cos 2x + f4 sin 2x is 0, or nearly so.
+
+    Column 0 of ``found`` (4, 3) gets the angle, column 2 whether it is a root (1.0) or only an
+    extremum that does not reach 0 (0.0). ``work`` is memory, (7, 7).
+
+    Returns:
+        How many, 0 to 4.
+    """
+    count, p = 0, work[6]
+    size = abs(f[0]) + abs(f[1]) + abs(f[2]) + abs(f[3]) + abs(f[4])
+    for half in range(2):
+        sign, shift = (1.0, 0.0) if half == 0 else (-1.0, math.pi)
+        a, b = sign * f[1], sign * f[2]
+        p[0], p[1] = f[0] + a + f[3], 2.0 * b + 4.0 * f[4]
+        p[2] = 2.0 * f[0] - 6.0 * f[3]
+        p[3], p[4] = 2.0 * b - 4.0 * f[4], f[0] - a + f[3]
+        counts = _roots(p, work, 4)
+        for i in range(counts % 10):
+            count = _append(found, count, shift + 2.0 * math.atan(work[0, i]), 1.0)
+        for i in range(counts // 10):
+            t = work[1, i]
+            value = _value(p, 4, t)[0] / (1.0 + t * t) ** 2
+            bend = 2.0 * p[2] + 6.0 * p[3] * t + 12.0 * p[4] * t * t
+            if value * bend > 0.0:
+                is_exact = 1.0 if abs(value) <= _SLACK * size else 0.0
+                count = _append(found, count, shift + 2.0 * math.atan(t), is_exact)
+    return count
+
+
+@inner
+def _crossed(
+    A: Array, B: Array, h: Array, rule: Array, first: float, second: float, k: int, pairs: Array
+) -> int:
+    """Pairs (x, y) where a null vector of B takes y out of the equations: two times two."""
+    n0, n1, row = rule[1], rule[2], int(rule[3])
+    a, b = n0 * A[0, 0] + n1 * A[1, 0], n0 * A[0, 1] + n1 * A[1, 1]
+    base, spread, is_x = one_angle(a, b, n0 * h[0] + n1 * h[1], first)
+    count = 0
+    for i in range(2):
+        x = base + spread if i == 0 else base - spread
+        d = h[row] - A[row, 0] * math.cos(x) - A[row, 1] * math.sin(x)
+        middle, width, is_y = one_angle(B[row, 0], B[row, 1], d, second)
+        for j in range(2):
+            pairs[count, k] = x
+            pairs[count, 1 - k] = middle + width if j == 0 else middle - width
+            pairs[count, 2] = is_x * is_y
+            count += 1
+    return count
+
+
+@kernel
+def pair_of_angles(
+    A: Array, B: Array, h: Array, rule: Array, seeds: Array, work: Array, pairs: Array
+) -> int:
+    """Write pairs with A (cos x, sin x) + B (cos y, sin y) = h into ``pairs`` (4, 3).
+
+    Args:
+        A: Factors of x, (2, 2).
+        B: Factors of y, (2, 2).
+        h: Right-hand side (2,).
+        rule: How to go (4,): 0 if B has a null vector, 1 if A has, 2 if neither; the null vector,
+            of two numbers; and the row that is left for the second angle.
+        seeds: Values of x and y where the equations leave them free (2,).
+        work: Memory (7, 7).
+        pairs: x, y and whether they solve the equations (1.0), in each row.
+
+    Returns:
+        How many pairs; all of them nearest only, where none solves the equations.
+    """
+    if rule[0] < 0.5:
+        return _crossed(A, B, h, rule, seeds[0], seeds[1], 0, pairs)
+    if rule[0] < 1.5:
+        return _crossed(B, A, h, rule, seeds[1], seeds[0], 1, pairs)
+    over = 1.0 / (B[0, 0] * B[1, 1] - B[0, 1] * B[1, 0])
+    g0, g1 = over * (B[1, 1] * h[0] - B[0, 1] * h[1]), over * (B[0, 0] * h[1] - B[1, 0] * h[0])
+    u0 = over * (B[0, 1] * A[1, 0] - B[1, 1] * A[0, 0])
+    u1 = over * (B[1, 0] * A[0, 0] - B[0, 0] * A[1, 0])
+    v0 = over * (B[0, 1] * A[1, 1] - B[1, 1] * A[0, 1])
+    v1 = over * (B[1, 0] * A[0, 1] - B[0, 0] * A[1, 1])
+    # The other angle's vector is g + u cos x + v sin x, of length 1.
+    uu, vv, f = u0 * u0 + u1 * u1, v0 * v0 + v1 * v1, work[4]
+    f[0] = g0 * g0 + g1 * g1 + 0.5 * (uu + vv) - 1.0
+    f[1], f[2] = 2.0 * (g0 * u0 + g1 * u1), 2.0 * (g0 * v0 + g1 * v1)
+    f[3], f[4] = 0.5 * (uu - vv), u0 * v0 + u1 * v1
+    count = int(circle_roots(f, work, pairs))
+    for k in range(count):
+        c, s = math.cos(pairs[k, 0]), math.sin(pairs[k, 0])
+        pairs[k, 1] = math.atan2(g1 + u1 * c + v1 * s, g0 + u0 * c + v0 * s)
+    return count

@@ -1,0 +1,115 @@
+"""Arms of each class with a closed form, as URDF texts: random axes and real arms."""
+
+import math
+
+import numpy as np
+
+SHOULDERS = ("skew", "1 and 2 parallel", "2 and 3 parallel", "1 and 2 meet", "2 and 3 meet")
+PARALLEL = ("5 and 6 meet", "5 and 6 apart")
+WIDE = (-2.0 * math.pi, 2.0 * math.pi)
+
+
+def direction(rng, *beside):
+    """Unit vector that is at least 0.6 rad off other directions."""
+    while True:
+        w = rng.normal(size=3)
+        w /= np.linalg.norm(w)
+        if all(abs(w @ other) < math.cos(0.6) for other in beside):
+            return w
+
+
+def directions(rng, count):
+    """Unit vectors, each off the one before it."""
+    found = [direction(rng)]
+    while len(found) < count:
+        found.append(direction(rng, found[-1]))
+    return found
+
+
+def point(rng):
+    return rng.uniform(0.15, 0.4, 3) * rng.choice((-1, 1), 3)
+
+
+def wrist_axes(rng, kind):
+    """Axes (direction, point) of an arm with a spherical wrist and a shoulder of a kind."""
+    w, o = directions(rng, 6), [point(rng) for _ in range(3)]
+    o += [o[2] + point(rng)] * 3
+    if kind == "1 and 2 parallel":
+        w[0] = w[1]
+    elif kind == "2 and 3 parallel":
+        w[2] = w[1] * rng.choice((-1, 1))
+        w[3] = direction(rng, w[2], w[4])
+    elif kind == "1 and 2 meet":
+        o[1] = o[0]
+    elif kind == "2 and 3 meet":
+        o[2] = o[1]
+    return list(zip(w, o, strict=True))
+
+
+def parallel_axes(rng, kind):
+    """Axes of an arm whose axes 2, 3 and 4 are parallel."""
+    w, o = directions(rng, 6), [point(rng)]
+    while len(o) < 6:
+        o.append(o[-1] + point(rng))
+    w[2], w[3] = w[1] * rng.choice((-1, 1)), w[1] * rng.choice((-1, 1))
+    w[4] = direction(rng, w[1], w[5])
+    if kind == "5 and 6 meet":
+        o[5] = o[4]
+    return list(zip(w, o, strict=True))
+
+
+def urdf(axes, limits, tool=(0.1, -0.05, 0.12), name="random"):
+    """Arm whose links are parallel to the base at zero; each frame somewhere on its axis."""
+    rng, here = np.random.default_rng(9), np.zeros(3)
+    lines = [f'<robot name="{name}"><link name="l0"/>']
+    for i, ((w, point_on), (lower, upper)) in enumerate(zip(axes, limits, strict=True)):
+        o = point_on + rng.uniform(-0.2, 0.2) * w
+        lines.append(
+            f'<link name="l{i + 1}"/><joint name="j{i + 1}" type="revolute"><parent link="l{i}"/>'
+            f'<child link="l{i + 1}"/><origin xyz="{row(o - here)}"/><axis xyz="{row(w)}"/>'
+            f'<limit lower="{lower!r}" upper="{upper!r}" effort="90" velocity="3"/></joint>'
+        )
+        here = o
+    n = len(axes)
+    return (
+        "".join(lines) + f'<link name="tip"/><joint name="tool" type="fixed"><parent link="l{n}"/>'
+        f'<child link="tip"/><origin xyz="{row(tool)}" rpy="0.3 -0.2 0.5"/></joint></robot>'
+    )
+
+
+def row(values):
+    return " ".join(repr(float(value)) for value in values)
+
+
+def axes_of_dh(rows):
+    """Axes at zero of a standard Denavit-Hartenberg table of rows a, alpha, d."""
+    T, axes = np.eye(4), []
+    for a, alpha, d in rows:
+        axes.append((T[:3, 2].copy(), T[:3, 3].copy()))
+        c, s = math.cos(alpha), math.sin(alpha)
+        T = T @ np.array([[1, 0, 0, a], [0, c, -s, 0], [0, s, c, d], [0, 0, 0, 1.0]])
+    return axes
+
+
+_H = 0.5 * math.pi
+# Universal Robots, support article on DH parameters of their arms.
+UR5E = axes_of_dh(
+    [(0, _H, 0.1625), (-0.425, 0, 0), (-0.3922, 0, 0), (0, _H, 0.1333), (0, -_H, 0.0997),
+     (0, 0, 0.0996)]
+)  # fmt: skip
+
+
+def swivel_axes(rng, kind="7"):
+    """Axes of an arm of seven joints whose shoulder and wrist are spherical, the elbow aside."""
+    w, shoulder = directions(rng, 7), point(rng)
+    elbow = shoulder + point(rng)
+    wrist = elbow + 0.05 * direction(rng) + point(rng)
+    return list(zip(w, [shoulder] * 3 + [elbow] + [wrist] * 3, strict=True))
+
+
+# KUKA, LBR iiwa 14 R820, lengths 360, 420, 400 and 126 mm; the limits are those of its data sheet.
+IIWA14 = axes_of_dh(
+    [(0, -_H, 0.36), (0, _H, 0), (0, _H, 0.42), (0, -_H, 0), (0, -_H, 0.4), (0, _H, 0),
+     (0, 0, 0.126)]
+)  # fmt: skip
+IIWA14_LIMITS = [(-math.radians(a), math.radians(a)) for a in (170, 120, 170, 120, 170, 120, 175)]

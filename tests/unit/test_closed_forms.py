@@ -1,0 +1,267 @@
+"""Closed forms of arms from files: all solutions, limits, whole turns, paths and classes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from random_arms import (
+    IIWA14,
+    IIWA14_LIMITS,
+    PARALLEL,
+    SHOULDERS,
+    UR5E,
+    WIDE,
+    parallel_axes,
+    swivel_axes,
+    urdf,
+    wrist_axes,
+)
+from teleop_core.robots import IkStatus, dh_kernels, load_robot, swivel
+from teleop_core.robots.chains import chain_of
+
+REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
+SIX = [(kind, wrist_axes, "spherical") for kind in SHOULDERS]
+SIX += [(kind, parallel_axes, "three parallel axes") for kind in PARALLEL]
+MAKERS = {kind: make for kind, make, _ in SIX}
+EACH = [(*case, side) for case in SIX for side in (1, -1)]
+NAMES = [f"{word}, {kind}, {'base' if side > 0 else 'tip'}" for kind, _, word, side in EACH]
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Robot of axes with limits [rad], the same for all joints or one pair for each."""
+
+    def made(axes, limits=(-math.pi, math.pi)):
+        pairs = limits if isinstance(limits, list) else [limits] * len(axes)
+        path = tmp_path / "arm.urdf"
+        path.write_text(urdf(axes, pairs))
+        return load_robot(str(path))
+
+    return made
+
+
+def narrow(rng, n=6):
+    """Limits [rad] of about a third of a turn, some of them not around zero."""
+    middle, half = rng.uniform(-2.5, 2.5, n), rng.uniform(0.5, 1.5, n)
+    return [(float(m - h), float(m + h)) for m, h in zip(middle, half, strict=True)]
+
+
+def apart(q, others):
+    """Smallest of the largest differences of angles [rad], whole turns aside."""
+    turns = (np.asarray(others) - q + math.pi) % (2.0 * math.pi) - math.pi
+    return abs(turns).max(axis=-1).min(initial=math.inf)
+
+
+@pytest.mark.parametrize(("kind", "make", "word", "side"), EACH, ids=NAMES)
+def test_every_legal_pose_is_found_with_all_its_solutions(kind, make, word, side, load):
+    rng = np.random.default_rng(len(kind))
+    for _ in range(3):
+        axes, limits = make(rng, kind)[::side], narrow(rng)
+        arm = load(axes, limits)
+        assert word in arm.solution
+        q = rng.uniform(arm.lower, arm.upper, (250, 6))
+        tips, seeds = arm.fk(q), np.clip(q + rng.normal(0.0, 0.02, q.shape), arm.lower, arm.upper)
+        for answer in (arm.ik_batch(tips), arm.ik_batch(tips, seeds)):
+            assert np.isin(answer.status, REACHED).all()
+            assert answer.residual.max() < 1e-9
+            assert ((answer.q >= arm.lower) & (answer.q <= arm.upper)).all()
+        for wanted, joints in zip(tips[:40], q, strict=False):
+            branches = arm.ik_all(wanted)
+            assert 1 <= len(branches) <= 8
+            assert apart(joints, branches) < 1e-5
+            np.testing.assert_allclose(arm.fk(branches), np.tile(wanted, (len(branches), 1, 1)),
+                                       atol=1e-9)  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "make", "word", "side"), EACH, ids=NAMES)
+def test_a_search_from_200_starts_finds_no_further_solution(kind, make, word, side, load):
+    rng, found = np.random.default_rng(3), np.empty((64, 6))
+    arm = load(make(rng, kind)[::side])
+    for q in rng.uniform(arm.lower, arm.upper, (4, 6)):
+        wanted = arm.fk(q)
+        count = dh_kernels.ik_all(wanted, arm.geometry_row, found)
+        branches = arm.ik_all(wanted)
+        assert len(branches) >= count
+        assert max(apart(other, branches) for other in found[:count]) < 1e-5
+        assert min(apart(b, np.delete(branches, i, 0)) for i, b in enumerate(branches)) > 1e-6
+
+
+TWO_ROUNDS = [WIDE, WIDE, (-1.0, 5.5), WIDE, (-6.0, 0.5), WIDE]
+
+
+@pytest.mark.parametrize("limits", [TWO_ROUNDS, [(-0.3, 4.5)] * 6], ids=["two rounds", "one side"])
+def test_the_nearest_branch_inside_the_limits_answers_whole_turns_included(limits, load):
+    arm = load(UR5E, limits)
+    rng = np.random.default_rng(8)
+    q = rng.uniform(arm.lower, arm.upper, (2000, 6))
+    answer = arm.ik_batch(arm.fk(q), q)
+    np.testing.assert_allclose(answer.q, q, atol=1e-6)
+    answer = arm.ik_batch(arm.fk(q))
+    assert np.isin(answer.status, REACHED).all()
+    # No branch is nearer to home by the largest move, in any round that the limits allow.
+    rounds = 2.0 * math.pi * np.array([-1.0, 0.0, 1.0])
+    for joints, chosen in zip(q[:100], answer.q, strict=False):
+        least = math.inf
+        for branch in arm.ik_all(arm.fk(joints)):
+            turns = branch[:, None] + rounds
+            is_legal = (turns >= arm.lower[:, None]) & (turns <= arm.upper[:, None])
+            moves = np.where(is_legal, abs(turns - arm.home[:, None]), math.inf).min(axis=1)
+            least = min(least, moves.max())
+        assert abs(abs(chosen - arm.home).max() - least) < 1e-9
+
+
+def smooth(arm, rng, count=1500):
+    """Joint path (count, n), 1 ms apart, at up to 0.8 of the speed limits, inside the limits."""
+    span, t = arm.upper - arm.lower, 1e-3 * np.arange(count)[:, None]
+    middle = rng.uniform(arm.lower + 0.2 * span, arm.upper - 0.2 * span)
+    swing = np.minimum(0.19 * span, 1.0) * rng.uniform(0.3, 1.0, arm.n)
+    rate = 0.8 * arm.drives.speed_limit / swing * rng.uniform(0.1, 1.0, arm.n)
+    return middle + swing * np.sin(rate * t + rng.uniform(0.0, 6.3, arm.n))
+
+
+def least_singular_value(arm, joints):
+    J = np.stack([arm.jacobian(q) for q in joints[::10]])
+    J[:, :3] /= arm.geometry["reach"]
+    return np.linalg.svd(J, compute_uv=False)[:, -1].min()
+
+
+def check_path(arm, joints):
+    """Follow a path, then 1.5 s of its end: speeds, limits, and that what can be reached is."""
+    tips = arm.fk(joints)
+    tips = np.concatenate([tips, np.repeat(tips[-1:], 1500, axis=0)])
+    answer = arm.follow(tips, joints[0])
+    moves = abs(np.diff(answer.q, axis=0, prepend=joints[:1]))
+    assert np.isfinite(answer.q).all()
+    assert (moves <= 1e-3 * arm.drives.speed_limit + 1e-14).all()
+    assert ((answer.q >= arm.lower) & (answer.q <= arm.upper)).all()
+    return answer
+
+
+@pytest.mark.parametrize(("kind", "make", "word", "side"), EACH[1::3], ids=NAMES[1::3])
+def test_paths_are_followed_without_a_flip_and_within_speeds(kind, make, word, side, load):
+    rng = np.random.default_rng(21)
+    regular = singular = late = 0
+    while regular < 4 or singular < 4:
+        arm = load(make(rng, kind)[::side])
+        joints = smooth(arm, rng)
+        answer = check_path(arm, joints)
+        is_reached = np.isin(answer.status, REACHED)
+        if least_singular_value(arm, joints) > 0.01:
+            regular += 1
+            assert is_reached.all()
+            np.testing.assert_allclose(answer.q[: len(joints)], joints, atol=1e-6)
+        else:
+            singular += 1
+            stopped = (answer.q[-1] <= arm.lower + 0.05) | (answer.q[-1] >= arm.upper - 0.05)
+            # Where its branch ends, at a singularity, the arm waits.
+            is_end = least_singular_value(arm, answer.q[-1:]) < 1e-3
+            late += not (is_reached[-1] or stopped.any() or is_end)
+    assert late == 0
+
+
+@pytest.mark.parametrize("kind", ["2 and 3 parallel", "5 and 6 meet"])
+def test_out_of_reach_the_nearest_posture_answers_and_motion_goes_on(kind, load):
+    rng = np.random.default_rng(4)
+    arm = load(MAKERS[kind](rng, kind), WIDE)
+    wanted = arm.fk(arm.home)
+    far = wanted.copy()
+    far[:3, 3] += np.array([3.0, 1.0, 2.0])
+    answer = arm.ik(far)
+    assert answer.status == IkStatus.UNREACHABLE
+    starts = rng.uniform(arm.lower, arm.upper, (20, 6))
+    others = arm.ik_batch(np.repeat(far[None], 20, axis=0), starts).residual
+    error = np.hypot(answer.residual[0] / arm.geometry["reach"], answer.residual[1])
+    assert error <= np.hypot(others[:, 0] / arm.geometry["reach"], others[:, 1]).min() + 1e-6
+    way = np.concatenate([np.linspace(0.0, 1.0, 1500), np.linspace(1.0, 0.0, 1500), np.zeros(800)])
+    tips = np.repeat(wanted[None], len(way), axis=0)
+    tips[:, :3, 3] += way[:, None] * (far - wanted)[:3, 3]
+    answer = arm.follow(tips, arm.home)
+    assert (answer.status == IkStatus.UNREACHABLE).any()
+    assert (abs(np.diff(answer.q, axis=0)) <= 1e-3 * arm.drives.speed_limit + 1e-14).all()
+    assert answer.status[-1] in REACHED
+
+
+def test_rounded_files_are_recognised_and_solved_to_the_last_digit(load):
+    axes = [(np.round(w, 5), np.round(o, 5)) for w, o in UR5E]
+    axes[3] = (axes[3][0] + np.array([4e-6, 0.0, 3e-6]), axes[3][1])
+    arm = load(axes)
+    assert "three parallel axes" in arm.solution
+    q = np.random.default_rng(2).uniform(arm.lower, arm.upper, (500, 6))
+    answer = arm.ik_batch(arm.fk(q))
+    assert np.isin(answer.status, REACHED).all()
+    assert answer.residual.max() < 1e-9
+
+
+@pytest.mark.parametrize("tilt", [1e-3, 0.1])
+def test_arms_that_do_not_decompose_are_searched(tilt, load):
+    axes = list(UR5E)
+    axes[3] = (axes[3][0] + np.array([tilt, 0.0, tilt]), axes[3][1])
+    assert "search" in load(axes).solution
+
+
+def test_the_arm_as_built_has_the_constants_of_its_chain_alone(load):
+    arm = load(UR5E)
+    np.testing.assert_array_equal(chain_of(arm).fixed[0][3], [0.0, 0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("kind", ["2 and 3 parallel", "1 and 2 meet", "5 and 6 meet"])
+def test_eaik_knows_as_many_solutions(kind, load):
+    module = pytest.importorskip("eaik.IK_HP")
+    rng = np.random.default_rng(12)
+    axes = MAKERS[kind](rng, kind)
+    arm = load(axes)
+    points = [np.zeros(3), *(o for _, o in axes), arm.fk(np.zeros(6))[:3, 3]]
+    peer = module.HPRobot(np.array([w for w, _ in axes]), np.diff(np.array(points), axis=0))
+    zero = arm.fk(np.zeros(6))[:3, :3]
+    for q in rng.uniform(arm.lower, arm.upper, (100, 6)):
+        wanted = arm.fk(q)
+        theirs = wanted.copy()
+        theirs[:3, :3] = wanted[:3, :3] @ zero.T
+        found = peer.IK(theirs)
+        exact = [b for b, is_ls in zip(found.Q, found.is_LS, strict=True) if not is_ls]
+        assert len(arm.ik_all(wanted)) == len(exact)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_narrow_limits_of_seven_axes_lose_no_reachable_pose(seed, load):
+    rng = np.random.default_rng(seed)
+    for _ in range(4):
+        middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.05, 0.6, 7)
+        arm = load(swivel_axes(rng), list(zip((middle - half).tolist(), (middle + half).tolist(),
+                                              strict=True)))  # fmt: skip
+        assert "swivel" in arm.solution
+        q = rng.uniform(arm.lower, arm.upper, (300, 7))
+        tips, seeds = arm.fk(q), np.clip(q + rng.normal(0.0, 0.02, q.shape), arm.lower, arm.upper)
+        for answer in (arm.ik_batch(tips), arm.ik_batch(tips, seeds)):
+            assert np.isin(answer.status, REACHED).all()
+            assert answer.residual.max() < 1e-9
+            assert ((answer.q >= arm.lower) & (answer.q <= arm.upper)).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(seed, load):
+    rng = np.random.default_rng(40 + seed)
+    middle, half = rng.uniform(-2.5, 2.5, 7), rng.uniform(0.02, 0.5, 7)
+    arm = load(swivel_axes(rng), [(float(m - h), float(m + h))
+                                  for m, h in zip(middle, half, strict=True)])  # fmt: skip
+    found, work = np.empty((13, 8)), np.empty((60, 4))
+    for q in rng.uniform(arm.lower, arm.upper, (100, 7)):
+        swivel._branches(arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(), True, found,
+                         work)  # fmt: skip
+        off = (found[:8, :7] - middle + math.pi) % (2.0 * math.pi) - math.pi
+        assert ((abs(off) <= half + 1e-9).all(axis=1) & (found[:8, 7] > 0.5)).any()
+
+
+@pytest.mark.parametrize("limits", [IIWA14_LIMITS, [(-0.9, 0.7)] * 7], ids=["iiwa 14", "narrow"])
+def test_seven_axes_use_their_freedom_to_follow_paths_within_speeds_and_limits(limits, load):
+    arm, rng, regular = load(IIWA14, limits), np.random.default_rng(5), 0
+    for _ in range(10):
+        joints = smooth(arm, rng)
+        joints[:, 3] = abs(joints[:, 3]) * 0.7 + 0.2  # not through the straight elbow
+        answer = check_path(arm, joints)
+        if least_singular_value(arm, joints) > 0.02:
+            regular += 1
+            assert np.isin(answer.status, REACHED).all()
+        assert answer.status[-1] in REACHED
+    assert regular > 0
