@@ -18,9 +18,9 @@ from teleop_core.graph.topics import (
     BY_NAME,
     DIAGNOSTICS,
     NETWORK_TOPICS,
-    PASSIVITY_TOPICS,
     OPERATOR_BUTTONS,
     OPERATOR_SERVO_CP,
+    PASSIVITY_TOPICS,
     Kind,
     Topic,
 )

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
+from teleop_core.base.parameters import NoParameters, build
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.passivity import PASSIVITIES, Passivity, register_passivity
 from teleop_core.chain.passivity.port import (
+    DRIFT,
     HEARD,
     IN,
     LAW,
@@ -16,6 +20,7 @@ from teleop_core.chain.passivity.port import (
     hear_energy,
 )
 from teleop_core.chain.passivity.slave_side import PASSIVITY, PassivityParameters
+from teleop_core.chain.passivity.tdpa import tdpa_hand, tdpa_slave
 from teleop_core.graph.topics import ENERGY
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
@@ -103,7 +108,104 @@ def test_energies_that_are_lost_late_or_doubled_take_nothing_away():
     assert hear_energy(port, sent[-1]) == 0.0  # of another round
 
 
-KINDS = ["none", "tank", "tdpa"]
+def hand_port(rng, count=4000):
+    """A hand that shakes under a push of 2 N and hears energy now and then: port, way, heard."""
+    port, memory, numbers = np.zeros(len(ENERGY)), np.zeros(12), np.array([3e-4])
+    begin_round(port, 2.0, 1.0)
+    push, way = np.zeros(3), 0.0
+    for _ in range(count):
+        moved = np.array([rng.uniform(-6e-5, 6e-5), 0.0, 0.0])
+        came, gained = -float(push @ moved), rng.choice([0.0, 2e-5])
+        way += abs(moved[0])
+        port[IN if came > 0.0 else OUT] += abs(came)
+        port[HEARD] += gained
+        flow, last = np.array([gained, max(came, 0.0), max(-came, 0.0)]), push.copy()
+        push[:] = 2.0, 0.0, 0.0
+        tdpa_hand(numbers, memory, last, moved, flow, port, port, push, 1.0, 1e-3)
+        yield port, way, push
+
+
+def test_the_hand_is_given_no_more_than_was_heard_and_what_it_put_in_and_did_not_tell():
+    """At every sample, but for the 5 mN of an empty port on its way."""
+    pushes = []
+    for port, way, push in hand_port(np.random.default_rng(3)):
+        assert port[OUT] <= port[HEARD] + port[IN] - port[TOLD] + 0.005 * way + 1e-15
+        pushes.append(push[0])
+    assert min(pushes) < 0.1
+    assert max(pushes) == 2.0
+
+
+def slave_law(numbers=(0.2, 0.03, 0.01, 1e-3)):
+    """Calls of the slave's law of TDPA, 2 N against z: port and the command it gives."""
+    port, memory, force = np.zeros(len(ENERGY)), np.zeros(12), np.zeros(6)
+    begin_round(port, 2.0, 1.0)
+    last = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    force[2] = 2.0
+
+    def command(height, heard=0.0, into=0.0, out=0.0, push=2.0):
+        force[2] = push
+        given = np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0])
+        port[IN] += into
+        flow = np.array([heard, into, out])
+        tdpa_slave(np.array(numbers), memory, flow, force, last, port, port, given, 1e-3)
+        last[:] = given
+        return port, given[2]
+
+    return command
+
+
+def test_a_command_goes_against_the_force_as_far_as_credit_and_hand_pay_for():
+    command, heard, rng = slave_law(), 0.0, np.random.default_rng(4)
+    for k in range(400):
+        gained = rng.choice([0.0, 1e-5])
+        heard += gained
+        port, height = command(-1e-4 * k, heard=gained)
+        assert -2.0 * height <= 1e-3 + heard + 1e-15
+    assert height > -1e-4 * k + 0.02
+    np.testing.assert_allclose(port[DRIFT : DRIFT + 3], [0.0, 0.0, -1e-4 * k - height], atol=1e-15)
+    for _ in range(3000):  # in the air, which costs nothing
+        height = command(-1e-4 * k, push=0.0)[1]
+    assert height == pytest.approx(-1e-4 * k, abs=1e-6)
+
+
+def test_what_the_arm_lent_is_paid_back_before_the_hand_gets_any():
+    command = slave_law()
+    assert command(0.0, out=1e-3)[0][TOLD] == 0.0
+    assert command(0.0, into=6e-4)[0][TOLD] == 0.0
+    assert command(0.0, into=6e-4)[0][TOLD] == pytest.approx(2e-4, rel=1e-12)
+    # What the hand pays then sets free what was kept of the world's.
+    assert command(0.0, heard=1e-3, into=1e-4)[0][TOLD] == pytest.approx(1.3e-3, rel=1e-12)
+
+
+def test_no_part_pushes_harder_than_allowed():
+    def rude(numbers, memory, last, moved, flow, heard, port, push, scale, period):
+        push *= 100.0
+
+    register_passivity(Passivity("rude", NoParameters, rude))
+    texts = ("reflection.passivity=rude", "reflection.max_force=1.5", "reach_force.is_on=false")
+    rows = VirtualTime(configure("palpation", settings=[*texts])).run(7000)
+    force = np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1)
+    assert force.max() == pytest.approx(1.5, rel=1e-9)
+
+
+def test_with_another_passivity_energies_begin_anew_while_a_session_runs():
+    session = VirtualTime(configure("palpation", settings=[*BOTH]))
+    before = session.run(7500)
+    assert before["master_energy"][-1, IN] > 1e-5
+    values = {
+        "reflection.architecture": "position_force", "reflection.passivity": "tdpa",
+        "reach_force.is_on": False, "feedback_timeout": 1.0,
+    }  # fmt: skip
+    session.stages["motion_scaling"].retune(build(MotionScalingParameters, values))
+    after = session.run(3000)
+    told = after["master_energy"]
+    assert told[0, LAW] == PASSIVITIES.names().index("tdpa")
+    assert told[0, ROUND] > before["master_energy"][-1, ROUND]
+    assert np.all(after["slave_energy"][10:, ROUND] == told[0, ROUND])
+    assert told[0, [IN, OUT, TOLD, HEARD]].max() < 1e-5
+    check_ports(after)
+
+
 STEP = 55e-6
 """Step of the device's reading [m]."""
 

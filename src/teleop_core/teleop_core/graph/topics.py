@@ -326,17 +326,20 @@ NETWORK_STATE = Topic(
 """Packets sent, lost, and by how many the newest that arrived is behind, of both directions."""
 ENERGY = (
     "law", "round", "energy_in", "energy_out", "told", "heard", "margin", "withheld",
-    "turn_in", "turn_out", "x", "y", "z",
+    "turn_in", "turn_out", "drift_x", "drift_y", "drift_z",
 )  # fmt: skip
 """Numbers of a port's energies since a round began, in the slave's scale [J]: the kind of
 passivity, by its place among them; when the round began [s]; what went in and out; how much the
 other side was told that it may give, and how much it told; what is left to be given; what was kept
-from going out; what torques took in and gave out; three numbers of the kind."""
+from going out; what torques took in and gave out; by how much a command is held back [m]."""
 MASTER_ENERGY = Topic(
-    "master/energy", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=ENERGY
-)
+    "master/energy", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=ENERGY,
+    is_seldom=True,
+)  # fmt: skip
 """Energies at the hand, of a session with a stage ``passivity``: push times way of the hand."""
-SLAVE_ENERGY = Topic("slave/energy", Kind.NUMBERS, SAMPLED, "slave_base", columns=ENERGY)
+SLAVE_ENERGY = Topic(
+    "slave/energy", Kind.NUMBERS, SAMPLED, "slave_base", columns=ENERGY, is_seldom=True
+)
 """The same at the slave: force on the tip times way of the tip."""
 PASSIVITY_SERVO_CP = Topic(
     "passivity/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"

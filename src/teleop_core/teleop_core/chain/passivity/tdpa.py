@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.passivity import Passivity
-from teleop_core.chain.passivity.port import EXTRA, IN, MARGIN, TOLD, WITHHELD
+from teleop_core.chain.passivity.port import DRIFT, IN, MARGIN, TOLD, WITHHELD
 from teleop_core.chain.passivity.tank import READING, SPARE
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
@@ -94,7 +94,7 @@ def tdpa_slave(
         Ryu, Artigas and Preusche 2010, an admittance that takes from the command; Coelho, Ott,
         Singh, Lizarralde and Kondak 2019 for drift that is made up for while energy is left.
     """
-    drift = port[EXTRA : EXTRA + 3]
+    drift = port[DRIFT : DRIFT + 3]
     port[MARGIN] += flow[0] + flow[1] - flow[2]
     memory[0] += flow[0] + flow[1]
     size = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from teleop_core.chain.passivity.port import (
-    EXTRA,
+    DRIFT,
     HEARD,
     IN,
     LAW,
@@ -77,7 +77,7 @@ class _Port:
         self._sums, self._last = sums[-1], values[-1]
         self._least = min(self._least, float(values[:, MARGIN].min()))
         self._trace.add(times, _MJ * sums)
-        drift = np.linalg.norm(values[:, EXTRA : EXTRA + 3], axis=1)
+        drift = np.linalg.norm(values[:, DRIFT : DRIFT + 3], axis=1)
         self.drifts = max(self.drifts[0], float(drift.max())), float(drift[-1])
 
     @property
