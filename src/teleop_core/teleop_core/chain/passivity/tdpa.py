@@ -80,7 +80,8 @@ def tdpa_slave(
 
     Args:
         numbers: Time constant [s] and largest speed [m/s] with which drift goes away, a force below
-            which nothing is touched [N], and what the arm may lend in a touch [J].
+            which nothing is touched [N], what the arm may lend in a touch [J], and up to which
+            force all of it; none from twice that force on [N].
         memory: Written.
         flow: Heard, in, out [J].
         force: On the tip (6,).
@@ -109,13 +110,15 @@ def tdpa_slave(
     for i in range(3):
         command[i] -= drift[i]
         inwards -= force[i] * (command[i] - last[i])
-    left = max(min(port[MARGIN], memory[0]) + numbers[3], 0.0)
+    lent = numbers[3] * min(max(2.0 - size / numbers[4], 0.0), 1.0)
+    # What is overdrawn is given back by going back, no faster than drift goes away.
+    left = max(min(port[MARGIN], memory[0]) + lent, -size * numbers[1] * period)
     if inwards > left and not is_free:
         for i in range(3):
             back = force[i] * (inwards - left) / (size * size)
             command[i] += back
             drift[i] -= back
-        port[WITHHELD] += inwards - left
+        port[WITHHELD] += max(inwards, 0.0) - max(left, 0.0)
         inwards = left
     memory[0] -= max(inwards, 0.0)
 
