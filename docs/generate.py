@@ -20,6 +20,7 @@ from teleop_core.graph.topics import (
     NETWORK_TOPICS,
     OPERATOR_BUTTONS,
     OPERATOR_SERVO_CP,
+    PASSIVITY_TOPICS,
     Kind,
     Topic,
 )
@@ -80,6 +81,12 @@ def topics_page(graph: Graph) -> str:
     with_network = build_graph(stages=["network"])
     writer = "[network](network.md), a further stage"
     rows += [topic_row(topic, writer, with_network) for topic in NETWORK_TOPICS]
+    with_ports = build_graph(stages=["network", "passivity"])
+    writers = {t: member.name for member in with_ports.members for t in member.writes}
+    rows += [
+        topic_row(t, f"{writers[t]}, with [passivity](passivity.md)", with_ports)
+        for t in PASSIVITY_TOPICS
+    ]
     with_filter = build_graph(stages=["tremor_filter"])
     writer = "[tremor_filter](tremor_filters.md), a further stage"
     rows += [topic_row(topic, writer, with_filter) for topic in TREMOR_FILTER.writes]

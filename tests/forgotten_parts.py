@@ -9,14 +9,15 @@ from teleop_core.chain.filters import TREMOR_FILTERS
 from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.network import NETWORKS
 from teleop_core.chain.operators import OPERATORS
+from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.graph.stage import STAGES
 from teleop_core.slave.bridges import BRIDGES
 from teleop_core.slave.controllers import CONTROLLERS
 from teleop_core.slave.plants import PLANTS
 
 REGISTRIES = (
-    ARCHITECTURES, BRIDGES, CONTROLLERS, FIXTURES, NETWORKS, OPERATORS, PLANTS, STAGES,
-    TREMOR_FILTERS,
+    ARCHITECTURES, BRIDGES, CONTROLLERS, FIXTURES, NETWORKS, OPERATORS, PASSIVITIES, PLANTS,
+    STAGES, TREMOR_FILTERS,
 )  # fmt: skip
 
 

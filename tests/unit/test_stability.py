@@ -70,7 +70,9 @@ def test_force_throws_a_hand_above_its_boundary_but_not_with_a_tank_or_by_a_soft
     bench, force = Bench(), ("position_force", "none")
     found = chain_boundary(bench, MEDIUM, 0.05, force)
     assert 600.0 < found < 1200.0
-    for way in (("position_force", "tank"), ("position_position", "none")):
+    for way in (
+        ("position_force", "tank"), ("position_position", "none"), ("position_force", "tdpa"),
+    ):  # fmt: skip
         assert chain_boundary(bench, MEDIUM, 0.05, way) == STIFFEST
     calm, thrown = (fastest(bench, MEDIUM, 0.05, share * found, force) for share in (0.5, 2.0))
     assert thrown > 2.0 * calm

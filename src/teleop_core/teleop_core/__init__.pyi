@@ -27,6 +27,10 @@ from .session.exchange import (
     export_recording as export_recording,
     import_recording as import_recording,
 )
+from .chain.passivity import (
+    Passivity as Passivity,
+    register_passivity as register_passivity,
+)
 from .chain.architectures import (
     Architecture as Architecture,
     register_architecture as register_architecture,

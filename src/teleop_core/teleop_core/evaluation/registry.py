@@ -96,6 +96,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "contact": f"{_FOLDER}.contact:ContactMetric",
         "touch": f"{_FOLDER}.touch:TouchMetric",
         "network": f"{_FOLDER}.network:NetworkMetric",
+        "passivity": f"{_FOLDER}.passivity:PassivityMetric",
         "force_sensing": f"{_FOLDER}.force_sensing:ForceSensingMetric",
         "tremor_filter": f"{_FOLDER}.tremor_filter:TremorFilterMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",

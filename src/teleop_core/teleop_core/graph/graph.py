@@ -5,7 +5,7 @@ of a tick, which topic feeds which port, what is delayed, what is summed.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
@@ -233,7 +233,8 @@ class Graph:
             for old, new in zip(stage.replaced, stage.writes, strict=False):
                 if old.name == port.name and stage is reader:
                     return found
-                if old.name == port.name and reader.name not in stage.spares:
+                own = {reader.name, f"{port.name}@{reader.name}"}
+                if old.name == port.name and own.isdisjoint(stage.spares):
                     found = (stage, new)
         return found
 
@@ -340,7 +341,38 @@ def build_graph(
     if RECORDER_NAME in names:
         raise PartError("stage", RECORDER_NAME, "left out of the stages; it is always there")
     return Graph(
-        tuple(STAGES.find(name) for name in names),
+        _demanded(tuple(STAGES.find(name) for name in names)),
         tuple(arms) or ("",),
         tuple(Delay.parse(text) for text in delays),
+    )
+
+
+def _demanded(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
+    """The stages without those of their outputs on demand for which there is none."""
+    needed = {
+        topic.name for stage in stages for topic in stage.reads if topic not in stage.optional
+    }
+    written = {
+        topic.name
+        for stage in stages
+        for topic in stage.writes
+        if topic not in stage.on_demand or topic.name in needed
+    }
+    return tuple(_pruned(stage, needed, written) for stage in stages)
+
+
+def _pruned(stage: Stage, needed: set[str], written: set[str]) -> Stage:
+    old = dict(zip(stage.writes, stage.replaced, strict=False))
+    left = {
+        topic
+        for topic in stage.on_demand
+        if topic.name not in needed and old.get(topic, topic).name not in written
+    }
+    if not left:
+        return stage
+    return replace(
+        stage,
+        writes=tuple(topic for topic in stage.writes if topic not in left),
+        replaces=tuple(topic for new, topic in old.items() if new not in left) or None,
+        on_demand=tuple(topic for topic in stage.on_demand if topic not in left),
     )

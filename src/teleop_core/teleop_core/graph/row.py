@@ -69,6 +69,16 @@ class Row(Fields):
     network_reach_ns: int
     network_state: Array
     network_state_ns: int
+    master_energy: Array
+    master_energy_ns: int
+    slave_energy: Array
+    slave_energy_ns: int
+    passivity_servo_cp: Array
+    passivity_servo_cp_ns: int
+    network_master_energy: Array
+    network_master_energy_ns: int
+    network_slave_energy: Array
+    network_slave_energy_ns: int
     master_filtered_cp: Array
     master_filtered_cp_ns: int
     master_filtered_out: Array

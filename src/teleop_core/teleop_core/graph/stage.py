@@ -99,7 +99,9 @@ class Stage:
         replaces: Topic whose other readers read ``writes[0]`` in its place, as for a limit or a
             filter between two stages; or several, for ``writes`` in their order.
         spares: Names of stages that read what is replaced all the same, such as an operator who
-            holds the stylus itself.
+            holds the stylus itself; of one topic alone: ``slave/measured_cf@passivity``.
+        on_demand: Those of ``writes`` that are there only where another stage must read them, or
+            where what they replace is written.
         notes: Further fields of its record, which nobody reads.
         node: ``module:class`` of its node, if a general one does not do.
         needs: Topics without which the node answers nothing.
@@ -120,6 +122,7 @@ class Stage:
     trigger: Topic | None = None
     replaces: Topic | tuple[Topic, ...] | None = None
     spares: tuple[str, ...] = ()
+    on_demand: tuple[Topic, ...] = ()
     notes: tuple[Field, ...] = ()
     node: str = ""
     needs: tuple[Topic, ...] = ()
@@ -377,6 +380,7 @@ STAGES: Registry[Stage] = Registry(
         "tremor_filter": "teleop_core.chain.filters.tremor_filter:TREMOR_FILTER",
         "motion_scaling": "teleop_core.chain.mapping.motion_scaling:MOTION_SCALING",
         "network": "teleop_core.chain.network.network:NETWORK",
+        "passivity": "teleop_core.chain.passivity.slave_side:PASSIVITY",
         "inverse_kinematics": "teleop_core.chain.mapping.inverse_kinematics:INVERSE_KINEMATICS",
         "slave": "teleop_core.slave.slave:SLAVE",
         "slave_sim": "teleop_core.slave.slave_sim:SLAVE_SIM",

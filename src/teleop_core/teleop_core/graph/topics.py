@@ -324,6 +324,33 @@ NETWORK_STATE = Topic(
     columns=("sent_there", "lost_there", "behind_there", "sent_back", "lost_back", "behind_back"),
 )  # fmt: skip
 """Packets sent, lost, and by how many the newest that arrived is behind, of both directions."""
+ENERGY = (
+    "law", "round", "energy_in", "energy_out", "told", "heard", "margin", "withheld",
+    "turn_in", "turn_out", "drift_x", "drift_y", "drift_z",
+)  # fmt: skip
+"""Numbers of a port's energies since a round began, in the slave's scale [J]: the kind of
+passivity, by its place among them; when the round began [s]; what went in and out; how much the
+other side was told that it may give, and how much it told; what is left to be given; what was kept
+from going out; what torques took in and gave out; by how much a command is held back [m]."""
+MASTER_ENERGY = Topic(
+    "master/energy", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=ENERGY,
+    is_seldom=True,
+)  # fmt: skip
+"""Energies at the hand, of a session with a stage ``passivity``: push times way of the hand."""
+SLAVE_ENERGY = Topic(
+    "slave/energy", Kind.NUMBERS, SAMPLED, "slave_base", columns=ENERGY, is_seldom=True
+)
+"""The same at the slave: force on the tip times way of the tip."""
+PASSIVITY_SERVO_CP = Topic(
+    "passivity/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"
+)
+"""The slave's command as passivity lets it through."""
+NETWORK_MASTER_ENERGY = Topic(
+    "network/master_energy", Kind.NUMBERS, arrived("master/energy"), "master_base", columns=ENERGY
+)
+NETWORK_SLAVE_ENERGY = Topic(
+    "network/slave_energy", Kind.NUMBERS, arrived("slave/energy"), "slave_base", columns=ENERGY
+)
 HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Where the operator wants the stylus; silence lets go of it."""
 HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base", is_seldom=True)
@@ -357,10 +384,17 @@ NETWORK_TOPICS = (
     NETWORK_STATE,
 )  # fmt: skip
 """Topics of a session with a network between both sides."""
+PASSIVITY_TOPICS = (
+    MASTER_ENERGY, SLAVE_ENERGY, PASSIVITY_SERVO_CP, NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY,
+)  # fmt: skip
+"""Topics of a session with a stage ``passivity``, the last two with a network too."""
 ALL = (
     *STREAMS, HAND_BUTTONS, HAND_TREMOR,
     SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS,
 )  # fmt: skip
 BY_NAME = {
-    topic.name: topic for topic in (*ALL, *NETWORK_TOPICS, MASTER_FILTERED_CP, MASTER_FILTERED_OUT)
-}
+    topic.name: topic
+    for topic in (
+        *ALL, *NETWORK_TOPICS, *PASSIVITY_TOPICS, MASTER_FILTERED_CP, MASTER_FILTERED_OUT,
+    )
+}  # fmt: skip

@@ -6,8 +6,16 @@ from typing import Any
 from teleop_core.chain.network.network import BACK, THERE
 from teleop_core.chain.network.parameters import NetworkParameters
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import NETWORK_SERVO_CP, NETWORK_SETPOINT_CP, NETWORK_STATE, Topic
+from teleop_core.graph.topics import (
+    NETWORK_MASTER_ENERGY,
+    NETWORK_SERVO_CP,
+    NETWORK_SETPOINT_CP,
+    NETWORK_STATE,
+    Topic,
+)
 from teleop_core.nodes.ticking import TickingNode
+
+_THERE = (NETWORK_SERVO_CP, NETWORK_MASTER_ENERGY)
 
 
 class NetworkNode(TickingNode):
@@ -38,7 +46,7 @@ class NetworkNode(TickingNode):
 
     def _is_due(self, topic: Topic, has_come: Any) -> bool:
         """Whether a topic arrived, and anew."""
-        if not has_come[THERE if topic is NETWORK_SERVO_CP else BACK]:
+        if not has_come[THERE if topic in _THERE else BACK]:
             return False
         before_ns, stamp_ns = self._passed[topic], int(self.row[f"{topic.field}_ns"])
         self._passed[topic] = stamp_ns

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure
+from teleop_core.evaluation.figure import DARK, FIRST, FIXTURE, SECOND, THIRD, Figure
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.drawing import PUBLISHED, axis, joined, line
 from teleop_lab.experiments.experiment import Experiment
@@ -27,7 +27,10 @@ Way = tuple[str, str]
 """Architecture and passivity."""
 _WAYS: tuple[Way, ...] = (
     ("position_force", "none"), ("position_force", "tank"), ("position_position", "none"),
+    ("position_force", "tdpa"),
 )  # fmt: skip
+_TWO_PORTS = ("tdpa",)
+"""Passivities that need the slave's port."""
 _ROUNDS = 8
 _SECONDS = 8.0  # of each session: two touches
 _TOUCH = 2000  # ticks before the tip is on its path
@@ -40,14 +43,16 @@ _APPARENT_MASS = DeviceParameters().apparent_mass
 
 def _settings(grip: Grip, delay: float, stiffness: float, way: Way) -> Settings:
     architecture, passivity = way
-    late = (f"slave/measured_{kind}@motion_scaling={delay + 1e-3}" for kind in ("cf", "cp"))
+    ports = ("passivity",) if passivity in _TWO_PORTS else ()
+    late = [f"slave/measured_{kind}@motion_scaling={delay + 1e-3}" for kind in ("cf", "cp")]
+    late += [f"slave/energy@motion_scaling={delay + 1e-3}" for _ in ports]
     return {
         "world.material": "own", "world.stiffness": stiffness, "world.damping": 0.0,
         "world.friction_coefficient": 0.0, "reflection.max_force": 10.0, "feedback_timeout": 1.0,
         "reflection.architecture": architecture, "reflection.passivity": passivity,
         "hand.mass": grip.mass - _APPARENT_MASS, "hand.stiffness": grip.stiffness,
         "hand.damping": grip.damping,
-        "delays": tuple(late),
+        "delays": tuple(late), "stages": ports,
     }  # fmt: skip
 
 
@@ -130,7 +135,7 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
     traces = []
     for (name, grip), color in zip(GRIPS.items(), _COLORS, strict=True):
         exact = np.array([exact_boundary(grip, delay) for delay in smooth])
-        whole, tank, spring = np.array([found[name, delay] for delay in DELAYS]).T
+        whole, tank, spring, tdpa = np.array([found[name, delay] for delay in DELAYS]).T
         traces += [
             {**line(1e3 * smooth, exact, f"{name}, one exact axis", color, 1.2, "N/m"),
              "line": {"color": color, "width": 1.2, "dash": "dot"}},
@@ -138,6 +143,7 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
         ]  # fmt: skip
         if name == "medium":
             traces.append(joined(delays, tank, "with a tank, stiffest tried", PUBLISHED, "N/m"))
+            traces.append(joined(delays, tdpa, "with TDPA, stiffest tried", DARK, "N/m"))
             traces.append(joined(delays, spring, "medium, position_position", THIRD, "N/m"))
     layout = {"xaxis": axis("the force comes later by", "ms"),
               "yaxis": axis("stiffness", "N/m", type="log")}  # fmt: skip

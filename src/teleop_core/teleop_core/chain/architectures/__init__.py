@@ -28,6 +28,11 @@ MEMORY = 12
 """Numbers that an architecture remembers."""
 
 
+def unscaled(parameters: object) -> float:
+    """One: forces at the hand are of the size of those on the tip."""
+    return 1.0
+
+
 @dataclass(frozen=True)
 class Architecture:
     """A kind of architecture: what comes back to the hand.
@@ -44,12 +49,15 @@ class Architecture:
             push (3,) along the slave's base [N].
         numbers: ``numbers(parameters)`` gives what ``push`` takes; None for the numbers of the
             parameters in their order.
+        force_scale: ``force_scale(parameters)`` gives the force at the hand over the one on the
+            tip that it answers, above 0, by which energies of hand and slave are compared.
     """
 
     name: str
     parameters: type
     push: Callable[[Array, Array, Array, Array, float, Array], None]
     numbers: Callable[[Any], Array] | None = None
+    force_scale: Callable[[Any], float] = unscaled
 
     @cached_property
     def push_pointer(self) -> Any:

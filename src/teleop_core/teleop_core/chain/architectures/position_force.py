@@ -30,4 +30,10 @@ def position_force_push(
         out[i] = numbers[0] * felt[i]
 
 
-POSITION_FORCE = Architecture("position_force", PositionForceParameters, position_force_push)
+def _scale(parameters: PositionForceParameters) -> float:
+    return max(parameters.force_gain, 1e-3)
+
+
+POSITION_FORCE = Architecture(
+    "position_force", PositionForceParameters, position_force_push, force_scale=_scale
+)

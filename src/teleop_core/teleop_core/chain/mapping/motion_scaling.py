@@ -57,14 +57,17 @@ from teleop_core.chain.mapping.walls import (
     forget_wall,
     wall_force,
 )
+from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, STATE, assign, copy
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
+    MASTER_ENERGY,
     MASTER_FILTERED_OUT,
     MASTER_MEASURED_CP,
     MASTER_SERVO_CF,
+    SLAVE_ENERGY,
     SLAVE_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_REACH,
@@ -369,7 +372,9 @@ class MotionScaling(RunningStage):
         self._values = parameters
         self.kernel = motion_scaling_step
         self._shape = Shape(None, np.empty(0), np.zeros(3), np.zeros(3))
-        self._law = make_law(ARCHITECTURES.find("unilateral"), np.empty(0))
+        self._law = make_law(
+            ARCHITECTURES.find("unilateral"), np.empty(0), PASSIVITIES.find("none"), np.empty(0)
+        )
         self.reset()
         self.retune(parameters)
 
@@ -435,15 +440,22 @@ class MotionScaling(RunningStage):
         p, chosen = self.parameters, reflection.architecture
         p["is_reflected"] = chosen.kind != "unilateral"
         p["reflected_most"] = reflection.max_force
-        p["has_tank"] = reflection.passivity == "tank"
         part = ARCHITECTURES.find(chosen.kind)
+        passivity = PASSIVITIES.find(reflection.passivity.kind)
+        p["law"] = PASSIVITIES.names().index(passivity.name)
+        p["force_scale"] = part.force_scale(chosen.parameters)
         numbers = part.numbers_of(chosen.parameters)
-        if part.push_pointer is self._law.push and len(numbers) == len(self._law.numbers):
-            self._law.numbers[:] = numbers  # the tick that is composed already goes on
+        kept = passivity.numbers_of(reflection.passivity.parameters)
+        law = self._law
+        if (part.push_pointer, passivity.hand_pointer) == (law.push, law.hand) and (
+            len(numbers), len(kept)
+        ) == (len(law.numbers), len(law.kept)):  # fmt: skip
+            law.numbers[:], law.kept[:] = numbers, kept  # the tick that is composed already goes on
             return
-        self._law = make_law(part, numbers)
-        self.state["heard"] = self.state["seen"] = 0.0  # what is new sets in from nothing
-        self.state["push"] = 0.0
+        if part.push_pointer is not law.push:
+            # what is new sets in from nothing
+            self.state["heard"] = self.state["seen"] = self.state["push"] = 0.0
+        self._law = make_law(part, numbers, passivity, kept)
         self._compose_anew()
 
     def _compose_anew(self) -> None:
@@ -487,10 +499,12 @@ MOTION_SCALING = Stage(
         SLAVE_MEASURED_CF,
         SLAVE_MEASURED_CP,
         MASTER_FILTERED_OUT,
+        SLAVE_ENERGY,
     ),
-    writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE),
-    late=(SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF, SLAVE_MEASURED_CP),
-    optional=(MASTER_FILTERED_OUT,),
+    writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE, MASTER_ENERGY),
+    late=(SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_ENERGY),
+    optional=(MASTER_FILTERED_OUT, SLAVE_ENERGY),
+    on_demand=(MASTER_ENERGY,),
     trigger=MASTER_MEASURED_CP,
     needs=(SLAVE_SETPOINT_CP,),
     make=MotionScaling,

@@ -11,6 +11,7 @@ from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.mapping.walls import WALLS
+from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation
 from teleop_core.kernels.portable import dot, product
 
@@ -71,10 +72,12 @@ class ReflectionParameters:
         3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )  # fmt: skip
-    passivity: str = parameter(
-        "none", choices=("none", "tank"),
+    passivity: Choice = choice(
+        PASSIVITIES, "none",
         doc="tank: the push gives the hand no more energy than it took from it in this touch, "
-        "however late it comes; none: what the slave feels, which may throw the hand",
+        "however late it comes; tdpa: no more than the slave got back, and with a stage passivity "
+        "the slave gives no more than the hand did; none: what the slave feels, which may throw "
+        "the hand",
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Reflection: what the hand feels of the slave, and the tank that pays for it."""
+"""Reflection: what the hand feels of the slave, and what its passivity leaves of that."""
 
 import math
 from typing import Annotated, Any, NamedTuple
@@ -7,6 +7,19 @@ import numpy as np
 
 from teleop_core.chain.architectures import MEMORY, Architecture
 from teleop_core.chain.mapping.following import is_felt, is_seen
+from teleop_core.chain.passivity import MEMORY as PASSIVE_MEMORY
+from teleop_core.chain.passivity import Passivity
+from teleop_core.chain.passivity.port import (
+    IN,
+    LAW,
+    ROUND,
+    WITHHELD,
+    begin_round,
+    count,
+    hear_energy,
+    port_work,
+)
+from teleop_core.graph.topics import ENERGY
 from teleop_core.kernels import inner
 from teleop_core.kernels.fields import Fields, Integers, Vector3
 from teleop_core.kernels.geometry import Array
@@ -17,7 +30,9 @@ class ReflectionNumbers(Fields):
 
     is_reflected: int
     reflected_most: float  # [N]
-    has_tank: int
+    law: float  # kind of passivity
+    force_scale: float  # force at the hand over that on the tip
+    gain: Annotated[Array, 2]  # motion of the slave over the hand's: coarse, fine
     axis: Annotated[Integers, 3]  # axes of master and slave
     sign: Vector3
 
@@ -27,20 +42,18 @@ class ReflectionState(Fields):
 
     heard: float  # share of the force that counts
     seen: float  # share of the slave's place that counts
-    tank: float  # energy [J]
     push: Vector3  # the last one [N]
     pushed_at: Vector3  # where it began [m]
-    pushed_way: float  # how far the hand went with it [m]
+    scale: float  # the hand's energy over the slave's
 
 
 # Time [s] over which what comes from afar sets in, or fades where nothing comes any more.
 _FADE = 0.1
-# Of a tank: push that an empty one allows [N], and a step of the device's reading [m].
-_SPARE, _READING = 0.005, 0.06e-3
+_ROUNDING = 1.0 + 1e-12
 
 
 class Law(NamedTuple):
-    """The architecture: its push, its numbers and memory, what it gets and what it writes."""
+    """Architecture and passivity: kernels, numbers, memory, what they get and what they write."""
 
     push: Any
     numbers: Array
@@ -48,16 +61,31 @@ class Law(NamedTuple):
     felt: Array
     away: Array
     out: Array
+    hand: Any
+    kept: Array  # numbers of the passivity
+    left: Array  # its memory
+    last: Array
+    moved: Array
+    asked: Array
+    flow: Array
+    port: Array
 
     def clear(self) -> None:
         """Forget what happened."""
-        for array in (self.memory, self.felt, self.away, self.out):
+        for array in (
+            self.memory, self.felt, self.away, self.out, self.left, self.last, self.moved,
+            self.asked, self.flow, self.port,
+        ):  # fmt: skip
             array[:] = 0.0
 
 
-def make_law(part: Architecture, numbers: Array) -> Law:
-    """The law of an architecture, at rest."""
-    return Law(part.push_pointer, numbers, np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3))
+def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Array) -> Law:
+    """The law of an architecture and a passivity, at rest."""
+    return Law(
+        part.push_pointer, numbers, np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3),
+        passivity.hand_pointer, kept, np.zeros(PASSIVE_MEMORY), np.zeros(3), np.zeros(3),
+        np.zeros(3), np.zeros(3), np.zeros(len(ENERGY)),
+    )  # fmt: skip
 
 
 @inner
@@ -67,8 +95,8 @@ def reflect(
     """Add to the hand's force (3,) [N] what it feels of the slave; what falls silent fades.
 
     Args:
-        p: Record with :data:`REFLECTION_PARAMETERS`.
-        s: Record with :data:`REFLECTION_STATE`; written.
+        p: Record with :class:`ReflectionNumbers`.
+        s: Record with :class:`ReflectionState`; written.
         law: :class:`Law`; written.
         is_following: Whether the slave is led by the hand; where it goes its own way is not felt.
         period: Since the sample before [s].
@@ -76,8 +104,11 @@ def reflect(
         row: Signals.
     """
     if p.is_reflected == 0:
+        if row.master_energy[LAW] != 0.0:  # nothing is asked of the slave's side any more
+            begin_round(row.master_energy, 0.0, 1e-9 * row.master_measured_cp_ns)
         return
-    force, step = row.master_servo_cf, period / _FADE
+    _count(p, s, law, is_following, stylus, row)
+    step = period / _FADE
     s.heard = min(max(s.heard + (step if is_felt(p, s, row) else -step), 0.0), 1.0)
     is_led = is_following and is_seen(p, s, row)
     s.seen = min(max(s.seen + (step if is_led else -step), 0.0), 1.0)
@@ -85,46 +116,59 @@ def reflect(
         law.felt[i] = s.heard * row.slave_measured_cf[i]
         law.away[i] = s.seen * (row.slave_measured_cp[i] - s.command[i])
     law.push(law.numbers, law.memory, law.felt, law.away, period, law.out)
-    square = 0.0
+    _bound(law.out, p.reflected_most, 1.0)
     for i in range(3):
-        square += law.out[i] * law.out[i]
-    share = 1.0
-    if square > p.reflected_most * p.reflected_most:
-        share = p.reflected_most / math.sqrt(square)
-    _fill_tank(s, stylus)
+        law.asked[p.axis[i]] = p.sign[i] * law.out[i]
+    _make_passive(p, s, law, period, row)
     for i in range(3):
-        s.push[p.axis[i]] = p.sign[i] * share * law.out[i]
-    if p.has_tank:
-        _draw_from_tank(s)
-    for i in range(3):
-        force[i] += s.push[i]
+        row.master_servo_cf[i] += s.push[i]
 
 
 @inner
-def _fill_tank(s: Any, stylus: Array) -> None:
-    """Take from the tank what the last push gave the hand, which moved to a place since then."""
-    s.pushed_way = 0.0
-    for i in range(3):
-        way = stylus[i] - s.pushed_at[i]
-        s.tank -= s.push[i] * way
-        s.pushed_way += abs(way)
-        s.pushed_at[i] = stylus[i]
-
-
-@inner
-def _draw_from_tank(s: Any) -> None:
-    """Make the push (3,) [N] no larger than the tank can pay for until the next sample.
-
-    Source:
-        The energy tank of Franken, Stramigioli, Misra, Secchi and Macchelli 2011, at the hand
-        alone: what is in it came from the hand in this touch.
-    """
+def _bound(push: Array, most: float, rounding: float) -> None:
+    """Shorten a push (3,) to ``most`` [N]; one that is longer by rounding alone stays."""
     square = 0.0
     for i in range(3):
-        square += s.push[i] * s.push[i]
-    if square == 0.0:  # the touch is over
-        s.tank = 0.0
-    push, most = math.sqrt(square), _SPARE + max(s.tank, 0.0) / (_READING + 2.0 * s.pushed_way)
-    if push > most:
+        square += push[i] * push[i]
+    if square > most * most * rounding:
+        share = most / math.sqrt(square)
         for i in range(3):
-            s.push[i] *= most / push
+            push[i] *= share
+
+
+@inner
+def _count(p: Any, s: Any, law: Any, is_following: bool, stylus: Array, row: Any) -> None:
+    """Count what the last push did on the way of the hand; what begins anew has no energy.
+
+    Energies begin anew with another law or scale, and while the hand does not lead the slave.
+    """
+    scale = p.force_scale / p.gain[s.is_fine]
+    is_other = law.port[LAW] != p.law or s.scale != scale or law.port[ROUND] == 0.0
+    if is_other or not is_following:
+        s.scale = scale
+        begin_round(law.port, p.law, 1e-9 * row.master_measured_cp_ns)
+    for i in range(3):
+        law.moved[i] = stylus[i] - s.pushed_at[i]
+        s.pushed_at[i] = stylus[i]
+    came = -port_work(s.push, law.moved) / scale
+    count(law.port, IN, came)
+    law.flow[0] = hear_energy(law.port, row.slave_energy)
+    law.flow[1], law.flow[2] = max(came, 0.0), max(-came, 0.0)
+
+
+@inner
+def _make_passive(p: Any, s: Any, law: Any, period: float, row: Any) -> None:
+    """Make of the push that is asked for the one that is given, and tell the energies."""
+    for i in range(3):
+        law.last[i], s.push[i] = s.push[i], law.asked[i]
+    law.hand(
+        law.kept, law.left, law.last, law.moved, law.flow, row.slave_energy, law.port, s.push,
+        s.scale, period,
+    )  # fmt: skip
+    _bound(s.push, p.reflected_most, _ROUNDING)
+    for i in range(3):
+        lost = (s.push[i] - law.asked[i]) * law.moved[i] / s.scale
+        if lost > 0.0:
+            law.port[WITHHELD] += lost
+    for i in range(law.port.shape[0]):
+        row.master_energy[i] = law.port[i]

@@ -28,16 +28,21 @@ from teleop_core.chain.network.link import (
     take_packet,
 )
 from teleop_core.chain.network.parameters import NetworkParameters, WayParameters
-from teleop_core.graph.signals import DT, assign, copy
+from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
+    ENERGY,
+    MASTER_ENERGY,
+    NETWORK_MASTER_ENERGY,
     NETWORK_MEASURED_CF,
     NETWORK_MEASURED_CP,
     NETWORK_REACH,
     NETWORK_SERVO_CP,
     NETWORK_SETPOINT_CP,
+    NETWORK_SLAVE_ENERGY,
     NETWORK_STATE,
     NO_COMMAND_NS,
+    SLAVE_ENERGY,
     SLAVE_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_REACH,
@@ -55,8 +60,10 @@ _TOLD = 20
 _FOLLOWS_NS = 100_000_000
 """A slave whose setpoint is of an older command than this goes its own way [ns]."""
 _SETPOINT, _POSE, _FORCE, _REACH = 0, 7, 14, 20
-"""Places in a packet from the slave: setpoint, measured pose, force, reach."""
-_WIDTHS = (7, 20 + len(SLAVE_REACH.columns))
+_ENERGY = _REACH + len(SLAVE_REACH.columns)
+"""Places in a packet from the slave: setpoint, measured pose, force, reach, energies."""
+_ENERGY_THERE = 7  # place of the energies in a packet to the slave, behind the command
+_WIDTHS = (_ENERGY_THERE + len(ENERGY), _ENERGY + len(ENERGY))
 
 
 @inner
@@ -86,7 +93,8 @@ def _send_there(p: Any, s: Any, there: Any, row: Any, dt: float) -> None:
     remember_told(s, THERE, row.slave_servo_cp, none)
     s.sent_ns = row.slave_servo_cp_ns
     _pack(row.slave_servo_cp, there.packet, 0)
-    there.packet_ns[0] = row.slave_servo_cp_ns
+    _pack(row.master_energy, there.packet, _ENERGY_THERE)
+    there.packet_ns[0], there.packet_ns[1] = row.slave_servo_cp_ns, row.master_energy_ns
     send_packet(p, s, there, THERE, dt)
 
 
@@ -103,8 +111,10 @@ def _send_back(p: Any, s: Any, back: Any, row: Any, dt: float) -> None:
     _pack(row.slave_measured_cp, back.packet, _POSE)
     _pack(row.slave_measured_cf, back.packet, _FORCE)
     _pack(row.slave_reach, back.packet, _REACH)
+    _pack(row.slave_energy, back.packet, _ENERGY)
     back.packet_ns[0], back.packet_ns[1] = row.slave_setpoint_cp_ns, row.slave_measured_cp_ns
     back.packet_ns[2], back.packet_ns[3] = row.slave_measured_cf_ns, row.slave_reach_ns
+    back.packet_ns[4] = row.slave_energy_ns
     send_packet(p, s, back, BACK, dt)
 
 
@@ -113,8 +123,9 @@ def _take_there(p: Any, s: Any, there: Any, row: Any) -> None:
     """Take the command that arrived; increments count from where the slave is led, or was last."""
     take_packet(s, there, THERE)
     if s.arrived[THERE]:
-        copy(there.came, row.network_servo_cp)
-        row.network_servo_cp_ns = there.came_ns[0]
+        _unpack(there.came, 0, row.network_servo_cp)
+        _unpack(there.came, _ENERGY_THERE, row.network_master_energy)
+        row.network_servo_cp_ns, row.network_master_energy_ns = there.came_ns[0], there.came_ns[1]
     if p.is_incremental == 0:
         return
     setpoint_ns = row.slave_setpoint_cp_ns
@@ -136,8 +147,10 @@ def _take_back(s: Any, back: Any, row: Any) -> None:
     _unpack(back.came, _POSE, row.network_measured_cp)
     _unpack(back.came, _FORCE, row.network_measured_cf)
     _unpack(back.came, _REACH, row.network_reach)
+    _unpack(back.came, _ENERGY, row.network_slave_energy)
     row.network_setpoint_cp_ns, row.network_measured_cp_ns = back.came_ns[0], back.came_ns[1]
     row.network_measured_cf_ns, row.network_reach_ns = back.came_ns[2], back.came_ns[3]
+    row.network_slave_energy_ns = back.came_ns[4]
 
 
 @kernel
@@ -178,7 +191,7 @@ class NetworkLink(RunningStage):
         self.kernel, self._seed, self.ahead = network_step, parameters.seed, BLOCK
         self._ways = [
             self._made(width, topics, given)
-            for width, topics, given in zip(_WIDTHS, (1, 4), parameters.ways, strict=True)
+            for width, topics, given in zip(_WIDTHS, (2, 5), parameters.ways, strict=True)
         ]
         self.arguments = (self.parameters, self.state, *self._ways)
         self._begin = self.signals.copy()
@@ -241,20 +254,23 @@ class NetworkLink(RunningStage):
         return found
 
 
+_TAKEN = (
+    SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH,
+    MASTER_ENERGY, SLAVE_ENERGY,
+)  # fmt: skip
 NETWORK = Stage(
     "network",
     NetworkParameters,
-    reads=(
-        SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH,
-    ),
+    reads=_TAKEN,
     writes=(
         NETWORK_SERVO_CP, NETWORK_SETPOINT_CP, NETWORK_MEASURED_CP, NETWORK_MEASURED_CF,
-        NETWORK_REACH, NETWORK_STATE,
+        NETWORK_REACH, NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY, NETWORK_STATE,
     ),
-    late=(SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH),
-    replaces=(
-        SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH,
-    ),
+    late=(SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH, SLAVE_ENERGY),
+    optional=(MASTER_ENERGY, SLAVE_ENERGY),
+    replaces=_TAKEN,
+    spares=("slave/measured_cf@passivity", "slave/measured_cp@passivity"),
+    on_demand=(NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY),
     make=NetworkLink,
     node="teleop_core.nodes.network:NetworkNode",
 )  # fmt: skip

@@ -1,0 +1,129 @@
+"""Passivity: what keeps force that comes late from giving energy, one file per kind.
+
+Hand and slave are joined at two ports. At the hand's, the push on it and its motion; at the
+slave's, the force on the tip and the tip's motion. What goes in and out is counted at both for
+every kind (:mod:`teleop_core.chain.passivity.port`); a kind says what is done about it, on either
+side, knowing its own port and what it heard of the other one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from teleop_core.base.errors import PartError
+from teleop_core.base.registry import Registry, part_check, tried
+from teleop_core.graph.topics import ENERGY
+from teleop_core.kernels import kernel, pointer
+from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.parts import fenced, is_whole, numbers_of
+
+__all__ = ["MEMORY", "PASSIVITIES", "Passivity", "leave_command", "register_passivity"]
+
+_ROW = types.float64[::1]
+HAND = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64, types.float64)
+SLAVE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64)
+"""Signatures of both kernels, so that one compiled stage serves every kind."""
+MEMORY = 12
+"""Numbers that each side of a kind remembers."""
+
+
+@kernel
+def leave_command(
+    numbers: Array, memory: Array, flow: Array, force: Array, last: Array, heard: Array,
+    port: Array, command: Array, period: float,
+) -> None:  # fmt: skip
+    """Let the slave have the command as it came."""
+
+
+@dataclass(frozen=True)
+class Passivity:
+    """A kind of passivity: what it makes of the push on the hand, and of the slave's command.
+
+    Both kernels may write to ``port``, their row of :data:`~teleop_core.graph.topics.ENERGY`, and
+    get ``heard``, the other side's, as it arrived; energies are those of the slave [J]. ``flow``
+    (3,) is what the other side told since the last call, what went in and what went out at this
+    port. ``memory`` (12,) is kept from call to call, and zero at the start; energies begin anew
+    with every ``round``, and at the slave ``memory`` with them.
+
+    Attributes:
+        name: What ``--set reflection.passivity=`` calls it.
+        parameters: Its parameter group.
+        hand: ``hand(numbers, memory, last, moved, flow, heard, port, push, scale, period)``, called
+            for every sample of the master. ``last`` (3,) is the push since the sample before [N],
+            ``moved`` (3,) how far the hand went under it [m], both along the master's base;
+            ``push`` (3,) the one that is asked for, to be made the one that is given; ``scale`` the
+            hand's energy over that of the slave; ``period`` the time since the sample before [s].
+        slave: ``slave(numbers, memory, flow, force, last, heard, port, command, period)``, called
+            for every command that arrives, with a stage ``passivity`` alone. ``numbers`` are those
+            of that stage; ``force`` (6,) is on the tip [N, N m]; ``last`` (7,) the command before
+            it, as it was given; ``command`` (7,) the one that came, to be made the one that is
+            given.
+        numbers: ``numbers(parameters)`` gives what ``hand`` takes; None for the numbers of the
+            parameters in their order.
+    """
+
+    name: str
+    parameters: type
+    hand: Callable[..., None]
+    slave: Callable[..., None] = leave_command
+    numbers: Callable[[Any], Array] | None = None
+
+    @cached_property
+    def hand_pointer(self) -> Any:
+        """The hand's side as an argument for kernels."""
+        return pointer(self.hand, HAND)
+
+    @cached_property
+    def slave_pointer(self) -> Any:
+        """The slave's side as an argument for kernels."""
+        return pointer(self.slave, SLAVE)
+
+    def numbers_of(self, parameters: object) -> Array:
+        """Numbers of a parameter group, as the hand's side takes them."""
+        return numbers_of(parameters) if self.numbers is None else self.numbers(parameters)
+
+
+def _try(part: Passivity) -> None:
+    """Call both sides for some samples, so that what cannot work is told before anything runs."""
+    needs = (
+        "one with hand(numbers, memory, last, moved, flow, heard, port, push, scale, period) and "
+        "parameters that all have defaults"
+    )
+    with tried("passivity", part.name, needs):
+        numbers, width = part.numbers_of(part.parameters()), len(ENERGY)
+        memory, fence = fenced(np.zeros(MEMORY))
+        push, behind = fenced(np.zeros(3))
+        command, after = fenced(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+        last = command.copy()
+        heard, port, flow = np.zeros(width), np.zeros(width), np.full(3, 1e-6)
+        for size in (0.0, 1.0, -1.0):
+            push[:], moved = size, np.full(3, 1e-4 * size)
+            part.hand(numbers, memory, push.copy(), moved, flow, heard, port, push, 1.0, 1e-3)
+            part.slave(np.ones(5), memory, flow, np.full(6, size), last, heard, port, command, 1e-3)
+            is_sound = np.isfinite(push).all() and np.isfinite(command).all()
+            if not (is_sound and is_whole(fence) and is_whole(behind) and is_whole(after)):
+                text = f"one whose push and command are finite, not {push!r} and {command!r}"
+                raise PartError("passivity", part.name, text)
+
+
+PASSIVITIES: Registry[Passivity] = Registry(
+    "passivity",
+    "passivities",
+    {
+        "none": "teleop_core.chain.passivity.none:NONE",
+        "tank": "teleop_core.chain.passivity.tank:TANK",
+        "tdpa": "teleop_core.chain.passivity.tdpa:TDPA",
+    },
+    part_check("passivity", Passivity, "hand", "slave"),
+    _try,
+)
+"""All kinds by name."""
+
+
+def register_passivity(part: Passivity, *, replace: bool = False) -> Passivity:
+    """Add a kind under its own name for the rest of the program; see :meth:`Registry.add`."""
+    return PASSIVITIES.add(part.name, part, replace=replace)

@@ -1,0 +1,205 @@
+"""Passivity as a stage: the slave's port, between what arrives of the hand and inverse kinematics.
+
+It counts what goes through the slave's tip and lets the kind of passivity that the hand tells of
+have its say about the command. Without it nobody limits what the slave gives.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.chain.passivity import MEMORY, PASSIVITIES
+from teleop_core.chain.passivity.port import (
+    IN,
+    LAW,
+    ROUND,
+    TURN_IN,
+    begin_round,
+    count,
+    hear_energy,
+    port_work,
+)
+from teleop_core.graph.signals import DT, assign, copy
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
+    MASTER_ENERGY,
+    PASSIVITY_SERVO_CP,
+    SLAVE_ENERGY,
+    SLAVE_MEASURED_CF,
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+)
+from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels.geometry import Array, turn_between
+
+
+@dataclass(frozen=True, kw_only=True)
+class PassivityParameters:
+    """Parameters of the slave's side, of every kind of passivity."""
+
+    recovery: float = parameter(
+        0.2, unit="s", lower=1e-3, upper=100.0,
+        doc="time constant with which what a command lost is made up for",
+        source="assumed",
+    )  # fmt: skip
+    recovery_speed: float = parameter(
+        5e-3, unit="m/s", lower=0.0, upper=1.0,
+        doc="largest speed of the same, and of going back from what is overdrawn",
+        source="assumed: at it an arm meets steel with some 2 N",
+    )  # fmt: skip
+    least_force: float = parameter(
+        0.01, unit="N", lower=0.0, upper=10.0,
+        doc="a smaller force on the tip is none; above what the sensor tells of nothing",
+        source="assumed: that of an ideal sensor",
+    )  # fmt: skip
+    credit: float = parameter(
+        2e-3, unit="J", lower=0.0, upper=1.0,
+        doc="energy that the arm lends in a touch before the hand has paid; what the world gives "
+        "back goes to it first, never to the hand",
+        source="assumed: what presses tissue with 0.9 N; an arm that runs into steel brings more",
+    )  # fmt: skip
+    credit_force: float = parameter(
+        1.0, unit="N", lower=1e-3, upper=100.0,
+        doc="force on the tip up to which it lends all of that; from twice the force on it lends "
+        "nothing, and what an arm that ran into something hard overdrew is given back",
+        source="assumed: a gentle touch",
+    )  # fmt: skip
+
+
+class Laws(NamedTuple):
+    """The slave's side of all kinds, what they remember, and room to work in."""
+
+    slaves: Any
+    numbers: Array
+    memory: Array
+    flow: Array  # heard, in and out since the last command
+    step: Array
+    turn: Array
+    last: Array  # the command that was given last (7,)
+
+
+_STATE = [
+    ("tip", "f8", (7,)), ("tip_ns", "i8"), ("force", "f8", (6,)), ("felt", "f8", (6,)),
+    ("before", "f8", (6,)), ("command_ns", "i8"), ("has_last", "i8"),
+]  # fmt: skip
+
+
+@inner
+def _observe(s: Any, laws: Any, row: Any, port: Array) -> None:
+    """Count what went through the tip since it was measured last.
+
+    The force is that of the time when the tip was measured: the mean of both ends of its way, so
+    that a spring takes and gives the same.
+    """
+    is_late = row.slave_measured_cf_ns > row.slave_measured_cp_ns
+    for i in range(6):
+        now = s.before[i] if is_late else row.slave_measured_cf[i]
+        s.felt[i], s.force[i] = 0.5 * (s.force[i] + now), now
+        s.before[i] = row.slave_measured_cf[i]
+    if s.tip_ns != 0 and row.slave_measured_cp_ns > s.tip_ns:
+        for i in range(3):
+            laws.step[i] = row.slave_measured_cp[i] - s.tip[i]
+        turn_between(s.tip[3:7], row.slave_measured_cp[3:7], laws.turn)
+        came = port_work(s.felt[0:3], laws.step)
+        count(port, IN, came)
+        count(port, TURN_IN, port_work(s.felt[3:6], laws.turn))
+        laws.flow[1] += max(came, 0.0)
+        laws.flow[2] += max(-came, 0.0)
+    copy(row.slave_measured_cp, s.tip)
+    s.tip_ns = row.slave_measured_cp_ns
+
+
+@inner
+def _begin(s: Any, laws: Any, heard: Array, port: Array) -> None:
+    """Begin the round that the hand tells of, without any drift."""
+    begin_round(port, heard[LAW], heard[ROUND])
+    for i in range(laws.memory.shape[0]):
+        laws.memory[i] = 0.0
+    for i in range(3):
+        laws.flow[i] = 0.0
+    s.has_last = 0
+
+
+@kernel
+def passivity_step(p: Any, s: Any, laws: Any, row: Any, dt: float) -> None:
+    """One tick: count the energy at the tip, and answer a command that has come.
+
+    Args:
+        p: Nothing.
+        s: State record; written.
+        laws: :class:`Laws`; written.
+        row: Signals; ``slave_energy`` and ``passivity_servo_cp`` are written.
+        dt: Tick [s].
+    """
+    port, heard = row.slave_energy, row.master_energy
+    if heard[ROUND] > port[ROUND]:
+        _begin(s, laws, heard, port)
+    _observe(s, laws, row, port)
+    laws.flow[0] += hear_energy(port, heard)
+    if row.slave_servo_cp_ns == s.command_ns:
+        return
+    elapsed = max(1e-9 * (row.slave_servo_cp_ns - s.command_ns), dt) if s.has_last else dt
+    s.command_ns = row.slave_servo_cp_ns
+    copy(row.slave_servo_cp, row.passivity_servo_cp)
+    if s.has_last == 0:
+        copy(row.slave_servo_cp, laws.last)
+    law = int(port[LAW])
+    if 0 <= law < len(laws.slaves):
+        laws.slaves[law](
+            laws.numbers, laws.memory, laws.flow, s.force, laws.last, heard, port,
+            row.passivity_servo_cp, elapsed,
+        )  # fmt: skip
+    copy(row.passivity_servo_cp, laws.last)
+    s.has_last = 1
+    for i in range(3):
+        laws.flow[i] = 0.0
+
+
+class SlaveSide(RunningStage):
+    """Stage of the slave's port."""
+
+    def __init__(self, parameters: PassivityParameters, dt: float = DT) -> None:
+        super().__init__(PASSIVITY, 0, dt)
+        self.parameters, self.state = records([("none", "i8")])[0], records(_STATE)[0]
+        self.kernel = passivity_step
+        slaves = tuple(PASSIVITIES.find(name).slave_pointer for name in PASSIVITIES)
+        self._laws = Laws(
+            slaves,
+            np.zeros(5),
+            np.zeros(MEMORY),
+            np.zeros(3),
+            np.zeros(3),
+            np.zeros(3),
+            np.zeros(7),
+        )
+        self.arguments = (self.parameters, self.state, self._laws)
+        self._start = self.signals.copy()
+        self.retune(parameters)
+        self.reset()
+
+    def reset(self) -> None:
+        """No energy, no drift, no command."""
+        assign(self.state, 0)
+        assign(self.signals, self._start)
+        for array in self._laws[2:]:
+            array[:] = 0.0
+
+    def retune(self, parameters: PassivityParameters) -> None:
+        """Take new parameters from the next command on."""
+        self._laws.numbers[:] = (
+            parameters.recovery, parameters.recovery_speed, parameters.least_force,
+            parameters.credit, parameters.credit_force,
+        )  # fmt: skip
+
+
+PASSIVITY = Stage(
+    "passivity",
+    PassivityParameters,
+    reads=(SLAVE_SERVO_CP, MASTER_ENERGY, SLAVE_MEASURED_CF, SLAVE_MEASURED_CP),
+    writes=(PASSIVITY_SERVO_CP, SLAVE_ENERGY),
+    late=(SLAVE_MEASURED_CF, SLAVE_MEASURED_CP),
+    replaces=SLAVE_SERVO_CP,
+    make=SlaveSide,
+)

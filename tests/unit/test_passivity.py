@@ -1,0 +1,306 @@
+"""Passivity: power of a port, energies that only grow, and laws over networks drawn at random."""
+
+import numpy as np
+import pytest
+
+from teleop_core.base.parameters import NoParameters, build
+from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.chain.passivity import PASSIVITIES, Passivity, register_passivity
+from teleop_core.chain.passivity.port import (
+    DRIFT,
+    HEARD,
+    IN,
+    LAW,
+    OUT,
+    ROUND,
+    TOLD,
+    TURN_IN,
+    TURN_OUT,
+    begin_round,
+    hear_energy,
+)
+from teleop_core.chain.passivity.slave_side import PASSIVITY, PassivityParameters
+from teleop_core.chain.passivity.tdpa import tdpa_hand, tdpa_slave
+from teleop_core.graph.topics import ENERGY
+from teleop_core.session.configuration import configure
+from teleop_core.session.virtual import VirtualTime
+
+pytestmark = pytest.mark.usefixtures("own_parts")
+BOTH = ("teleop.stages=[network,passivity]", "feedback_timeout=1.0", "reach_force.is_on=false",
+        "gimbal_noise=0.0")  # fmt: skip
+TICK_NS = 1_000_000
+
+
+def pressing(*texts, ticks=12_000):
+    """Signals of the scenario ``palpation`` with both ports."""
+    return VirtualTime(configure("palpation", settings=[*BOTH, *texts])).run(ticks)
+
+
+def slave_port():
+    """The slave's side at rest, and a call that makes a tick with force (6,) and pose (7,)."""
+    stage = PASSIVITY.run(PassivityParameters())
+    row = stage.signals
+
+    def tick(force, pose):
+        now_ns = int(row["slave_measured_cp_ns"]) + TICK_NS
+        row["slave_measured_cf"], row["slave_measured_cp"] = force, pose
+        row["slave_measured_cf_ns"] = row["slave_measured_cp_ns"] = now_ns
+        stage.step()
+        return row["slave_energy"].copy()
+
+    return tick
+
+
+def moved(axis, way):
+    """Pose (7,) that is a way [m] along an axis from the origin, or for 3 to 5 a turn [rad]."""
+    pose = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    if axis < 3:
+        pose[axis] = way
+    else:
+        pose[3], pose[1 + axis] = np.cos(0.5 * way), np.sin(0.5 * way)
+    return pose
+
+
+@pytest.mark.parametrize("along", range(6))
+@pytest.mark.parametrize("pushed", range(6))
+def test_the_power_of_the_slaves_port_is_each_force_times_its_own_speed(pushed, along):
+    """Force with speed and torque with turn, in J: 2 N over 1 mm are 2 mJ."""
+    tick, force = slave_port(), np.zeros(6)
+    force[pushed] = 2.0
+    tick(force, moved(along, 0.0))
+    there = tick(force, moved(along, 1e-3))
+    back = tick(force, moved(along, 0.0))
+    work = 2e-3 if pushed == along else 0.0
+    into, out = (IN, OUT) if along < 3 else (TURN_IN, TURN_OUT)
+    assert there[into] == pytest.approx(work, abs=1e-15)
+    assert there[out] == 0.0
+    assert back[out] == pytest.approx(work, abs=1e-15)
+    others = [k for k in (IN, OUT, TURN_IN, TURN_OUT) if k not in (into, out)]
+    assert not back[others].any()
+
+
+def test_energies_at_the_hand_are_its_push_times_its_way_on_every_axis():
+    rows = pressing("reflection.passivity=none", "operator.kind=circle", "world.material=silicone",
+                    "operator.size=[0.006,0.02,0.006]")  # fmt: skip
+    push, place = rows["master_servo_cf"][:-1, :3], rows["master_measured_cp"][:, :3]
+    told = rows["master_energy"]
+    begun = int(np.argmax(np.diff(told[:, ROUND]) == 0.0)) + 1
+    assert (told[begun:, ROUND] == told[-1, ROUND]).all()
+    work = -np.einsum("ij,ij->i", push, np.diff(place, axis=0))[begun:]
+    assert np.all(np.abs(push).max(axis=0) > 0.05)  # on every axis
+    np.testing.assert_allclose(told[-1, IN], work[work > 0.0].sum(), rtol=1e-9)
+    np.testing.assert_allclose(told[-1, OUT], -work[work < 0.0].sum(), rtol=1e-9)
+
+
+def test_energies_that_are_lost_late_or_doubled_take_nothing_away():
+    rng, port, sent = np.random.default_rng(1), np.zeros(len(ENERGY)), []
+    begin_round(port, 2.0, 1.0)
+    for told in np.cumsum(rng.uniform(0.0, 1e-3, 200)):
+        sent.append(np.zeros(len(ENERGY)))
+        sent[-1][[LAW, ROUND, TOLD]] = 2.0, 1.0, told
+    newest, gained = 0.0, 0.0
+    for i in rng.integers(0, 200, 400):
+        gained += hear_energy(port, sent[i])
+        newest = max(newest, sent[i][TOLD])
+        assert port[HEARD] == newest == pytest.approx(gained, rel=1e-12)
+    sent[-1][ROUND] = 0.5
+    port[HEARD] = 0.0
+    assert hear_energy(port, sent[-1]) == 0.0  # of another round
+
+
+def hand_port(rng, count=4000):
+    """A hand that shakes under a push of 2 N and hears energy now and then: port, way, heard."""
+    port, memory, numbers = np.zeros(len(ENERGY)), np.zeros(12), np.array([3e-4])
+    begin_round(port, 2.0, 1.0)
+    push, way = np.zeros(3), 0.0
+    for _ in range(count):
+        moved = np.array([rng.uniform(-6e-5, 6e-5), 0.0, 0.0])
+        came, gained = -float(push @ moved), rng.choice([0.0, 2e-5])
+        way += abs(moved[0])
+        port[IN if came > 0.0 else OUT] += abs(came)
+        port[HEARD] += gained
+        flow, last = np.array([gained, max(came, 0.0), max(-came, 0.0)]), push.copy()
+        push[:] = 2.0, 0.0, 0.0
+        tdpa_hand(numbers, memory, last, moved, flow, port, port, push, 1.0, 1e-3)
+        yield port, way, push
+
+
+def test_the_hand_is_given_no_more_than_was_heard_and_what_it_put_in_and_did_not_tell():
+    """At every sample, but for the 5 mN of an empty port on its way."""
+    pushes = []
+    for port, way, push in hand_port(np.random.default_rng(3)):
+        assert port[OUT] <= port[HEARD] + port[IN] - port[TOLD] + 0.005 * way + 1e-15
+        pushes.append(push[0])
+    assert min(pushes) < 0.1
+    assert max(pushes) == 2.0
+
+
+def slave_law(numbers=(0.2, 0.03, 0.01, 1e-3, 2.0)):
+    """Calls of the slave's law of TDPA, 2 N against z: port and the command it gives."""
+    port, memory, force = np.zeros(len(ENERGY)), np.zeros(12), np.zeros(6)
+    begin_round(port, 2.0, 1.0)
+    last = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    force[2] = 2.0
+
+    def command(height, heard=0.0, into=0.0, out=0.0, push=2.0):
+        force[2] = push
+        given = np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0])
+        port[IN] += into
+        flow = np.array([heard, into, out])
+        tdpa_slave(np.array(numbers), memory, flow, force, last, port, port, given, 1e-3)
+        last[:] = given
+        return port, given[2]
+
+    return command
+
+
+def test_a_command_goes_against_the_force_as_far_as_credit_and_hand_pay_for():
+    command, heard, rng = slave_law(), 0.0, np.random.default_rng(4)
+    for k in range(400):
+        gained = rng.choice([0.0, 1e-5])
+        heard += gained
+        port, height = command(-1e-4 * k, heard=gained)
+        assert -2.0 * height <= 1e-3 + heard + 1e-15
+    assert height > -1e-4 * k + 0.02
+    np.testing.assert_allclose(port[DRIFT : DRIFT + 3], [0.0, 0.0, -1e-4 * k - height], atol=1e-15)
+    for _ in range(3000):  # in the air, which costs nothing
+        height = command(-1e-4 * k, push=0.0)[1]
+    assert height == pytest.approx(-1e-4 * k, abs=1e-6)
+
+
+def test_what_the_arm_lent_is_paid_back_before_the_hand_gets_any():
+    command = slave_law()
+    assert command(0.0, out=1e-3)[0][TOLD] == 0.0
+    assert command(0.0, into=6e-4)[0][TOLD] == 0.0
+    assert command(0.0, into=6e-4)[0][TOLD] == pytest.approx(2e-4, rel=1e-12)
+    # What the hand pays then sets free what was kept of the world's.
+    assert command(0.0, heard=1e-3, into=1e-4)[0][TOLD] == pytest.approx(1.3e-3, rel=1e-12)
+
+
+def test_no_part_pushes_harder_than_allowed():
+    def rude(numbers, memory, last, moved, flow, heard, port, push, scale, period):
+        push *= 100.0
+
+    register_passivity(Passivity("rude", NoParameters, rude))
+    texts = ("reflection.passivity=rude", "reflection.max_force=1.5", "reach_force.is_on=false")
+    rows = VirtualTime(configure("palpation", settings=[*texts])).run(7000)
+    force = np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1)
+    assert force.max() == pytest.approx(1.5, rel=1e-9)
+
+
+def test_with_another_passivity_energies_begin_anew_while_a_session_runs():
+    session = VirtualTime(configure("palpation", settings=[*BOTH]))
+    before = session.run(7500)
+    assert before["master_energy"][-1, IN] > 1e-5
+    values = {
+        "reflection.architecture": "position_force", "reflection.passivity": "tdpa",
+        "reach_force.is_on": False, "feedback_timeout": 1.0,
+    }  # fmt: skip
+    session.stages["motion_scaling"].retune(build(MotionScalingParameters, values))
+    after = session.run(3000)
+    told = after["master_energy"]
+    assert told[0, LAW] == PASSIVITIES.names().index("tdpa")
+    assert told[0, ROUND] > before["master_energy"][-1, ROUND]
+    assert np.all(after["slave_energy"][10:, ROUND] == told[0, ROUND])
+    assert told[0, [IN, OUT, TOLD, HEARD]].max() < 1e-5
+    check_ports(after)
+
+
+STEP = 55e-6
+"""Step of the device's reading [m]."""
+
+
+def drawn(rng, kind):
+    """Settings of a session drawn at random: world, gains, hand and network."""
+    stiffness = 10.0 ** rng.uniform(1.5, 4.7)
+    there = rng.uniform(0.0, 0.5)
+    ways = [
+        f"network.{way}.{name}={value}"
+        for way, delay in (("there", there), ("back", rng.uniform(0.0, 0.5)))
+        for name, value in (
+            ("kind", "jitter"), ("least_delay", delay), ("jitter.mean", rng.choice([1e-4, 0.03])),
+            ("loss", rng.choice([0.0, 0.2, 0.5])), ("packet_order", rng.choice(["newest", "kept"])),
+        )
+    ]  # fmt: skip
+    return (
+        f"reflection.passivity={kind}", "world.material=own", f"world.stiffness={stiffness}",
+        f"world.damping={rng.choice([0.0, 0.5])}", f"hand.stiffness={rng.uniform(100.0, 1000.0)}",
+        f"world.friction_coefficient={rng.choice([0.0, 0.5])}", f"seed={rng.integers(1000)}",
+        f"operator.kind={rng.choice(['line', 'human', 'circle'])}",
+        f"position_force.force_gain={rng.uniform(0.3, 3.0)}", *ways,
+    )  # fmt: skip
+
+
+def gained(rows):
+    """Most that a touch gave the hand beyond what it took, but for 5 mN on its way [J]."""
+    force, place = rows["master_servo_cf"][:-1, :3], rows["master_measured_cp"][:, :3]
+    steps = np.diff(place, axis=0)
+    work = np.einsum("ij,ij->i", force, steps) - 0.005 * np.linalg.norm(steps, axis=1)
+    largest = total = 0.0
+    for step, pushes in zip(work.tolist(), force.any(axis=1).tolist(), strict=True):
+        total = total + step if pushes else 0.0
+        largest = max(largest, total)
+    return largest
+
+
+def fastest(rows):
+    """Fastest that the hand gets [m/s] once it leads the slave."""
+    places = rows["master_measured_cp"][5000:, :3]
+    return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
+
+
+def check_ports(rows):
+    """Neither side heard more than the other told, and told no more than came in, in any round."""
+    hand, slave = rows["master_energy"], rows["slave_energy"]
+    for own, other in ((hand, slave), (slave, hand)):
+        assert np.all(own[:, TOLD] <= own[:, IN] + 1e-15)
+        for number in np.unique(own[:, ROUND])[-3:]:
+            mine, theirs = own[own[:, ROUND] == number], other[other[:, ROUND] == number]
+            assert np.all(np.diff(mine[:, [IN, OUT, TOLD, HEARD]], axis=0) >= 0.0)
+            most = theirs[:, TOLD].max(initial=0.0)
+            assert mine[:, HEARD].max() <= most
+
+
+def left_at_the_hand(rows, scale):
+    """Least that the hand's port had left to give in a touch, by forces and places alone [J]."""
+    hand, force = rows["master_energy"], rows["master_servo_cf"][:-1, :3]
+    steps = np.diff(rows["master_measured_cp"][:, :3], axis=0)
+    came = -np.einsum("ij,ij->i", force, steps) + 0.005 * np.linalg.norm(steps, axis=1)
+    same = np.diff(hand[:, ROUND]) == 0.0
+    heard, told = (np.diff(hand[:, k]) * same for k in (HEARD, TOLD))
+    change = scale * (heard - told) + came
+    least = left = 0.0
+    for step, pushes in zip(change.tolist(), force.any(axis=1).tolist(), strict=True):
+        left = left + step if pushes else 0.0
+        least = min(least, left)
+    return least
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["tank", "tdpa"])
+def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(kind):
+    """Delay to 1 s there and back, jitter, loss to a half, 30 N/m to 50 kN/m, any grip."""
+    rng = np.random.default_rng(7)
+    for _ in range(10):
+        texts = drawn(rng, kind)
+        rows = pressing(*texts, ticks=9000)
+        force = np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1)
+        assert force.max() <= 3.3 + 1e-9, texts
+        assert fastest(rows) < 0.2, texts
+        check_ports(rows)
+        if kind == "tank":
+            assert gained(rows) < 3.3 * STEP, texts
+        else:
+            scale = float(next(t for t in texts if "force_gain" in t).partition("=")[2])
+            assert left_at_the_hand(rows, scale) > -3.3 * STEP, texts
+
+
+def steel(kind):
+    """Fastest hand [m/s] that presses steel, of which it hears 50 ms later."""
+    late = ("network.there.least_delay=0.025", "network.back.least_delay=0.025")
+    return fastest(pressing(f"reflection.passivity={kind}", "world.material=steel", *late))
+
+
+def test_steel_throws_a_hand_50_ms_away_and_passivity_keeps_it():
+    assert steel("none") > 0.15
+    assert steel("tdpa") < 0.06
