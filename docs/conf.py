@@ -1,13 +1,17 @@
 """Settings of the site that ``make docs`` builds from these pages."""
 
 import re
+import shutil
 import sys
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from docutils import nodes
 
 import teleop_core
+from teleop_core.cli import main
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
@@ -39,7 +43,7 @@ myst_fence_as_directive = ["mermaid"]
 
 # Tutorials run when their page is built; one that raises or takes too long fails the build.
 nb_execution_mode = "force"
-nb_execution_timeout = 300
+nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 
@@ -142,7 +146,18 @@ def is_output(node: nodes.Node) -> bool:
     return isinstance(node, nodes.container) and node.get("nb_element") == "mime_bundle"
 
 
+def write_report(app: Any, error: Exception | None) -> None:
+    """Run a session and write its report beside the page that shows it."""
+    file, bag = Path(app.outdir) / "report_of_this_build.html", Path(app.doctreedir) / "session"
+    if error is None and not file.exists():
+        shutil.rmtree(bag, ignore_errors=True)
+        with redirect_stdout(StringIO()):
+            main(["sim", "--scenario", "coarse_box", "--duration", "15", "--out", str(bag)])
+            main(["evaluate", str(bag), "--html", str(file)])
+
+
 def setup(app: Any) -> None:
-    """Have Sphinx call ``read`` for each page, and ``mark`` once it is read and its cells ran."""
+    """Have Sphinx call ``read`` for each page, ``mark`` after its cells, ``write_report`` last."""
     app.connect("source-read", read)
     app.connect("doctree-read", mark)
+    app.connect("build-finished", write_report)

@@ -87,7 +87,7 @@ def wide_and_narrow(url: str, folder: Path) -> None:
     """Take the three."""
     with Tab(folder / "wide", 1400, 900) as tab:
         tab.visit(url)
-        tab.shows("follows · box on", 180)
+        tab.shows("follows · fixture on", 180)
         keep(tab, "console.png", AT_A_WALL)
         toggle_dark(tab)
         tab.click("Settings")
