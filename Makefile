@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format docs bench bench-setup endurance fuzz drill-mutants flaky clean
+.PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format docs docs-links bench bench-setup endurance fuzz drill-mutants flaky clean
 
 # Python compiles a module when it is first imported: most of them never are.
 INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check \
@@ -57,6 +57,7 @@ lint: $(VENV)/.tested
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache --no-logo
+	$(BIN)/proselint check --config docs/.proselintrc.json README.md docs
 
 format: $(VENV)/.tested
 	$(BIN)/ruff format .
@@ -111,6 +112,10 @@ $(VENV)/.documented: $(VENV)/.installed
 docs: $(VENV)/.documented
 	$(BIN)/python -m sphinx -W --keep-going -q -d build/doctrees docs build/docs
 	@echo "$(CURDIR)/build/docs/index.html"
+
+# Links to other hosts, which need a network; those inside are checked by the tests and the build.
+docs-links: $(VENV)/.documented
+	$(BIN)/python -m sphinx -q -b linkcheck -D nb_execution_mode=off -d build/links docs build/docs-links
 
 bench-setup: $(VENV)/.tested
 	$(INSTALL) -e 'src/teleop_core[bench]'

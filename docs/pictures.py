@@ -1,15 +1,20 @@
 """Take the console's pictures in the documents anew, in a Chromium of this machine.
 
-python docs/pictures.py            half a minute; look at them before they are committed
+python docs/pictures.py            all of them, some minutes; look at them before they are committed
+python docs/pictures.py --moving   the moving one alone
 """
 
 import base64
+import io
+import json
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from PIL import Image
 
 import teleop_core as tc
 
@@ -24,6 +29,10 @@ SCENARIO = "coarse_box"
 AT_A_WALL = f"{VIEWER}.nodeRefFromName['/arm/master/force'].visible"
 NOTICE = "document.querySelector('.mantine-Notification-closeButton')?.click()"  # of the renderer
 SETTLE = 4.0  # the page fades and slides [s]
+TAKEN = IMAGES / "taken.json"
+FROM, TO, FRAME_TIME = 5.0, 14.0, 0.1  # of the moving picture [s]
+LARGE = {"robot": "puma560", "motion_scaling.coarse_gain": 3.0}
+"""What makes motion of the arm large on the page."""
 
 
 def toggle_dark(tab: Tab) -> None:
@@ -39,9 +48,20 @@ def keep(tab: Tab, name: str, when: str = "true") -> None:
     while time.monotonic() < end:  # headless, what slides moves only while it is pictured
         tab.call("Page.captureScreenshot")
     tab.until(when, 60)
-    shot = tab.call("Page.captureScreenshot")
-    (IMAGES / name).write_bytes(base64.b64decode(shot["data"]))
+    (IMAGES / name).write_bytes(shot(tab))
     assert not tab.faults()
+    told(name)
+
+
+def shot(tab: Tab) -> bytes:
+    """What is seen now, as a PNG."""
+    return base64.b64decode(tab.call("Page.captureScreenshot")["data"])
+
+
+def told(name: str) -> None:
+    """Note the version that a picture shows, for its mark on the site."""
+    versions = json.loads(TAKEN.read_text(encoding="utf-8")) | {name: tc.__version__}
+    TAKEN.write_text(json.dumps(versions, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     print(IMAGES / name)
 
 
@@ -67,7 +87,7 @@ def wide_and_narrow(url: str, folder: Path) -> None:
     """Take the three."""
     with Tab(folder / "wide", 1400, 900) as tab:
         tab.visit(url)
-        tab.shows("follows · box on", 180)
+        tab.shows("follows · fixture on", 180)
         keep(tab, "console.png", AT_A_WALL)
         toggle_dark(tab)
         tab.click("Settings")
@@ -95,7 +115,38 @@ def replay(folder: Path) -> None:
         keep(tab, "console_replay.png")
 
 
+def moving(folder: Path) -> None:
+    """Take a recorded session frame by frame, each at its time of the replay, and join them."""
+    recorded = folder / "session"
+    tc.run(SCENARIO, duration=TO, out=recorded, settings=LARGE)
+    with served(folder, recorded) as console, Tab(folder / "moving", 900, 540) as tab:
+        tab.visit(console.url)
+        tab.shows("Play", 120)
+        tab.value(NOTICE)
+        for _ in range(2):  # nearer
+            turn = {"x": 330, "y": 270, "deltaX": 0, "deltaY": -200}
+            tab.call("Input.dispatchMouseEvent", type="mouseWheel", **turn)
+        count = round((TO - FROM) / FRAME_TIME)
+        frames = [frame(tab, FROM + k * FRAME_TIME) for k in range(count)]
+        assert not tab.faults()
+    options = {"duration": round(1e3 * FRAME_TIME), "loop": 0, "quality": 70, "method": 6}
+    frames[0].save(IMAGES / "console.webp", save_all=True, append_images=frames[1:], **options)
+    told("console.webp")
+
+
+def frame(tab: Tab, moment: float) -> Image.Image:
+    """Picture of a replay at a time of the recording [s]."""
+    tab.fill("time", f"{moment:.1f}")
+    tab.key("Enter")
+    tab.shows(f"{moment:.2f} s of")
+    for _ in range(4):  # headless, the page is drawn only while it is pictured
+        picture = shot(tab)
+    return Image.open(io.BytesIO(picture)).convert("RGB")
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place:
-        live(Path(place))
-        replay(Path(place))
+        moving(Path(place))
+        if "--moving" not in sys.argv:
+            live(Path(place))
+            replay(Path(place))

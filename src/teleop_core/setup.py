@@ -69,6 +69,7 @@ setup(
             "pytest-xdist",
             "hypothesis",
             "import-linter",
+            "proselint",
             "pin",
             "mujoco",
             "roboticstoolbox-python",

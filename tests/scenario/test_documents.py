@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -19,8 +20,14 @@ from teleop_core.session.configuration import parse_setting
 from teleop_core.session.virtual import VirtualTime
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "docs"))
+import blocks  # noqa: E402
+
+STYLE = tomllib.loads((ROOT / "docs" / "words.toml").read_text(encoding="utf-8"))
+TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("bags/*.md")]
 NAMES = [path.relative_to(ROOT).as_posix() for path in sorted(PAGES)]
+HISTORY = {"CHANGELOG.md", "docs/style.md"}  # what was written before, and the words themselves
 PACKAGE_HEADING = "## As an installed package"
 
 
@@ -93,13 +100,54 @@ def test_every_session_of_a_documented_command_can_be_begun():
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "CHANGELOG.md"])
-def test_no_sentence_has_more_than_thirty_five_words(name):
-    text = re.sub(r"```.*?```|<!--.*?-->", "", text_of(name), flags=re.DOTALL)
-    text = re.sub(r"^( {4}|\||#).*$", "\n", text, flags=re.MULTILINE)  # code, tables, headings
-    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)  # what a link shows
-    for paragraph in re.split(r"\n\s*\n|\n(?=- )", text):
+def test_no_sentence_has_more_words_than_the_style_allows(name):
+    for paragraph in re.split(r"\n\s*\n|\n(?=- )", prose(name)):
         for sentence in re.split(r"(?<=[.!?:;])\s+| · ", " ".join(paragraph.split())):
-            assert len(sentence.split()) <= 35, sentence
+            assert len(sentence.split()) <= STYLE["longest_sentence"], sentence
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in HISTORY])
+def test_no_page_has_a_word_that_the_style_avoids(name):
+    text = re.sub(r"`[^`]*`", "", prose(name))
+    for avoided, better in (STYLE["instead"] | STYLE["glossary"]).items():
+        found = re.search(rf"\b(?:{avoided})", text, re.IGNORECASE)
+        assert found is None, f"{found[0]!r}: say {better}"
+
+
+def prose(name: str) -> str:
+    """Sentences of a page: without code, tables and headings, links as they are read."""
+    text = re.sub(r"```.*?```|<!--.*?-->", "", text_of(name), flags=re.DOTALL)
+    text = re.sub(r"^( {4}|\||#).*$", "\n", text, flags=re.MULTILINE)
+    return re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
+
+
+@pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
+def test_every_tutorial_teaches_one_thing_in_ten_minutes_and_opens_with_its_picture(path):
+    text = path.read_text(encoding="utf-8")
+    assert text.count("**You learn:**") == 1
+    assert text.count("```{code-cell} python\n:tags: [picture]\n") == 1
+    words_a_minute = 120  # of somebody who reads the code too
+    assert len(text.split()) <= 10 * words_a_minute
+
+
+def test_every_block_that_says_so_is_run_or_parsed_by_the_tests():
+    for name in NAMES:
+        for language, code in re.findall(r"^```(\w+)\n(.*?)^```", text_of(name), re.DOTALL | re.M):
+            if blocks.mark_of(language, code) == blocks.RUN_BY_TESTS:
+                assert code in snippets(text_of(name), "python")
+    parsed = "teleop sim --scenario coarse_box"
+    assert blocks.mark_of("", parsed) == blocks.CHECKED
+    assert commands(f"\n    {parsed}\n") == [parsed.removeprefix("teleop ")]
+    for code in ("make demo", f"{parsed}\nros2 run teleop_core slave", "pip install teleop_core"):
+        assert blocks.mark_of("", code) == blocks.NOT_RUN
+
+
+def test_every_picture_is_drawn_by_the_build_or_says_which_version_it_shows():
+    kept = {
+        path.name for path in ROOT.glob("docs/**/*") if path.suffix in {".png", ".webp", ".gif"}
+    }
+    assert kept == set(blocks.TAKEN)
+    assert (ROOT / "docs/images/console.webp").stat().st_size < 2e6
 
 
 def test_commands_are_found_in_the_readme():

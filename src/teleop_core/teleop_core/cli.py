@@ -173,7 +173,9 @@ def _add_play(commands: Any) -> None:
     play = command(commands, "play", _play, "publish a recording on live ROS 2 topics")
     play.add_argument("bag", type=Path, help="recording to publish")
     play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
-    play.add_argument("--rate", type=float, default=1.0, help="times real time (default: 1)")
+    play.add_argument(
+        "--rate", type=float, default=1.0, help="speed, as a multiple of real time (default: 1)"
+    )
     play.add_argument(
         "--clock", type=float, nargs="?", const=100.0, default=0.0, metavar="HZ",
         help="publish the recording's time on /clock as well (default: 100 times a second)",
@@ -196,7 +198,7 @@ def _add_lookups(commands: Any) -> None:
     recover.add_argument("bag", type=Path, help="recording that was not closed")
     recover.add_argument("--out", type=Path, help="new recording (default: BAG_recovered)")
     command(commands, "scenarios", _scenarios, "list the scenarios")
-    text = "list the parts that --set and teleop.stages take by name, also your own"
+    text = "list the parts that --set and teleop.stages take by name, your own included"
     command(commands, "parts", _parts, text)
     text = "list every parameter with unit, bounds and meaning"
     parameters = command(commands, "parameters", _parameters, text)
@@ -218,7 +220,9 @@ def _add_lookups(commands: Any) -> None:
     geometry_argument(space)
     space.add_argument("--html", type=Path, metavar="FILE", help="page with the picture")
     space.add_argument("--csv", type=Path, metavar="FILE", help="x, y, z, manipulability")
-    space.add_argument("--samples", type=int, default=20_000, help="joint vectors to draw")
+    space.add_argument(
+        "--samples", type=int, default=20_000, help="number of joint vectors to draw"
+    )
     space.add_argument("--seed", type=int, default=1, help="seed of the draws")
 
 

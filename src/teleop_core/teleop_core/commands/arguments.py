@@ -36,14 +36,19 @@ def out_argument(parser: argparse.ArgumentParser) -> None:
     """Let a command write a recording; interrupted, it keeps what it has recorded."""
     parser.set_defaults(records=True)
     parser.add_argument(
-        "--out", type=Path, required=True, help="directory of the recording; must not exist"
+        "--out", type=Path, required=True, help="directory for the recording; it must not exist yet"
     )
 
 
 def session_arguments(parser: argparse.ArgumentParser) -> None:
     """Let a command configure a session, from a scenario on."""
     parser.add_argument("--scenario", help="one of `teleop scenarios`")
-    parser.add_argument("--duration", type=float, metavar="S", help="seconds, in its place")
+    parser.add_argument(
+        "--duration",
+        type=float,
+        metavar="S",
+        help="time that the hand moves [s] (default: the scenario's)",
+    )
     out_argument(parser)
     setting_arguments(parser)
 
@@ -52,11 +57,11 @@ def setting_arguments(parser: argparse.ArgumentParser) -> None:
     """Let a command take files and values of parameters."""
     parser.add_argument(
         "--config", type=Path, action="append", default=[], metavar="FILE",
-        help="ROS 2 parameter file over the scenario; may be repeated",
+        help="ROS 2 parameter file that overrides the scenario; may be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", dest="settings",
-        help="parameter over all files, e.g. fine_gain=0.2 or slave.command_timeout=0.2",
+        help="set a parameter, over all files, e.g. fine_gain=0.2 or slave.command_timeout=0.2",
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
     text = "compile the kernels of built-in parts now, on all processors"
     parser = command(commands, "compile", _run, text)
     parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--all", action="store_true", help="those that no scenario needs, too")
+    parser.add_argument("--all", action="store_true", help="also those that no scenario needs")
 
 
 def _run(arguments: argparse.Namespace) -> int:

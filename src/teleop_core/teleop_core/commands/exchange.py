@@ -41,7 +41,9 @@ def add(commands: Any) -> None:
 
 
 def _add_import(commands: Any) -> None:
-    parser = command(commands, "import", _import, "make a recording of a file of others")
+    parser = command(
+        commands, "import", _import, "turn a file from another system into a recording"
+    )
     listed = "\n".join(f"  --preset {name:9} {one.text}" for name, one in PRESETS.items())
     parser.description, parser.epilog = _IMPORT, _EXAMPLES % listed
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -52,7 +54,7 @@ def _add_import(commands: Any) -> None:
     )
     parser.add_argument(
         "--arm", nargs=2, action="append", default=[], metavar=("NAME", "OPTIONS"),
-        help="one of several hands of the file, and what is said of it alone",
+        help="one of several hands in the file, with options for it alone",
     )  # fmt: skip
     _options(parser)
 
@@ -78,7 +80,9 @@ def _time(group: Any) -> None:
     group.add_argument(
         "--time", nargs="+", metavar="COL", help="column of the time, or seconds and nanoseconds"
     )
-    group.add_argument("--rate", type=float, metavar="HZ", help="samples per second, without time")
+    group.add_argument(
+        "--rate", type=float, metavar="HZ", help="samples per second, for a file without times"
+    )
     group.add_argument(
         "--time-unit", choices=("auto", *TIMES_NS), help="unit of the time (default: guessed)"
     )
@@ -87,12 +91,14 @@ def _time(group: Any) -> None:
 def _place(group: Any) -> None:
     group.add_argument("--position", nargs="+", metavar="COL", help="columns of x, y, z")
     group.add_argument(
-        "--unit", choices=("auto", *LENGTHS), help="of the position (default: by the names, else m)"
+        "--unit",
+        choices=("auto", *LENGTHS),
+        help="unit of the position (default: by the names, else m)",
     )
     group.add_argument("--quaternion", nargs="+", metavar="COL", help="four columns")
     group.add_argument(
         "--quaternion-order", choices=("auto", "wxyz", "xyzw"),
-        help="of its columns (default: as their names say, else wxyz)",
+        help="order of these columns (default: as their names say, else wxyz)",
     )  # fmt: skip
     group.add_argument("--matrix", nargs="+", metavar="COL", help="nine columns of a rotation")
     group.add_argument(
@@ -107,7 +113,7 @@ def _place(group: Any) -> None:
         "--forward", nargs="+", metavar="COL", help="three columns: direction of the tool's z axis"
     )
     group.add_argument(
-        "--angles", choices=("auto", "rad", "deg"), help="of --euler and --rotation-vector"
+        "--angles", choices=("auto", "rad", "deg"), help="unit of --euler and --rotation-vector"
     )
     group.add_argument(
         "--orientation", choices=("auto", "none"), help="none: constant, nothing is guessed"
@@ -118,7 +124,10 @@ def _buttons(group: Any) -> None:
     for button in BUTTONS:
         group.add_argument(f"--{button}", metavar="COL", help=f"column of the {button} button")
     group.add_argument(
-        "--threshold", type=float, metavar="X", help="pressed above it (default: 0.5)"
+        "--threshold",
+        type=float,
+        metavar="X",
+        help="a button is pressed above this value (default: 0.5)",
     )
     group.add_argument("--buttons-topic", metavar="TOPIC", help="topic of Joy messages in a bag")
     group.add_argument(
@@ -138,7 +147,7 @@ def _changes(group: Any) -> None:
     group.add_argument("--scale", type=float, metavar="X", help="multiplies positions (default: 1)")
     group.add_argument(
         "--center", choices=("keep", "mean", "middle", "start"),
-        help="what comes to zero: mean, middle of the range, start (default: keep)",
+        help="point that becomes the origin: mean, middle of the range, or start (default: keep)",
     )  # fmt: skip
 
 
@@ -148,14 +157,17 @@ def _damage(group: Any) -> None:
         "--missing", choices=("drop", "interpolate"), help="rows with NaN (default: drop)"
     )
     group.add_argument(
-        "--missing-time", type=float, metavar="S", help="interpolate at most so long (default: 0.1)"
+        "--missing-time",
+        type=float,
+        metavar="S",
+        help="longest gap to interpolate [s] (default: 0.1)",
     )
     group.add_argument(
         "--backwards", choices=("auto", "refuse", "drop", "sort"),
         help="rows whose time goes back (default: drop up to 1 %%, refuse more)",
     )  # fmt: skip
     group.add_argument(
-        "--gap", type=float, metavar="N", help="tell gaps longer than N periods (default: 5)"
+        "--gap", type=float, metavar="N", help="report gaps longer than N periods (default: 5)"
     )
 
 
@@ -179,10 +191,12 @@ def _add_export(commands: Any) -> None:
     parser.add_argument("bags", type=Path, nargs="+", metavar="BAG", help="recordings to export")
     parser.add_argument(
         "--out", type=Path, required=True, metavar="X",
-        help="file or directory to make: .csv, .csv.gz, .parquet, or no end for a data set",
+        help="file or directory to make: .csv, .csv.gz, .parquet, or no ending for a data set",
     )  # fmt: skip
     parser.add_argument(
-        "--format", choices=("csv", "parquet", "lerobot"), help="in place of what --out ends with"
+        "--format",
+        choices=("csv", "parquet", "lerobot"),
+        help="format (default: by the ending of --out)",
     )
     parser.add_argument("--topics", nargs="+", default=(), metavar="TOPIC", help="only these")
     parser.add_argument(

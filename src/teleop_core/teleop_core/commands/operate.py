@@ -31,7 +31,9 @@ def add(commands: Any) -> None:
     """Add the parsers of both commands."""
     stop = command(commands, "stop", _stop, "emergency stop of the arms that run here")
     stop.epilog, stop.formatter_class = _STOP, argparse.RawDescriptionHelpFormatter
-    operate = command(commands, "operate", _operate, "enable, home, pause or reset arms; or see")
+    operate = command(
+        commands, "operate", _operate, "enable, home, pause or reset arms, or show their states"
+    )
     operate.epilog, operate.formatter_class = _OPERATE, argparse.RawDescriptionHelpFormatter
     operate.add_argument("words", nargs="*", metavar="COMMAND", help="see below")
     operate.add_argument("--arm", help="namespace of one arm (default: all)")

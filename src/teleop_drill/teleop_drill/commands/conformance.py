@@ -39,12 +39,12 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--robot", metavar="NAME",
-        help="what it is, one of `teleop robots` or a Denavit-Hartenberg table: its forward "
+        help="what it is, one of `teleop robot` or a Denavit-Hartenberg table: its forward "
         "kinematics are held against measured_cp",
     )  # fmt: skip
     parser.add_argument(
         "--wait", type=float, default=5.0, metavar="S",
-        help="seconds in which the arm must be there (default: 5)",
+        help="longest time to wait for the arm [s] (default: 5)",
     )  # fmt: skip
 
 

@@ -40,7 +40,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table as Markdown")
     parser.add_argument(
         "--drives", metavar="COMMAND", type=shlex.split, default=(),
-        help="command of drives that the slave leads in place of the simulated ones",
+        help="command that starts drives in place of the simulated ones",
     )  # fmt: skip
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="keep the recordings here; must not exist"

@@ -51,7 +51,7 @@ def add(commands: Any) -> None:
         help="whether x, y, z are in the robot's base, or its place is to be found too",
     )  # fmt: skip
     parser.add_argument(
-        "--keep-all", action="store_true", help="keep errors that are not told from zero"
+        "--keep-all", action="store_true", help="keep errors that cannot be told from zero"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument(
@@ -74,7 +74,7 @@ def _add_simulation(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--choose", metavar="optimal|random",
-        help="poses that tell most, or any (default: optimal)",
+        help="poses that tell most, or random ones (default: optimal)",
     )  # fmt: skip
     parser.add_argument(
         "--seed", type=int, metavar="N", help="of poses, errors, noise (default: 1)"

@@ -36,7 +36,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--loss", default="cauchy", metavar="NAME",
-        help="cauchy, huber, soft_l1 or linear: how fast what no model explains is let go",
+        help="cauchy, huber, soft_l1 or linear: how little weight an outlier gets",
     )  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument(

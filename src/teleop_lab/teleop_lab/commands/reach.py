@@ -32,7 +32,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--arm", default="", help="namespace of the arm (default: the first)")
     parser.add_argument(
         "--share", type=float, default=99.0, metavar="PERCENT",
-        help="share of the time that is to be followed (default: 99)",
+        help="share of the time that the slave should follow (default: 99)",
     )  # fmt: skip
     parser.add_argument(
         "--keep-axes", action="store_true", help="leave the map of axes from hand to slave as it is"
