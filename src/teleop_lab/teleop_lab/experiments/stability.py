@@ -52,6 +52,8 @@ def _settings(grip: Grip, delay: float, stiffness: float, way: Way) -> Settings:
         "reflection.architecture": architecture, "reflection.passivity": passivity,
         "hand.mass": grip.mass - _APPARENT_MASS, "hand.stiffness": grip.stiffness,
         "hand.damping": grip.damping,
+        # An arm that is pressed into steel goes on: one that its fault stops would look calm.
+        "operation.reported": ("effort",),
         "delays": tuple(late), "stages": ports,
     }  # fmt: skip
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from teleop_core.chain.architectures import MEMORY, Architecture
-from teleop_core.chain.mapping.following import is_felt, is_seen
+from teleop_core.chain.mapping.following import FollowingNumbers, FollowingState, is_felt, is_seen
 from teleop_core.chain.passivity import MEMORY as PASSIVE_MEMORY
 from teleop_core.chain.passivity import Passivity
 from teleop_core.chain.passivity.port import (
@@ -19,13 +19,14 @@ from teleop_core.chain.passivity.port import (
     hear_energy,
     port_work,
 )
+from teleop_core.graph.row import Row
 from teleop_core.graph.topics import ENERGY
 from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Integers, Vector3
+from teleop_core.kernels.fields import Integers, PoseRow, Vector3
 from teleop_core.kernels.geometry import Array
 
 
-class ReflectionNumbers(Fields):
+class ReflectionNumbers(FollowingNumbers):
     """Fields of a parameter record with what comes back."""
 
     is_reflected: int
@@ -37,7 +38,7 @@ class ReflectionNumbers(Fields):
     sign: Vector3
 
 
-class ReflectionState(Fields):
+class ReflectionState(FollowingState):
     """Fields of a state record with what the hand feels."""
 
     heard: float  # share of the force that counts
@@ -45,6 +46,8 @@ class ReflectionState(Fields):
     push: Vector3  # the last one [N]
     pushed_at: Vector3  # where it began [m]
     scale: float  # the hand's energy over the slave's
+    command: PoseRow  # where the hand leads the slave
+    is_fine: int
 
 
 # Time [s] over which what comes from afar sets in, or fades where nothing comes any more.
@@ -90,14 +93,20 @@ def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Arr
 
 @inner
 def reflect(
-    p: Any, s: Any, law: Any, is_following: bool, period: float, stylus: Array, row: Any
+    p: ReflectionNumbers,
+    s: ReflectionState,
+    law: Law,
+    is_following: bool,
+    period: float,
+    stylus: Array,
+    row: Row,
 ) -> None:
     """Add to the hand's force (3,) [N] what it feels of the slave; what falls silent fades.
 
     Args:
-        p: Record with :class:`ReflectionNumbers`.
-        s: Record with :class:`ReflectionState`; written.
-        law: :class:`Law`; written.
+        p: Parameters.
+        s: State; written.
+        law: What comes back, and how; written.
         is_following: Whether the slave is led by the hand; where it goes its own way is not felt.
         period: Since the sample before [s].
         stylus: Where the tip of the stylus is (3,) [m].
@@ -137,7 +146,14 @@ def _bound(push: Array, most: float, rounding: float) -> None:
 
 
 @inner
-def _count(p: Any, s: Any, law: Any, is_following: bool, stylus: Array, row: Any) -> None:
+def _count(
+    p: ReflectionNumbers,
+    s: ReflectionState,
+    law: Law,
+    is_following: bool,
+    stylus: Array,
+    row: Row,
+) -> None:
     """Count what the last push did on the way of the hand; what begins anew has no energy.
 
     Energies begin anew with another law or scale, and while the hand does not lead the slave.
@@ -157,7 +173,9 @@ def _count(p: Any, s: Any, law: Any, is_following: bool, stylus: Array, row: Any
 
 
 @inner
-def _make_passive(p: Any, s: Any, law: Any, period: float, row: Any) -> None:
+def _make_passive(
+    p: ReflectionNumbers, s: ReflectionState, law: Law, period: float, row: Row
+) -> None:
     """Make of the push that is asked for the one that is given, and tell the energies."""
     for i in range(3):
         law.last[i], s.push[i] = s.push[i], law.asked[i]

@@ -11,19 +11,31 @@ Source:
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 from teleop_core.base.parameters import parameter
+from teleop_core.chain.network.link import LinkState
 from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Field
+from teleop_core.kernels.fields import Fields, Vector3
 from teleop_core.kernels.geometry import Array
 
-DEADBAND_PARAMETERS: list[Field] = [
-    ("has_deadband", "i8"), ("place", "f8"), ("chord", "f8"),
-    ("force_share", "f8"), ("least_force", "f8"), ("longest_ticks", "i8"),
-]  # fmt: skip
-DEADBAND_STATE: list[Field] = [("told_pose", "f8", (2, 7)), ("told_force", "f8", (3,))]
-"""Poses that the last packet of each direction told, and the force of the last one back."""
+
+class DeadbandNumbers(Fields):
+    """Fields of a parameter record with the deadband."""
+
+    has_deadband: int
+    place: float  # [m]
+    chord: float  # between quaternions
+    force_share: float
+    least_force: float  # [N]
+    longest_ticks: int
+
+
+class DeadbandState(LinkState):
+    """Fields of a state record with what the last packets told."""
+
+    told_pose: Annotated[Array, 2, 7]  # of each direction
+    told_force: Vector3  # of the last one back [N]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +65,8 @@ class DeadbandParameters:
     )  # fmt: skip
 
 
-def take_deadband(p: Any, parameters: DeadbandParameters, dt: float) -> None:
-    """Write the fields of :data:`DEADBAND_PARAMETERS` of a record.
+def take_deadband(p: DeadbandNumbers, parameters: DeadbandParameters, dt: float) -> None:
+    """Write the fields of the deadband in a parameter record.
 
     Args:
         p: Record; written.
@@ -69,12 +81,14 @@ def take_deadband(p: Any, parameters: DeadbandParameters, dt: float) -> None:
 
 
 @inner
-def is_worth_telling(p: Any, s: Any, k: int, pose: Array, force: Array) -> bool:
+def is_worth_telling(
+    p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, force: Array
+) -> bool:
     """Whether a packet of direction ``k`` shall go with this pose (7,) and force (3,) or (0,).
 
     Args:
-        p: Record with :data:`DEADBAND_PARAMETERS`.
-        s: Record with :data:`DEADBAND_STATE`, and ``tick``, ``sent`` and ``sent_tick`` of the link.
+        p: Parameters.
+        s: State.
         k: Direction.
         pose: Quaternion w, x, y, z behind the place [m].
         force: [N].
@@ -85,7 +99,7 @@ def is_worth_telling(p: Any, s: Any, k: int, pose: Array, force: Array) -> bool:
 
 
 @inner
-def remember_told(s: Any, k: int, pose: Array, force: Array) -> None:
+def remember_told(s: DeadbandState, k: int, pose: Array, force: Array) -> None:
     """Keep what the packet says that is sent."""
     for i in range(7):
         s.told_pose[k, i] = pose[i]
@@ -94,7 +108,7 @@ def remember_told(s: Any, k: int, pose: Array, force: Array) -> None:
 
 
 @inner
-def _has_moved(p: Any, told: Array, pose: Array) -> bool:
+def _has_moved(p: DeadbandNumbers, told: Array, pose: Array) -> bool:
     """Whether a pose (7,) is beyond the deadband around the one that was told."""
     way = turn = other = 0.0
     for i in range(3):
@@ -109,7 +123,7 @@ def _has_moved(p: Any, told: Array, pose: Array) -> bool:
 
 
 @inner
-def _has_changed(p: Any, told: Array, force: Array) -> bool:
+def _has_changed(p: DeadbandNumbers, told: Array, force: Array) -> bool:
     """Whether a force (3,) is beyond the deadband around the one that was told."""
     change = before = 0.0
     for i in range(force.shape[0]):

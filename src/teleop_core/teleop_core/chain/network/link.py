@@ -4,31 +4,43 @@ Every packet is due at a tick, found when it is sent. What is due at the same ti
 a calendar of ticks, where the newest packet stays; so a tick costs the same with any delay.
 """
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from teleop_core.chain.network import CHANCES, MEMORY
 from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Field
+from teleop_core.kernels.fields import Fields, Integers
 from teleop_core.kernels.geometry import Array
 
 LONGEST = 16384
 """Ticks that a packet may be on the way; one that would take longer is lost."""
 BLOCK = 1000
 """Ticks for which random numbers are drawn at once."""
-LINK_PARAMETERS: list[Field] = [
-    (name, kind, (2,)) for name, kind in
-    (("least_delay", "f8"), ("loss", "f8"), ("keeps_order", "i8"), ("every", "i8"))
-]  # fmt: skip
-LINK_STATE: list[Field] = [
-    ("tick", "i8"), ("next", "i8"), ("behind", "i8"),
-    *((name, "i8", (2,)) for name in
-      ("sent", "lost", "newest", "last_due", "sent_tick", "arrived")),
-]  # fmt: skip
-"""Ticks, random numbers used, ticks by which the present one comes late; of each direction packets
-sent and lost, the newest that arrived, when the last one is due and was sent, and whether one just
-came."""
+_BothWays = Annotated[Integers, 2]
+
+
+class LinkNumbers(Fields):
+    """Fields of a parameter record with both directions."""
+
+    least_delay: Annotated[Array, 2]  # [s]
+    loss: Annotated[Array, 2]
+    keeps_order: _BothWays
+    every: _BothWays  # least ticks from packet to packet
+
+
+class LinkState(Fields):
+    """Fields of a state record with both directions."""
+
+    tick: int
+    next: int  # random numbers used
+    behind: int  # ticks by which the present one comes late
+    sent: _BothWays
+    lost: _BothWays
+    newest: _BothWays  # that arrived
+    last_due: _BothWays  # tick
+    sent_tick: _BothWays
+    arrived: _BothWays  # whether one just came
 
 
 class Way(NamedTuple):
@@ -69,13 +81,13 @@ def make_way(width: int, topics: int, draw: Any, numbers: Array) -> Way:
 
 
 @inner
-def may_send(p: Any, s: Any, k: int) -> bool:
+def may_send(p: LinkNumbers, s: LinkState, k: int) -> bool:
     """Whether the rate of packets of direction ``k`` allows one more in this tick."""
     return bool(s.sent[k] == 0 or s.tick - s.sent_tick[k] >= p.every[k])
 
 
 @inner
-def _due(p: Any, s: Any, way: Any, k: int, dt: float) -> int:
+def _due(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> int:
     """Tick at which the packet arrives that is sent now; 0 if it is lost."""
     chances = way.chances[s.next]
     drawn = way.draw(way.numbers, way.memory, chances[:CHANCES], s.tick * dt)
@@ -91,13 +103,13 @@ def _due(p: Any, s: Any, way: Any, k: int, dt: float) -> int:
 
 
 @inner
-def send_packet(p: Any, s: Any, way: Any, k: int, dt: float) -> None:
+def send_packet(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> None:
     """Send ``way.packet``; the motion in ``way.moved[0]`` goes with it.
 
     Args:
-        p: Record with :data:`LINK_PARAMETERS`.
-        s: Record with :data:`LINK_STATE`; written.
-        way: :class:`Way`; written.
+        p: Parameters.
+        s: State; written.
+        way: Written.
         k: Which direction it is.
         dt: Tick [s].
     """
@@ -122,7 +134,7 @@ def send_packet(p: Any, s: Any, way: Any, k: int, dt: float) -> None:
 
 
 @inner
-def take_packet(s: Any, way: Any, k: int) -> None:
+def take_packet(s: LinkState, way: Way, k: int) -> None:
     """Take what is due now: ``way.came`` is the newest packet, ``s.arrived`` whether it is new.
 
     ``way.moved[1]`` gets the motion of all that is due, overtaken or not.

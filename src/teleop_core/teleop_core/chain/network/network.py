@@ -5,22 +5,20 @@ arrived, under its own stamp, so that its age is known.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
 from teleop_core.chain.network import CHANCES, NETWORKS
 from teleop_core.chain.network.deadband import (
-    DEADBAND_PARAMETERS,
-    DEADBAND_STATE,
+    DeadbandNumbers,
+    DeadbandState,
     is_worth_telling,
     remember_told,
     take_deadband,
 )
 from teleop_core.chain.network.link import (
     BLOCK,
-    LINK_PARAMETERS,
-    LINK_STATE,
+    LinkNumbers,
     Way,
     make_way,
     may_send,
@@ -28,6 +26,7 @@ from teleop_core.chain.network.link import (
     take_packet,
 )
 from teleop_core.chain.network.parameters import NetworkParameters, WayParameters
+from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
@@ -49,12 +48,11 @@ from teleop_core.graph.topics import (
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
 )
-from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import Vector3, record
 from teleop_core.kernels.geometry import Array
 
 THERE, BACK = 0, 1
-_PARAMETERS = [*LINK_PARAMETERS, *DEADBAND_PARAMETERS, ("is_incremental", "i8")]
-_STATE = [*LINK_STATE, *DEADBAND_STATE, ("sent_ns", "i8"), ("base", "f8", (3,))]
 _TOLD = 20
 """Ticks from one report to the next."""
 _FOLLOWS_NS = 100_000_000
@@ -64,6 +62,19 @@ _ENERGY = _REACH + len(SLAVE_REACH.columns)
 """Places in a packet from the slave: setpoint, measured pose, force, reach, energies."""
 _ENERGY_THERE = 7  # place of the energies in a packet to the slave, behind the command
 _WIDTHS = (_ENERGY_THERE + len(ENERGY), _ENERGY + len(ENERGY))
+
+
+class NetworkNumbers(LinkNumbers, DeadbandNumbers):
+    """Parameter record of the network."""
+
+    is_incremental: int
+
+
+class NetworkState(DeadbandState):
+    """State record of the network."""
+
+    sent_ns: int
+    base: Vector3  # from where increments count [m]
 
 
 @inner
@@ -79,7 +90,7 @@ def _unpack(packet: Array, at: int, row_values: Array) -> None:
 
 
 @inner
-def _send_there(p: Any, s: Any, there: Any, row: Any, dt: float) -> None:
+def _send_there(p: NetworkNumbers, s: NetworkState, there: Way, row: Row, dt: float) -> None:
     """Send the command if it is a new one, and its sender has heard where the slave is."""
     is_new = row.slave_servo_cp_ns not in (0, s.sent_ns)
     if not (is_new and s.newest[BACK] > 0 and may_send(p, s, THERE)):
@@ -99,7 +110,7 @@ def _send_there(p: Any, s: Any, there: Any, row: Any, dt: float) -> None:
 
 
 @inner
-def _send_back(p: Any, s: Any, back: Any, row: Any, dt: float) -> None:
+def _send_back(p: NetworkNumbers, s: NetworkState, back: Way, row: Row, dt: float) -> None:
     """Send what the slave says of itself, once it has said anything."""
     if row.slave_setpoint_cp_ns == 0 or not may_send(p, s, BACK):
         return
@@ -119,7 +130,7 @@ def _send_back(p: Any, s: Any, back: Any, row: Any, dt: float) -> None:
 
 
 @inner
-def _take_there(p: Any, s: Any, there: Any, row: Any) -> None:
+def _take_there(p: NetworkNumbers, s: NetworkState, there: Way, row: Row) -> None:
     """Take the command that arrived; increments count from where the slave is led, or was last."""
     take_packet(s, there, THERE)
     if s.arrived[THERE]:
@@ -138,7 +149,7 @@ def _take_there(p: Any, s: Any, there: Any, row: Any) -> None:
 
 
 @inner
-def _take_back(s: Any, back: Any, row: Any) -> None:
+def _take_back(s: NetworkState, back: Way, row: Row) -> None:
     """Take what arrived from the slave."""
     take_packet(s, back, BACK)
     if s.arrived[BACK] == 0:
@@ -154,7 +165,9 @@ def _take_back(s: Any, back: Any, row: Any) -> None:
 
 
 @kernel
-def network_step(p: Any, s: Any, there: Any, back: Any, row: Any, dt: float) -> None:
+def network_step(
+    p: NetworkNumbers, s: NetworkState, there: Way, back: Way, row: Row, dt: float
+) -> None:
     """One tick: send what is new on either side, and write what arrives at the other.
 
     Args:
@@ -187,7 +200,7 @@ class NetworkLink(RunningStage):
 
     def __init__(self, parameters: NetworkParameters, dt: float = DT) -> None:
         super().__init__(NETWORK, 0, dt)
-        self.parameters, self.state = records(_PARAMETERS)[0], records(_STATE)[0]
+        self.parameters, self.state = record(NetworkNumbers), record(NetworkState)
         self.kernel, self._seed, self.ahead = network_step, parameters.seed, BLOCK
         self._ways = [
             self._made(width, topics, given)

@@ -21,6 +21,7 @@ from teleop_core.chain.passivity.port import (
     hear_energy,
     port_work,
 )
+from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign, copy
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
@@ -32,6 +33,7 @@ from teleop_core.graph.topics import (
     SLAVE_SERVO_CP,
 )
 from teleop_core.kernels import inner, kernel, records
+from teleop_core.kernels.fields import Fields, PoseRow, Wrench, record
 from teleop_core.kernels.geometry import Array, turn_between
 
 
@@ -80,14 +82,20 @@ class Laws(NamedTuple):
     last: Array  # the command that was given last (7,)
 
 
-_STATE = [
-    ("tip", "f8", (7,)), ("tip_ns", "i8"), ("force", "f8", (6,)), ("felt", "f8", (6,)),
-    ("before", "f8", (6,)), ("command_ns", "i8"), ("has_last", "i8"),
-]  # fmt: skip
+class PortState(Fields):
+    """State record of the slave's port."""
+
+    tip: PoseRow
+    tip_ns: int
+    force: Wrench
+    felt: Wrench  # mean over the way of the tip
+    before: Wrench
+    command_ns: int
+    has_last: int
 
 
 @inner
-def _observe(s: Any, laws: Any, row: Any, port: Array) -> None:
+def _observe(s: PortState, laws: Laws, row: Row, port: Array) -> None:
     """Count what went through the tip since it was measured last.
 
     The force is that of the time when the tip was measured: the mean of both ends of its way, so
@@ -112,7 +120,7 @@ def _observe(s: Any, laws: Any, row: Any, port: Array) -> None:
 
 
 @inner
-def _begin(s: Any, laws: Any, heard: Array, port: Array) -> None:
+def _begin(s: PortState, laws: Laws, heard: Array, port: Array) -> None:
     """Begin the round that the hand tells of, without any drift."""
     begin_round(port, heard[LAW], heard[ROUND])
     for i in range(laws.memory.shape[0]):
@@ -123,7 +131,7 @@ def _begin(s: Any, laws: Any, heard: Array, port: Array) -> None:
 
 
 @kernel
-def passivity_step(p: Any, s: Any, laws: Any, row: Any, dt: float) -> None:
+def passivity_step(p: Fields, s: PortState, laws: Laws, row: Row, dt: float) -> None:
     """One tick: count the energy at the tip, and answer a command that has come.
 
     Args:
@@ -162,7 +170,7 @@ class SlaveSide(RunningStage):
 
     def __init__(self, parameters: PassivityParameters, dt: float = DT) -> None:
         super().__init__(PASSIVITY, 0, dt)
-        self.parameters, self.state = records([("none", "i8")])[0], records(_STATE)[0]
+        self.parameters, self.state = records([("none", "i8")])[0], record(PortState)
         self.kernel = passivity_step
         slaves = tuple(PASSIVITIES.find(name).slave_pointer for name in PASSIVITIES)
         self._laws = Laws(
