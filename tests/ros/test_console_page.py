@@ -1,5 +1,7 @@
 """Console's page: in a real browser a person drives a live session, and its recordings prove it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from teleop_core.slave.operation import State
 
 pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow, pytest.mark.alone]
 
+ROOT = Path(__file__).parents[2]
 TIP = "/arm/robot/tip"
 GRIP, ARROW = "/arm/master/grip", 0.07  # the stylus' gizmo, and the heads of its arrows [m]
 DRIVER = "/browser [0-9]+ drives/.exec(document.body.innerText)?.[0]"
@@ -30,7 +33,8 @@ SHARE, STILL = 0.15, 2e-4  # m
 @pytest.fixture(scope="module")
 def console(tmp_path_factory):
     folder = tmp_path_factory.mktemp("console")
-    started = ConsoleProcess(folder, "--out", folder / "session", "--set", PATIENT)
+    own = ("--parts", ROOT / "examples" / "own_control.py")
+    started = ConsoleProcess(folder, *own, "--out", folder / "session", "--set", PATIENT)
     try:
         yield started
     finally:
@@ -105,6 +109,12 @@ def way(stream):
 def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(page, console):
     assert not page.faults()
     assert page.hosts() == {console.url.split("/")[2]}
+
+
+def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page):
+    for told in ("at most 20 mm/s", "at most what its joints make"):
+        page.click("Gentle")
+        page.shows(told)
 
 
 @pytest.mark.parametrize(("axis", "by"), [(0, "mouse"), (1, "mouse"), (1, "finger")])

@@ -53,6 +53,7 @@ from .chain.operators import (
 )
 from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
 from .base.parameters import NoParameters as NoParameters, parameter as parameter
+from .console.controls import Control as Control, register_control as register_control
 from .slave.bridges import (
     Bridge as Bridge,
     Command as Command,

@@ -301,6 +301,7 @@ def _parts(_: argparse.Namespace) -> int:
     from teleop_core.chain.network import NETWORKS
     from teleop_core.chain.operators import OPERATORS
     from teleop_core.chain.passivity import PASSIVITIES
+    from teleop_core.console.controls import CONTROLS
     from teleop_core.evaluation import METRICS
     from teleop_core.graph.stage import STAGES
     from teleop_core.robots import ROBOTS
@@ -311,7 +312,7 @@ def _parts(_: argparse.Namespace) -> int:
 
     parts = (
         OPERATORS, FIXTURES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, ARCHITECTURES, NETWORKS,
-        PASSIVITIES, TREMOR_FILTERS, BRIDGES, STAGES, METRICS,
+        PASSIVITIES, TREMOR_FILTERS, BRIDGES, STAGES, METRICS, CONTROLS,
     )  # fmt: skip
     for registry in parts:
         print(f"{registry.kinds:16}{', '.join(registry)}")

@@ -14,24 +14,18 @@ import numpy as np
 import viser
 
 from teleop_core.base.errors import TeleopError
+from teleop_core.console.controls import CONTROLS, Control
 from teleop_core.console.drivers import Drivers
 from teleop_core.console.history import SPAN, History, LiveScores
 from teleop_core.console.hooks import Server
 from teleop_core.console.link import Link, Parameters, View
 from teleop_core.console.plots import Plots
 from teleop_core.console.settings import Renew, SettingsPanel
-from teleop_core.console.status import alive, fixture_text, mode_text, next_button, status_html
+from teleop_core.console.status import alive, next_button, status_html
 from teleop_core.console.tails import is_jump
 
 _PERIOD = 0.2  # between two drawings of the texts [s]
 _RECALLED = 300  # points of a plot
-_PATIENCE = 3.0  # for an arm that must be at rest first [s]
-_ACTIONS = (
-    ("Initialize", "release, reset, enable and home", ("reset", "enable", "home")),
-    ("Start", "follow the stylus", ("enable",)),
-    ("Pause", "hold still until Start", ("pause",)),
-    ("Home", "move smoothly to the home posture", ("home",)),
-)
 
 
 class Panel:
@@ -61,6 +55,7 @@ class Panel:
         self._plots: list[Plots] = []
         self._gui.main_panel.dock_right()  # beside the scene, not over it
         self._buttons: dict[str, viser.GuiButtonHandle] = {}
+        self._controls: list[Control] = []
         self._status = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
         if link.is_live:
@@ -76,24 +71,24 @@ class Panel:
 
     # -- parts -----------------------------------------------------------------------------------
 
-    def _release(self, client: int) -> None:
-        self._link.press(is_pressed=False)
-
     def _add_drive(self) -> None:
         take = self._button("Take control", "one browser drives, the others watch", self._take)
         self._make_public(take)
-        for label, hint, words in _ACTIONS:
-            self._button(label, hint, partial(self._command, words))
-        self._button("Release", "lets the emergency stop go; then Initialize", self._release)
+        self._add_controls("")
         with self._gui.add_folder("stylus"):
-            for name in ("mode", "fixture"):
-                self._button(name, f"the {name} button of the stylus", partial(self._press, name))
+            self._add_controls("stylus")
             self.stylus_folder = self._gui.add_folder("small steps", expand_by_default=False)
         with self._gui.add_folder("recording"):
             self._name = self._gui.add_text("name", "run_1", hint="letters, digits, . _ -")
             self._button("Save as", "closes the recording under this name", self._save)
             self._saved = self._gui.add_markdown("")
         self._told = self._gui.add_markdown("")
+
+    def _add_controls(self, folder: str) -> None:
+        for control in map(CONTROLS.find, CONTROLS):
+            if control.folder == folder:
+                self._controls.append(control)
+                self._button(control.name, control.hint, partial(self._act, control))
 
     def _button(
         self, label: str, hint: str, action: Callable[[int], None]
@@ -142,31 +137,19 @@ class Panel:
     def _guard(self, client: int | None) -> bool:
         return client is not None and self._may_drive(client)
 
-    def _command(self, words: tuple[str, ...], client: int) -> None:
-        """Send commands to every arm; what is refused is told."""
-        if words[0] == "reset":
-            self._link.press(is_pressed=False)
-        told = []
+    def _act(self, control: Control, client: int) -> None:
+        """Do it for every arm; what is refused, or goes wrong, is told."""
+        told: list[str] = []
         for arm in self._link.arms:
-            for word in words:
-                is_taken, text = self._insist(word, arm.name)
-                told.append(f"- {'✓' if is_taken else '⚠'} {text}")
-                if not is_taken and len(words) == 1:
-                    self._tell(client, text)
+            try:
+                answers = control.act(self._link, arm.name)
+            except Exception as error:  # of anybody's control: the page goes on
+                reason = " ".join(str(error).split())
+                answers = [(False, f"{control.name}: {type(error).__name__}: {reason}")]
+            told += [f"- {'✓' if is_taken else '⚠'} {text}" for is_taken, text in answers]
+            if answers and not answers[-1][0]:
+                self._tell(client, answers[-1][1])
         self._told.content = "\n".join(told)
-
-    def _insist(self, word: str, arm: str) -> tuple[bool, str]:
-        """Send a command; an arm that is coming to rest is asked again for a while."""
-        until = time.monotonic() + _PATIENCE
-        while True:
-            is_taken, text = self._link.command(word, arm)
-            if is_taken or "rest" not in text or time.monotonic() > until:
-                return is_taken, text
-            time.sleep(_PERIOD)
-
-    def _press(self, name: str, client: int) -> None:
-        for arm in self._link.arms:
-            self._link.press_button(arm.name, name)
 
     def _save(self, client: int) -> None:
         try:
@@ -236,13 +219,14 @@ class Panel:
     def _draw_buttons(self, view: View) -> None:
         """Show on the buttons what is so, which of them can do something, and which comes next."""
         arm, soon, now = next(iter(view.arms.values())), next_button(view), alive(view)
-        labels = {"mode": f"Mode: {mode_text(arm)}", "fixture": f"Fixture: {fixture_text(arm)}"}
+        labels = {c.name: f"{c.name.capitalize()}: {c.text(arm)}" for c in self._controls if c.text}
+        own = {c.name: c.is_alive(view) for c in self._controls if c.is_alive is not None}
         for name, button in self._buttons.items():
-            label, is_dead = labels.get(name, button.label), not now.get(name, True)
+            label, is_dead = labels.get(name, button.label), not own.get(name, True)
             color: Literal["blue", "gray"] = "blue" if name == soon else "gray"
             if (button.label, button.color) != (label, color):
                 button.label, button.color = label, color
-            if name in now and button.disabled != is_dead:
+            if name in own and button.disabled != is_dead:
                 button.disabled = is_dead
         self.stylus_folder.visible = now["steps"]
 

@@ -16,9 +16,6 @@ _PRESSED = (
 _RELEASED = "Released; the arms stay in FAULT. Next: press Initialize, which resets and homes them."
 _NEWS = 4  # lines
 
-MOVES = ("Start", "Pause", "Home", "mode", "fixture", "steps")
-"""Controls that do nothing while an arm is stopped."""
-
 
 def situation(view: View) -> Situation:
     """What every page shows of a live session, whatever is scrolled or folded."""

@@ -1,0 +1,33 @@
+"""Add a button of your own to the console's page: gentle limits for the arm, and back.
+
+teleop console --parts examples/own_control.py
+"""
+
+import teleop_core as tc
+from teleop_core.console.controls import CONTROLS, Answers
+from teleop_core.console.link import Link
+
+GENTLE, USUAL = 0.02, 0.0
+"""Largest speeds of the tip [m/s]; 0: what its joints make."""
+
+
+def be_gentle(link: Link, arm: str) -> Answers:
+    """Limit the speed of the tip, or go back to the usual limit, while the session runs."""
+    node = f"{arm}/slave" if arm else "slave"
+    known = link.parameters().get((node, "operation.tool_speed"))
+    speed = USUAL if known is not None and known.value == GENTLE else GENTLE
+    refused = link.change(node, "operation.tool_speed", speed)
+    limit = f"{1e3 * speed:g} mm/s" if speed else "what its joints make"
+    return [(not refused, refused or f"{node}: the tip moves by at most {limit}")]
+
+
+tc.register_control(tc.Control("Gentle", "slower limits for the arm; again: the usual", be_gentle))
+
+
+def main() -> None:
+    """Tell which buttons the page has now."""
+    print("buttons:", ", ".join(CONTROLS))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""Controls of the console: what a part must be, and what the built-in ones ask of a session."""
+
+import pytest
+
+import teleop_core as tc
+from teleop_core.base.errors import PartError
+from teleop_core.console.controls import CONTROLS, commands, register_control
+
+
+class Asked:
+    """A session that takes what it is told, after it was asked some times whether it rests."""
+
+    def __init__(self, moving: int = 0) -> None:
+        self.words: list[tuple[str, str]] = []
+        self.pressed: list[bool] = []
+        self.buttons: list[tuple[str, str]] = []
+        self._moving = moving
+
+    def command(self, word, arm=""):
+        self.words.append((word, arm))
+        self._moving -= 1
+        return self._moving < 0, f"{word}: {'done' if self._moving < 0 else 'not at rest yet'}"
+
+    def press(self, *, is_pressed):
+        self.pressed.append(is_pressed)
+
+    def press_button(self, arm, name):
+        self.buttons.append((arm, name))
+
+
+def test_initialize_lets_the_stop_go_and_then_resets_enables_and_homes():
+    session = Asked()
+    answers = CONTROLS.find("Initialize").act(session, "left")
+    assert session.pressed == [False]
+    assert session.words == [("reset", "left"), ("enable", "left"), ("home", "left")]
+    assert [is_taken for is_taken, _ in answers] == [True] * 3
+
+
+def test_an_arm_that_is_coming_to_rest_is_asked_again():
+    session = Asked(moving=2)
+    assert commands("enable")(session, "") == [(True, "enable: done")]
+    assert len(session.words) == 3
+
+
+def test_buttons_of_the_stylus_are_those_of_the_device():
+    session = Asked()
+    for name in ("mode", "fixture"):
+        CONTROLS.find(name).act(session, "")
+    assert session.buttons == [("", "mode"), ("", "fixture")]
+
+
+@pytest.mark.parametrize("part", [len, tc.Control("x", "", None), tc.Control("x", "", len, "", 3)])
+def test_what_is_no_control_is_refused(part):
+    with pytest.raises(PartError) as told:
+        CONTROLS.add("x", part)
+    assert told.value.kind == "control"
+
+
+def test_a_control_of_ones_own_stands_behind_those_that_are_there():
+    mine = register_control(tc.Control("Mine", "does nothing", lambda link, arm: ()))
+    try:
+        assert CONTROLS.names()[-1] == mine.name
+    finally:
+        CONTROLS.remove("Mine")
