@@ -27,7 +27,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.console.recorded import RecordedLink
 from teleop_core.graph.layers import config_folder
 from teleop_core.robots import load_robot
-from teleop_lab.fitting.table import read_rests
+from teleop_lab.fitting.rest_table import read_rests
 
 pytestmark = pytest.mark.slow
 REFUSED = 2

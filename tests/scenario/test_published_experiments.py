@@ -14,8 +14,8 @@ from teleop_core.session.runner import session_ticks, simulate
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.trajectory import shortest_move_time
-from teleop_lab.fitting.table import PUBLISHED as PUBLISHED_RESTS
-from teleop_lab.fitting.table import read_rests
+from teleop_lab.fitting.rest_table import PUBLISHED as PUBLISHED_RESTS
+from teleop_lab.fitting.rest_table import read_rests
 
 ARM = load_robot("rcrt1")
 DEGREE, MM = math.pi / 180.0, 1e-3

@@ -14,12 +14,21 @@ from teleop_core.graph.topics import SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
 from teleop_core.robots import load_robot
 from teleop_core.session import api
 from teleop_core.slave.operation import Fault, State
-from teleop_drill.drill import EXERCISES, SHORT, Cure, Motion, Outcome, chosen, hand, measure
+from teleop_drill.drill import (
+    EXERCISES,
+    SHORT,
+    Cure,
+    Motion,
+    Outcome,
+    chosen,
+    hand,
+    measure,
+)
+from teleop_drill.drill.drill_table import drill_table, markdown, rows, summary
 from teleop_drill.drill.hand import Sample
 from teleop_drill.drill.judging import Measured, Seen, judge
 from teleop_drill.drill.numbers import Numbers, Scheduling
 from teleop_drill.drill.recordings import check_recording, missing
-from teleop_drill.drill.table import drill_table, markdown, rows, summary
 
 MS = 1_000_000
 DT = 1e-3

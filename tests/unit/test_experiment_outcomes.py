@@ -19,8 +19,8 @@ from teleop_lab.experiments import (
     factor,
     percent,
 )
+from teleop_lab.experiments.experiment_table import numbers, summary, text
 from teleop_lab.experiments.page import experiments_page
-from teleop_lab.experiments.table import numbers, summary, text
 
 positive = st.floats(1e-6, 1e6)
 finite = st.floats(-1e9, 1e9)

@@ -16,8 +16,8 @@ from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
 from teleop_core.slave.plants.hardware import faults_of
 from teleop_lab.fitting.fit import FitError, default_free, fit
+from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 from teleop_lab.fitting.rests import rest_positions
-from teleop_lab.fitting.table import PUBLISHED, RestTable, read_rests
 
 pytestmark = pytest.mark.slow
 ARM = load_robot("rcrt1")

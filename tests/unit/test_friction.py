@@ -197,8 +197,8 @@ def test_friction_of_a_joint_that_sticks_does_not_wander():
 def test_an_arm_at_rest_stays_there_however_long_it_is_held():
     from teleop_core.robots import load_robot
     from teleop_core.slave.pair import ArmParameters
+    from teleop_lab.fitting.rest_table import PUBLISHED, read_rests
     from teleop_lab.fitting.rests import Mover
-    from teleop_lab.fitting.table import PUBLISHED, read_rests
 
     arm = load_robot("rcrt1")
     given = {"plant.kind": "hardware", "controller.kind": "source_pid", "seed": 3}

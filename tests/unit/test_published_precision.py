@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from teleop_core.robots import load_robot
-from teleop_lab.fitting.table import PUBLISHED
+from teleop_lab.fitting.rest_table import PUBLISHED
 
 ARM = load_robot("rcrt1")
 # Tables 7.1-7.6 as printed: ten runs to each of six points.

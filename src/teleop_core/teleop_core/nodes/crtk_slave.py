@@ -1,8 +1,9 @@
 """CRTK slave: motion commands and further measurements of a slave, beside its streams.
 
-What moves the arm, and what it may do, decides :class:`~teleop_core.slave.motion.MotionCommands`;
-here messages become its calls. All of it runs in the executor: commands that come once, or at some
-hundred times a second. A thousand a second go to ``slave/servo_jp`` and ``slave/servo_cp``.
+What moves the arm, and what it may do, decides
+:class:`~teleop_core.slave.motion_commands.MotionCommands`. Here messages become its calls, in the
+executor: commands that come once, or some hundred times a second. A thousand a second go to
+``slave/servo_jp`` and ``slave/servo_cp``.
 """
 
 import time
@@ -24,7 +25,7 @@ from teleop_core.nodes.crtk import (
     streamed,
 )
 from teleop_core.nodes.streams import message_type, profile
-from teleop_core.slave.motion import Told
+from teleop_core.slave.motion_commands import Told
 from teleop_core.slave.operation.states import Answer, State
 
 _FRAME = SLAVE_MEASURED_CP.frame_id

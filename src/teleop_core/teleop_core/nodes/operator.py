@@ -13,7 +13,7 @@ from teleop_core.graph.topics import (
     Topic,
 )
 from teleop_core.nodes.device_hand import DeviceHand
-from teleop_core.nodes.hand import HandInput
+from teleop_core.nodes.person_hand import HandInput
 from teleop_core.nodes.ticking import TickingNode
 
 _FULL = 3.3

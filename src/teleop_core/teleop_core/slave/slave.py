@@ -33,7 +33,7 @@ from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import SlaveNumbers, SlaveState
-from teleop_core.slave.motion import MotionCommands
+from teleop_core.slave.motion_commands import MotionCommands
 from teleop_core.slave.operation import (
     Answer,
     Event,

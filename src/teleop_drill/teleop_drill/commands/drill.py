@@ -91,7 +91,7 @@ def _outcomes(exercises: "tuple[Exercise, ...]", arguments: argparse.Namespace) 
 def _write(outcomes: "list[Outcome]", arguments: argparse.Namespace) -> None:
     from teleop_core import __version__
     from teleop_core.evaluation.command import write_whole
-    from teleop_drill.drill.table import markdown
+    from teleop_drill.drill.drill_table import markdown
 
     if arguments.json is not None:
         found = [outcome.to_json() for outcome in outcomes]
@@ -105,7 +105,7 @@ def _write(outcomes: "list[Outcome]", arguments: argparse.Namespace) -> None:
 def _show(outcomes: "list[Outcome]") -> int:
     from rich.console import Console
 
-    from teleop_drill.drill.table import drill_table, summary
+    from teleop_drill.drill.drill_table import drill_table, summary
 
     console = Console()
     wide = console if console.is_terminal else Console(width=170)

@@ -215,6 +215,6 @@ class Outcome:
         }  # fmt: skip
 
     def __str__(self) -> str:
-        from teleop_lab.experiments.table import text
+        from teleop_lab.experiments.experiment_table import text
 
         return text(self)

@@ -13,8 +13,8 @@ from teleop_core.evaluation.packing import deflated
 from teleop_core.evaluation.page import Arrays
 from teleop_core.evaluation.page_template import PAGE, POLICY, TIMES, script, style
 from teleop_core.evaluation.preview import preview
+from teleop_lab.experiments.experiment_table import MARKS, empty, numbers, spread, summary, within
 from teleop_lab.experiments.outcome import Outcome, Row
-from teleop_lab.experiments.table import MARKS, empty, numbers, spread, summary, within
 
 _CLASSES = {True: "met", False: "missed", None: "plain"}
 _STYLE = """

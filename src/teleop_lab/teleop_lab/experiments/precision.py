@@ -15,8 +15,8 @@ from teleop_lab.experiments.conditions import OURS, PREDICTED
 from teleop_lab.experiments.drawing import axis, points, published_points
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, factor, percent
+from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 from teleop_lab.fitting.rests import rest_positions
-from teleop_lab.fitting.table import PUBLISHED, RestTable, read_rests
 
 _RUNS = 10
 # Table 7.7, mm: RMS, S.D., largest, smallest of each point.

@@ -27,7 +27,7 @@ from teleop_lab.experiments.conditions import OURS, PREDICTED
 from teleop_lab.experiments.drawing import axis, level, line
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.outcome import Findings, Row, factor
-from teleop_lab.fitting.table import PUBLISHED, read_rests
+from teleop_lab.fitting.rest_table import PUBLISHED, read_rests
 
 # What the text reads from its plots once the tip rests [mm].
 _AT_REST_MM = (0.091, 0.432, 0.432, 0.128, 0.142, 0.075)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from teleop_lab.fitting.fit import LOSSES, FitError, FitResult, Fitted, default_free, fit
-from teleop_lab.fitting.table import PUBLISHED, RestTable, read_rests
+from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 
 __all__ = [
     "LOSSES",

@@ -21,8 +21,8 @@ from teleop_core.robots.robot import Robot
 from teleop_core.slave.pair import ArmParameters
 from teleop_core.slave.plants.hardware import faults_of
 from teleop_core.slave.slave_sim import SlaveSim
+from teleop_lab.fitting.rest_table import RestTable
 from teleop_lab.fitting.rests import rest_positions
-from teleop_lab.fitting.table import RestTable
 
 _WEAK = 0.1  # singular value over the largest below which a direction is not identifiable
 _STEP = 0.01  # of differences, in units of the start

@@ -14,7 +14,7 @@ from teleop_core.graph.topics import Limit
 from teleop_core.kernels.geometry import Array, rotation_vectors
 from teleop_core.robots.dexterity import sample_workspace
 from teleop_lab.planning.asked import AskedPath
-from teleop_lab.planning.table import LABELS, text
+from teleop_lab.planning.reach_table import LABELS, text
 from teleop_lab.planning.walk import Walked
 
 if TYPE_CHECKING:

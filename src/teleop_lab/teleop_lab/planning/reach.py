@@ -103,7 +103,7 @@ class Reach:
         return self.proposed.placement.parameter_file(self.arm)
 
     def __str__(self) -> str:
-        from teleop_lab.planning.table import text
+        from teleop_lab.planning.reach_table import text
 
         return text(self)
 

@@ -17,7 +17,13 @@ from teleop_core.chain.master.device import (
     read_handle,
     read_phantom,
 )
-from teleop_core.chain.master.hand import HandNumbers, HandParameters, HandState, join, move_hand
+from teleop_core.chain.master.hand_mechanics import (
+    HandNumbers,
+    HandParameters,
+    HandState,
+    join,
+    move_hand,
+)
 from teleop_core.chain.master.rendering import RenderingNumbers, RenderingState, render
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT, rest_pose
 from teleop_core.chain.operators.shapes import PHASES
