@@ -63,6 +63,7 @@ setup(
         "console": ["viser>=1.1,<1.2", "msgspec", "pygame-ce", "hidapi"],
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         "test": [
+            "EAIK",
             "coverage",
             "pytest",
             "pytest-rerunfailures",
@@ -82,7 +83,7 @@ setup(
             "colcon-common-extensions",
             "colcon-ros",
         ],
-        "bench": ["EAIK", "ikpy"],
+        "bench": ["ikpy"],
         "docs": ["sphinx", "furo", "myst-nb", "sphinxcontrib-mermaid", "matplotlib"],
     },
     data_files=[

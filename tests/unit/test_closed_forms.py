@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from eaik.IK_HP import HPRobot
 
 from random_arms import (
     IIWA14,
@@ -207,12 +208,11 @@ def test_the_arm_as_built_has_the_constants_of_its_chain_alone(load):
 
 @pytest.mark.parametrize("kind", ["2 and 3 parallel", "1 and 2 meet", "5 and 6 meet"])
 def test_eaik_knows_as_many_solutions(kind, load):
-    module = pytest.importorskip("eaik.IK_HP")
     rng = np.random.default_rng(12)
     axes = MAKERS[kind](rng, kind)
     arm = load(axes)
     points = [np.zeros(3), *(o for _, o in axes), arm.fk(np.zeros(6))[:3, 3]]
-    peer = module.HPRobot(np.array([w for w, _ in axes]), np.diff(np.array(points), axis=0))
+    peer = HPRobot(np.array([w for w, _ in axes]), np.diff(np.array(points), axis=0))
     zero = arm.fk(np.zeros(6))[:3, :3]
     for q in rng.uniform(arm.lower, arm.upper, (100, 6)):
         wanted = arm.fk(q)
