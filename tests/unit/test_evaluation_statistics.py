@@ -178,6 +178,9 @@ def test_pairs_stay_right_when_messages_of_either_topic_are_lost(offset):
 
 def test_samples_far_apart_have_no_partner():
     assert (same_tick(np.arange(5) * MS, np.arange(5) * MS + 1000 * MS) == NONE).all()
+    seldom = np.arange(9) * 1000 * MS
+    assert (same_tick(seldom, seldom + 51 * MS) == NONE).all()
+    assert (same_tick(seldom, seldom + 50 * MS) == np.arange(9)).all()
     assert (same_tick(np.arange(5) * MS, np.empty(0, np.int64)) == NONE).all()
     assert not len(same_tick(np.empty(0, np.int64), np.arange(5)))
 
