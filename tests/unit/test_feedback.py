@@ -179,3 +179,77 @@ def test_simulated_drives_are_off_while_the_server_lets_brakes_hold_the_arm():
         efforts()
     needed = 0.5 * (0.5 * LIMIT) ** 2 / BRAKING + LIMIT * DT
     assert (np.abs(arm.simulated.arm.q - before) <= needed).all()
+
+
+def faulty(led: Led) -> Fault:
+    return Fault(int(led.slave.operation["fault"]))
+
+
+def others(*names):
+    """Faults that are told only, so that one alone can stop the arm."""
+    watched = ("tracking", "tip", "overspeed", "effort")
+    return tuple(name for name in watched if name not in names)
+
+
+@pytest.mark.parametrize("joint", range(N))
+def test_a_joint_too_far_from_its_setpoint_is_the_fault_tracking(joint):
+    led = following(**{"operation.reported": others("tracking")})
+    bound = float(led.slave.parameters["lag"][joint])
+    for share, fault in ((0.99, Fault.NONE), (-0.99, Fault.NONE), (1.01, Fault.TRACKING)):
+        measured = led.row["slave_setpoint_js"].copy()
+        measured[joint] += share * bound
+        led.tick(measured)
+        assert faulty(led) is fault
+    told = led.slave.operation
+    assert (told["state"], told["fault_joint"]) == (State.FAULT, joint)
+    assert told["fault_value"] == pytest.approx(1.01 * bound)
+    assert told["fault_bound"] == bound
+
+
+def test_a_joint_that_says_no_number_is_the_fault_tracking():
+    led = following(**{"operation.reported": others("tracking")})
+    measured = led.row["slave_setpoint_js"].copy()
+    measured[2] = np.nan
+    led.tick(measured)
+    assert (faulty(led), led.slave.operation["fault_joint"]) == (Fault.TRACKING, 2)
+
+
+@pytest.mark.parametrize("joint", range(N))
+def test_a_joint_faster_than_half_as_much_again_as_rated_is_the_fault_overspeed(joint):
+    led = following(**{"operation.reported": others("overspeed")})
+    for share, fault in ((1.49, Fault.NONE), (-1.49, Fault.NONE), (-1.51, Fault.OVERSPEED)):
+        led.row["slave_measured_js"][N + joint] = share * LIMIT[joint]
+        led.tick()
+        assert faulty(led) is fault
+    assert led.slave.operation["fault_joint"] == joint
+
+
+def test_a_tip_too_far_from_its_setpoint_is_the_fault_tip():
+    led = following(**{"operation.reported": others("tip"), "operation.tip_error": 5e-3})
+    setpoint = led.row["slave_setpoint_js"].copy()
+    for way, fault in ((4.9e-3, Fault.NONE), (5.1e-3, Fault.TIP)):
+        measured = setpoint.copy()
+        measured[2] += way  # the prismatic joint moves the tip by as much
+        led.tick(measured)
+        assert faulty(led) is fault
+    assert led.slave.operation["fault_value"] == pytest.approx(5.1e-3, rel=1e-6)
+
+
+def test_a_command_that_presses_a_joint_into_its_end_is_the_fault_joint_limit_in_time():
+    led = following(**{"operation.pressing_time": 0.2})
+    led.commanded = led.row["slave_setpoint_js"].copy()
+    for _ in range(20_000):
+        room = ARM.upper[1] - led.commanded[1]
+        led.commanded[1] += min(SLOW[1] * DT, room)
+        led.commanded += SLOW * DT  # what `tick` takes away again
+        led.tick(follows=True)
+        if room <= 0.0:
+            break
+    assert faulty(led) is Fault.NONE
+    ticks = 0
+    while faulty(led) is Fault.NONE and ticks < 1000:
+        led.commanded += SLOW * DT
+        led.tick(follows=True)
+        ticks += 1
+    assert faulty(led) is Fault.JOINT_LIMIT
+    assert ticks * DT == pytest.approx(0.2, abs=2.5e-3)
