@@ -27,7 +27,7 @@ class Led:
         self.slave = Slave(build(SlaveParameters, given))
         self.row, self.ns, self.commanded = self.slave.signals, 0, ARM.home.copy()
 
-    def tick(self, measured=None, *, speaks=True, follows=False, effort=0.0):
+    def tick(self, measured=None, *, speaks=True, follows=False, effort=0.0, ahead_ns=0):
         """One tick; the arm says before it where it is, and a command comes if it is to follow."""
         self.ns += TICK_NS
         row = self.row
@@ -38,7 +38,8 @@ class Led:
             row["slave_measured_js_ns"] = self.ns
         if follows:
             self.commanded -= SLOW * DT
-            row["slave_servo_jp"], row["slave_servo_jp_ns"] = self.commanded, self.ns
+            row["slave_servo_jp"] = self.commanded
+            row["slave_servo_jp_ns"] = self.ns + ahead_ns
         row["now_ns"] = self.ns
         self.slave.step()
         return row["slave_setpoint_js"].copy()
@@ -253,3 +254,15 @@ def test_a_command_that_presses_a_joint_into_its_end_is_the_fault_joint_limit_in
         ticks += 1
     assert faulty(led) is Fault.JOINT_LIMIT
     assert ticks * DT == pytest.approx(0.2, abs=2.5e-3)
+
+
+def test_a_command_of_more_than_a_second_ahead_is_refused_and_the_next_one_is_taken():
+    led = following()
+    for ahead_ns, status in (
+        (900_000_000, CommandStatus.FRESH),
+        (1_100_000_000, CommandStatus.REFUSED),
+    ):
+        led.tick(follows=True, ahead_ns=ahead_ns)
+        assert led.status is status
+    led.tick(follows=True, ahead_ns=901_000_000)
+    assert led.status is CommandStatus.FRESH
