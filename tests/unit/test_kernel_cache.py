@@ -360,3 +360,39 @@ def test_what_nobody_used_for_long_is_removed_from_the_store(tmp_path, monkeypat
     assert store.prune() >= 2 * len(old)
     assert not list(place.rglob("factor-*"))
     assert in_store(folder, place)[0] == [70.0, 7.0]
+
+
+LATE = """
+import numpy as np
+from teleop_core.kernels import kernel
+
+@kernel
+def size(values):
+    return values.size
+
+print(size(np.zeros(2)), flush=True)
+"""
+
+
+def test_a_kernel_is_kept_only_while_no_other_process_writes_there(tmp_path):
+    write(tmp_path / "late.py", LATE)
+    env = {**os.environ, "TELEOP_KERNELS": str(tmp_path / "kept")}
+    env.pop("NUMBA_CACHE_DIR", None)
+    command = [sys.executable, "late.py"]
+    first = subprocess.run(command, cwd=tmp_path, env=env, check=True, capture_output=True)
+    (index,) = (tmp_path / "kept").rglob("size-*.nbi")
+    for file in index.parent.glob(f"{index.stem}.*"):
+        file.unlink()
+    with store.locked(index.parent):
+        again = subprocess.Popen(command, cwd=tmp_path, env=env, stdout=subprocess.PIPE)
+        while not waits_for_a_lock(again.pid):
+            assert again.poll() is None, "it did not wait"
+        assert not index.exists()
+    assert again.communicate()[0] == first.stdout
+    assert index.exists()
+
+
+def waits_for_a_lock(pid: int) -> bool:
+    """Whether a process stands in a queue for the lock of a file."""
+    lines = Path("/proc/locks").read_text().splitlines()
+    return any("->" in line and f" {pid} " in line for line in lines)

@@ -231,8 +231,10 @@ class _Cache(FunctionCache):
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled for a signature, if the disk lets us."""
         with suppress(OSError):
-            Path(self._cache_file._index_path).parent.mkdir(parents=True, exist_ok=True)
-            super().save_overload(sig, data)
+            folder = Path(self._cache_file._index_path).parent
+            folder.mkdir(parents=True, exist_ok=True)
+            with store.locked(folder):
+                super().save_overload(sig, data)
 
     def keep(self, function: FunctionType, name: str, stamp: tuple[str, ...]) -> "_Cache":
         """Keep a function in the store, or under a name beside its source where there is none."""

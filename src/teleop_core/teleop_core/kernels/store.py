@@ -8,8 +8,8 @@ asked for them for :data:`KEPT_DAYS`.
 import os
 import sys
 import time
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -17,6 +17,11 @@ from typing import Any
 import numba
 
 from teleop_core.kernels.dependencies import hexdigest
+
+try:
+    import fcntl
+except ImportError:  # elsewhere than on Unix
+    fcntl = None  # type: ignore[assignment]
 
 KEPT_DAYS = 30
 """Days after which :func:`prune` removes what was not used."""
@@ -51,6 +56,18 @@ def place(function: FunctionType, stamp: Iterable[str]) -> Path | None:
     line = function.__code__.co_firstlineno
     key = hexdigest((*stamp, function.__module__ or "", function.__qualname__, str(line)))
     return kept / key[:2] / f"{function.__name__}-{key[2:]}.{_TAG}"
+
+
+@contextmanager
+def locked(kept: Path) -> Iterator[None]:
+    """Let one process at a time write in a folder: each reads the index that it adds to.
+
+    Two that added to one index at once would give two kernels one file.
+    """
+    with (kept / ".lock").open("a") as lock:
+        if fcntl is not None:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # let go when the file is closed
+        yield
 
 
 def prune(days: float = KEPT_DAYS) -> int:
