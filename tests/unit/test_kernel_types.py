@@ -74,7 +74,7 @@ twice(1.0, half)
 
 
 @kernel
-def step(s: Wider, signals: Row, dt: float) -> None:
+def tick(s: Wider, signals: Row, dt: float) -> None:
     hold(s, signals)
     s.speed = dt * signals.now_ns
 """
@@ -84,7 +84,7 @@ WRONG = (
     "state.speed = 1.0",
     "state.count = 'many'",
     "def late(row: Row) -> int: return row.slave_servo_cp_nss",
-    "def wrong(s: State, row: Row) -> None: step(s, row, 1e-3)",
+    "def wrong(s: State, row: Row) -> None: tick(s, row, 1e-3)",
     "spring(row, 2.0, 3)",
     "spring(2.0, 2.0, 3, row)",
     "spring(row, row, 3, row)",
