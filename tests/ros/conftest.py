@@ -77,11 +77,11 @@ class Listener:
         """Take what has come; returns how many there are in all."""
         while (taken := self._subscription.take()) is not None:
             if self._layout is None:
-                self._layout = discover(self.topic.kind, taken[0])
-            number = taken[1]["publication_sequence_number"]
+                self._layout = discover(self.topic.kind, taken.data)
+            number = taken.number
             self.lost += number - self._number - 1 if 0 < self._number < number else 0
             self._number = number
-            stamp_ns, values = self._layout.decode_one(taken[0])
+            stamp_ns, values = self._layout.decode_one(taken.data)
             self.stamps.append(stamp_ns)
             self.values.append(values)
         return len(self.stamps)

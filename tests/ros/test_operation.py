@@ -68,7 +68,7 @@ def operation(peer):
         peer.operation, peer.read = Subscription(peer.node, SLAVE_OPERATION, "slave/operation"), {}
         peer.read_reports = read_reports
     while (taken := peer.operation.take()) is not None:
-        for report in peer.read_reports(taken[0]):
+        for report in peer.read_reports(taken.data):
             peer.read = report.values
     return peer.read or None
 

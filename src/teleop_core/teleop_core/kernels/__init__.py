@@ -230,7 +230,7 @@ class _Memory:
     __slots__ = ("data",)
 
     def __init__(self, record: Any) -> None:
-        self.data = memoryview(np.frombuffer(record, np.uint8))
+        self.data = memoryview(record).cast("B")
 
 
 def bare(value: Any) -> Any:

@@ -30,7 +30,7 @@ from numba.core.imputils import lower_cast
 from numba.core.pythonapi import NativeValue, _unboxers
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
-from numba.experimental import function_type  # registers what is replaced here
+from numba.experimental import function_type
 from numba.extending import overload
 from numba.np import arrayobj
 
@@ -150,7 +150,8 @@ def _unbox_function(kind: Any, value: Any, c: Any) -> NativeValue:
 
 
 # numba's own asks functions written in Python, for each pointer and in each call: 5 µs.
-_unboxers.functions[function_type.FunctionType] = _unbox_function
+assert function_type.unbox_function_type is _unboxers.functions[types.FunctionType]
+_unboxers.functions[types.FunctionType] = _unbox_function
 
 
 class InnerDispatcher(Dispatcher):

@@ -65,11 +65,11 @@ class ArmBridgeNode(TickingNode):
 
     def _listen(self) -> None:
         while (taken := self._arm.take()) is not None:
-            message = deserialize_message(taken[0], self._arm.type)
+            message = deserialize_message(taken.data, self._arm.type)
             stamp = message.header.stamp
             stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
             if self.parameters.stamps == "sent":
-                stamp_ns = taken[1]["source_timestamp"]
+                stamp_ns = taken.sent_ns
             sample = Sample(
                 message.name, message.position, message.velocity, message.effort, stamp_ns
             )

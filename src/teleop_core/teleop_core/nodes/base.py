@@ -31,7 +31,8 @@ from teleop_core.nodes.quality import PREFIX, QualityOverrides, profile
 from teleop_core.nodes.rate import Recent, Schedule, TickCounts
 from teleop_core.nodes.real_time import apply_options
 from teleop_core.nodes.sender import Sender
-from teleop_core.nodes.streams import Input, Unattended, message_type
+from teleop_core.nodes.streams import Input, message_type
+from teleop_core.nodes.taking import Unattended
 from teleop_core.session.runner import report_of
 
 SUCCESS, FAILURE, ERROR = (

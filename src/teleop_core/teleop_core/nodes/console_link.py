@@ -64,7 +64,7 @@ class _Seen:
         """Write the newest sample into a view; whether there was one."""
         newest = None
         while (taken := self._subscription.take()) is not None:
-            newest = taken[0]
+            newest = taken.data
         if newest is None:
             self._find_another()
             return False
@@ -212,12 +212,12 @@ class LiveLink:
     def _hear(self, arm: Arm, view: ArmView) -> None:
         operation, state = self._told[arm.name]
         while (taken := operation.take()) is not None:
-            found = read_numbers(taken[0], OPERATION)
+            found = read_numbers(taken.data, OPERATION)
             if isinstance(found, tuple):
                 view.operation = dict(zip(OPERATION, map(float, found[1]), strict=True))
                 view.operation_text = operation_text(view.operation, arm.robot.joint_names)
         while (taken := state.take()) is not None:
-            found = read_numbers(taken[0], TELEOP_STATE.columns)
+            found = read_numbers(taken.data, TELEOP_STATE.columns)
             if isinstance(found, tuple):
                 view.state = dict(zip(TELEOP_STATE.columns, map(float, found[1]), strict=True))
 
@@ -225,7 +225,7 @@ class LiveLink:
         is_new = False
         while (taken := self._reports.take()) is not None:
             with suppress(ValueError):  # bytes of anybody, that are no report
-                for one in read_reports(taken[0]):
+                for one in read_reports(taken.data):
                     status = Status(one.level, one.message, one.values, time.monotonic())
                     self._statuses[one.name] = status
                     is_new = True

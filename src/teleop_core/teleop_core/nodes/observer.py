@@ -69,7 +69,7 @@ class Observer:
         self._waiter.wait(timeout)
         while (taken := self._reports.take()) is not None:
             try:
-                reports = read_reports(taken[0])
+                reports = read_reports(taken.data)
             except ValueError:  # bytes of anybody, that are no report
                 self.malformed += 1
                 continue

@@ -2,12 +2,10 @@
 
 from typing import Any, Protocol
 
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from teleop_core.nodes.streams import Unattended
 from teleop_core.nodes.taking import Taker
 from teleop_core.slave.operation.presses import Presses
 from teleop_core.slave.operation.states import COMMANDS, Answer
@@ -75,16 +73,7 @@ class StopInput:
     """
 
     def __init__(self, node: Any) -> None:
-        self._node = node
-        self._own = [
-            node.create_subscription(
-                Bool, STOP_TOPIC, _ignore, stop_profile(*kind), raw=True,
-                callback_group=Unattended(),
-                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-            )
-            for kind in _READERS
-        ]  # fmt: skip
-        self._takers = [Taker(own) for own in self._own]
+        self._takers = [Taker(node, Bool, STOP_TOPIC, stop_profile(*kind)) for kind in _READERS]
         self._presses, self._ticks = Presses(), 0
 
     def take(self) -> list[bool]:
@@ -93,13 +82,12 @@ class StopInput:
         self._ticks += 1
         for taker in self._takers if self._ticks % _EVERY == 0 else self._takers[:1]:
             while (taken := taker.take()) is not None:
-                data, sender, number = taken
-                if len(data) < _BYTES:
+                if len(taken.data) < _BYTES:
                     continue
-                is_pressed = data[_BYTES - 1] != 0
+                is_pressed = taken.data[_BYTES - 1] != 0
                 if taker is not self._takers[-1]:
-                    found += self._presses.take(sender, number, is_pressed=is_pressed)
-                elif not self._presses.knows(sender):
+                    found += self._presses.take(taken.sender, taken.number, is_pressed=is_pressed)
+                elif not self._presses.knows(taken.sender):
                     found.append(is_pressed)
         return found
 
@@ -110,13 +98,8 @@ class StopInput:
 
     def close(self) -> None:
         """Stop listening."""
-        for taker, own in zip(self._takers, self._own, strict=True):
-            self._node.destroy_subscription(own)
+        for taker in self._takers:
             taker.close()
-
-
-def _ignore(data: bytes) -> None:
-    """Stand in for the callback that is never called."""
 
 
 class Commanded(Protocol):

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from rclpy.publisher import Publisher
+from rclpy.lifecycle import LifecyclePublisher
 
 from teleop_core.bags.layouts import layout
 from teleop_core.bags.messages import BUTTONS
@@ -49,7 +49,7 @@ class Ports:
         signals: Any,
         joint_names: tuple[str, ...],
         feeds: Feeds,
-        publisher: Callable[[Topic], Publisher],
+        publisher: Callable[[Topic], LifecyclePublisher],
         buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
         self._arm, self._stage, self.row = arm, stage, bare(signals)

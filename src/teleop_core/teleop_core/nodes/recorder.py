@@ -27,7 +27,6 @@ from teleop_core.nodes.markers import LiveMarkers
 from teleop_core.nodes.model import LiveModel, ModelTopics
 from teleop_core.nodes.newest import Arrival, Newest
 from teleop_core.nodes.recorder_services import serve
-from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Subscription
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.model import Model
@@ -39,8 +38,6 @@ HOLD_NS = 100_000_000
 """Longest time for which messages wait before they go to the disk [ns]: what a loss of power or the
 end of the process costs is this time and that of writing one chunk, together below 0.2 s."""
 _PAUSE = 5e-3
-_MOST = 20_000
-"""Messages of one publisher a second at most: more are not taken for losses."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,11 +53,12 @@ class RecorderParameters(RecordingParameters):
 
 
 class _Channel:
-    """One recorded topic: what came and what the middleware lost on the way."""
+    """One recorded topic: how much came, and how much the middleware lost on the way."""
 
     def __init__(self, node: CoreNode, topic: Topic) -> None:
         self.topic, self._node = topic, node
-        self.received, self._sender = 0, Sender(limit=_MOST)
+        self.received = self.lost = 0
+        self._numbers: dict[bytes, int] = {}  # the last one of each publisher
         self._given: deque[Arrival] = deque()
         self._subscription: Subscription | None = None
         self._inside_ns: int | None = None
@@ -85,11 +83,9 @@ class _Channel:
             self.received += 1
         inside_ns = self._inside_ns
         while self._subscription is not None and (taken := self._subscription.take()) is not None:
-            data, about = taken
-            if inside_ns is None or about["source_timestamp"] < inside_ns:
-                self.count(about["publication_sequence_number"], about["source_timestamp"])
-                arrival_ns = about["received_timestamp"]
-                came.append((arrival_ns, self.topic, data, about["source_timestamp"]))
+            if inside_ns is None or taken.sent_ns < inside_ns:
+                self.count(taken.sender, taken.number)
+                came.append((taken.came_ns, self.topic, taken.data, taken.sent_ns))
         self._follow()
 
     def _follow(self) -> None:
@@ -98,7 +94,7 @@ class _Channel:
             self.close()
         elif self._subscription is None:
             depth = 10 if self.topic.quality is Quality.LATCHED else DEPTH
-            self._sender.release()
+            self._numbers.clear()
             self._subscription = Subscription(self._node, self.topic, f"/{self.topic.name}", depth)
 
     def close(self) -> None:
@@ -107,20 +103,12 @@ class _Channel:
             self._subscription.close()
             self._subscription = None
 
-    @property
-    def lost(self) -> int:
-        """Messages that the middleware lost, of the publisher that was first."""
-        return self._sender.gaps
-
-    def count(self, number: int, sent_ns: int) -> None:
-        """Note a message by its number in its publisher's sequence.
-
-        The middleware does not say which publisher a message comes from: what does not go on with
-        the numbers of the first one is no loss. A topic of many senders is not counted.
-        """
+    def count(self, sender: bytes, number: int) -> None:
+        """Note a message by its publisher and its number in that one's sequence."""
         self.received += 1
-        if self.topic is not DIAGNOSTICS:
-            self._sender.admit(number, sent_ns, time.monotonic_ns())
+        last = self._numbers.get(sender, number)
+        self._numbers[sender] = max(last, number)
+        self.lost += max(0, number - last - 1)
 
 
 class RecorderNode(CoreNode):

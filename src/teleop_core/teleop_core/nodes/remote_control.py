@@ -182,7 +182,7 @@ class RemoteControl:
         for name, reports in self._reports.items():
             arm = self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")]
             while (taken := reports.take()) is not None:
-                _note(arm, taken[0])
+                _note(arm, taken.data)
         self._executor.spin_once(timeout_sec=_PERIOD)
 
 

@@ -1,8 +1,8 @@
 """Sender: what the numbers and stamps of a topic's messages tell about who sends them.
 
-The middleware numbers the messages of each publisher from 1 on, and does not say which publisher a
-message is from. Two publishers therefore show as numbers that jump to and fro. The owner of a topic
-is who was first; messages of others are refused until the owner has been silent for a while.
+The middleware says which publisher a message is from, and numbers the messages of each from 1 on.
+The owner of a topic is who was first; messages of others are refused until the owner has been
+silent for a while. A number that is missing is a message that was lost.
 """
 
 from enum import Enum
@@ -13,8 +13,6 @@ from teleop_core.nodes.rate import Recent
 SECOND_NS = 1_000_000_000
 AHEAD_NS = SECOND_NS
 """Stamps that lie farther in the future are those of another clock [ns]."""
-_JUMP = 100
-"""Messages that may be lost at once, beside what a flood would have brought in between."""
 
 
 class StampFault(Enum):
@@ -49,7 +47,8 @@ class Sender:
 
     def forget(self) -> None:
         """Let the next message be that of the owner, whoever sends it."""
-        self._number = self._sent_ns = self._heard_ns = self._window_ns = self._in_window = 0
+        self._owner, self._number, self._heard_ns = b"", 0, 0
+        self._window_ns = self._in_window = 0
         self.has_other = self.conflict = False
         self.fault: StampFault | None = None
         self.clear_ages()
@@ -59,12 +58,12 @@ class Sender:
         self.ages.clear()
         self.newest_age_ns = 0
 
-    def admit(self, number: int, sent_ns: int, now_ns: int) -> Refusal | None:
+    def admit(self, sender: bytes, number: int, now_ns: int) -> Refusal | None:
         """Reason to refuse a message before it is read; None for one of the owner.
 
         Args:
-            number: Its number in its publisher's sequence; 0 where the middleware has none.
-            sent_ns: When it was sent, by the clock of the sender [ns].
+            sender: Which publisher sent it.
+            number: Its number in the publisher's sequence; 0 where the middleware has none.
             now_ns: Monotonic time [ns].
         """
         if now_ns - self._window_ns >= SECOND_NS:
@@ -72,35 +71,22 @@ class Sender:
         self._in_window += 1
         if self._in_window > self._limit:
             return Refusal.FLOOD
-        step = number - self._number
-        if step != 1 and self._number and number and not self._is_own(step, sent_ns, now_ns):
-            self.has_other = True
-            return Refusal.SECOND_PUBLISHER
-        self._number, self._sent_ns, self._heard_ns = number, sent_ns, now_ns
-        self.conflict = self.conflict or self.has_other  # the owner is still there
-        self.owners = self.owners or 1
-        return None
-
-    def _is_own(self, step: int, sent_ns: int, now_ns: int) -> bool:
-        """Whether a message that is not the next one may be the owner's, or makes a new owner.
-
-        The owner can have sent no more messages in between than there was time for; how long they
-        took to arrive tells nothing.
-        """
-        between_ns = max(sent_ns - self._sent_ns, 0)
-        if 0 < step <= _JUMP + self._limit * between_ns // SECOND_NS:
-            self.gaps += step - 1
-            return True
-        if now_ns - self._heard_ns > self._silence_ns:
+        if sender != self._owner:
+            if self._owner and now_ns - self._heard_ns <= self._silence_ns:
+                self.has_other = True
+                return Refusal.SECOND_PUBLISHER
+            self._owner, self._number, self.has_other = sender, 0, False
             self.owners += 1
-            self.has_other = False
-            return True
-        return False
+        self._heard_ns = now_ns
+        if number > self._number:  # one that was overtaken on the way is no loss
+            self.gaps += number - self._number - 1 if self._number else 0
+            self._number = number
+        self.conflict = self.conflict or self.has_other  # the owner is still there
+        return None
 
     def release(self) -> None:
         """Let another sender have the topic: the owner's publisher is gone."""
-        self._number = 0
-        self.has_other = False
+        self._owner = b""
 
     def note_stamp(self, stamp_ns: int, now_ns: int) -> None:
         """Note the age of a sound message; ``now_ns`` is the time of the system's clock [ns]."""

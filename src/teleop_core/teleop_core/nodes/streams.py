@@ -12,12 +12,10 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from rclpy.callback_groups import CallbackGroup
 from rclpy.context import Context
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.lifecycle import LifecyclePublisher
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 
 from teleop_core.bags.messages import (
     BUTTONS,
@@ -36,6 +34,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
 from teleop_core.nodes.quality import profile as profile  # noqa: PLC0414  for importers of both
 from teleop_core.nodes.sender import Sender
+from teleop_core.nodes.taking import Taker
 
 SILENCE_NS = 2_000_000_000
 """After this long without a sound message a sender may start anew with any stamp [ns]."""
@@ -56,23 +55,8 @@ def message_type(ros_type: str) -> Any:
     return getattr(import_module(f"{package}.msg"), name)
 
 
-class Unattended(CallbackGroup):
-    """Group that no executor ever serves: its subscriptions are taken from by hand."""
-
-    def can_execute(self, entity: Any) -> bool:
-        """Never."""
-        return False
-
-    def beginning_execution(self, entity: Any) -> bool:
-        """Never."""
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        """Nothing to end."""
-
-
-class Subscription:
-    """Raw subscription whose messages are taken by hand.
+class Subscription(Taker):
+    """Messages of a topic of the graph, taken by hand.
 
     Args:
         node: Node that owns it.
@@ -82,30 +66,11 @@ class Subscription:
     """
 
     def __init__(self, node: Node, topic: Topic, name: str, depth: int | None = None) -> None:
-        self.topic, self._node = topic, node
-        self.type = message_type(topic.kind.ros_type)
+        self.topic = topic
         overrides: QualityOverrides = getattr(node, "overrides", NO_OVERRIDES)
         wanted = profile(topic, depth, "subscription")
         wanted = overrides.apply(node.resolve_topic_name(name), "subscription", wanted)
-        self._own = node.create_subscription(
-            self.type, name, _ignore, wanted, raw=True,
-            callback_group=Unattended(),
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-        )  # fmt: skip
-        self.handle = self._own.handle
-        self._take = self.handle.take_message
-
-    def take(self) -> tuple[bytes, dict[str, Any]] | None:
-        """Oldest waiting message and what the middleware knows about it; None if there is none."""
-        return self._take(self.type, True)  # type: ignore[no-any-return]
-
-    def close(self) -> None:
-        """Stop listening."""
-        self._node.destroy_subscription(self._own)
-
-
-def _ignore(data: bytes) -> None:
-    """Stand in for the callback that is never called."""
+        super().__init__(node, message_type(topic.kind.ros_type), name, wanted)
 
 
 class Waiter:
@@ -210,15 +175,13 @@ class Input:
         """Next message of the subscription that can be read."""
         while self.subscription is not None and (taken := self.subscription.take()) is not None:
             self.received += 1
-            about = taken[1]
-            number, sent_ns = about["publication_sequence_number"], about["source_timestamp"]
-            if reason := self.sender.admit(number, sent_ns, time.monotonic_ns()):
+            if reason := self.sender.admit(taken.sender, taken.number, time.monotonic_ns()):
                 self.refused[reason] += 1
                 continue
             known = None
             if self._layout is not None and self._has_own_order:
-                known = self._layout.decode_one(taken[0])
-            found = known or self._read(taken[0])
+                known = self._layout.decode_one(taken.data)
+            found = known or self._read(taken.data)
             if not isinstance(found, Refusal):
                 return found
             self.refused[found] += 1
@@ -329,9 +292,12 @@ class Output:
         pending: Where messages wait for :meth:`publish` of their session; None to publish at once.
     """
 
-    def __init__(self, publisher: Publisher, form: Layout, source: Array, name: str = "") -> None:
+    def __init__(
+        self, publisher: LifecyclePublisher, form: Layout, source: Array, name: str = ""
+    ) -> None:
         self.name = name
-        self._publish, self._encode, self._source = publisher.publish, form.encode_one, source
+        self._publisher, self._handle = publisher, publisher.handle
+        self._encode, self._source = form.encode_one, source
         self.sent = 0
         self.inputs: list[Input] = []
         self.tap: Callable[[bytes, int], None] | None = None
@@ -349,7 +315,9 @@ class Output:
     def publish(self, stamp_ns: int, sent_ns: int) -> None:
         """Publish the present values under a stamp, handed on inside at ``sent_ns`` [ns]."""
         data = self._encode(stamp_ns, self._source)
-        self._publish(data)
+        if self._publisher.is_activated:
+            with self._handle:
+                self._handle.publish_raw(data)
         if self.tap is not None:
             self.tap(data, sent_ns)
         self.sent += 1

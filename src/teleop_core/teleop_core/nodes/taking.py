@@ -1,15 +1,21 @@
-"""Taking: messages of a subscription with the identity of their sender, which rclpy leaves out.
+"""Taking: raw messages of a subscription, by hand, with all that the middleware tells of them.
 
-rclpy hands over the number that a sender gave to a message, but not who the sender is; only both
-together show that a message was lost. So this module itself calls what rclpy calls,
+rclpy does not hand over who sent a message. A lost message, or a second publisher, shows only in
+the sender and its number together. So this module itself calls what rclpy calls,
 ``rcl_take_serialized_message``. All that depends on the layout of rcl's structures is in here.
 """
 
 import ctypes
-from typing import Any
+from typing import Any, NamedTuple
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
 _OK, _NOTHING = 0, 401  # RCL_RET_OK, RCL_RET_SUBSCRIPTION_TAKE_FAILED
 _ROOM = 64  # bytes at the beginning; rcl enlarges them
+_GID = 16
 
 
 class _Allocator(ctypes.Structure):
@@ -36,20 +42,67 @@ class _Info(ctypes.Structure):
         ("source_timestamp", ctypes.c_int64), ("received_timestamp", ctypes.c_int64),
         ("publication_sequence_number", ctypes.c_uint64),
         ("reception_sequence_number", ctypes.c_uint64),
-        ("implementation", ctypes.c_char_p), ("gid", ctypes.c_uint8 * 16),
+        ("implementation", ctypes.c_char_p), ("gid", ctypes.c_uint8 * _GID),
         ("from_intra_process", ctypes.c_bool),
     ]  # fmt: skip
 
 
-class Taker:
-    """Takes the messages of one subscription by hand; a look at an empty one takes 0.5 µs.
+class Taken(NamedTuple):
+    """A message as it came.
 
-    Args:
-        subscription: An rclpy subscription that no executor serves.
+    Attributes:
+        data: Its bytes.
+        sender: Which publisher sent it.
+        number: Its number in the sequence of that publisher, from 1 on; 0 where it has none.
+        sent_ns: When it was sent, by the clock of the sender [ns].
+        came_ns: When the middleware received it [ns].
     """
 
-    def __init__(self, subscription: Any) -> None:
-        rcl, rcutils = ctypes.CDLL("librcl.so"), ctypes.CDLL("librcutils.so")
+    data: bytes
+    sender: bytes
+    number: int
+    sent_ns: int
+    came_ns: int
+
+
+class Unattended(CallbackGroup):
+    """Group that no executor ever serves: its subscriptions are taken from by hand."""
+
+    def can_execute(self, entity: Any) -> bool:
+        """Never."""
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        """Never."""
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        """Nothing to end."""
+
+
+class Taker:
+    """Subscription whose messages are taken by hand; a look at an empty one takes 1 µs.
+
+    Args:
+        node: Node that owns it.
+        kind: Class of its messages.
+        name: Its name for the middleware.
+        profile: Its quality of service.
+
+    Attributes:
+        type: As given.
+        handle: What rcl knows it by.
+    """
+
+    def __init__(self, node: Node, kind: Any, name: str, profile: QoSProfile) -> None:
+        self.type, self._node = kind, node
+        self._own = node.create_subscription(
+            kind, name, _ignore, profile, raw=True, callback_group=Unattended(),
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )  # fmt: skip
+        self.handle: Any = self._own.handle
+        # With the interpreter's lock held, so that no thread destroys what is being taken from.
+        rcl, rcutils = ctypes.PyDLL("librcl.so"), ctypes.PyDLL("librcutils.so")
         self._bytes, self._info = _Bytes(), _Info()
         rcutils.rcutils_get_default_allocator.restype = _Allocator
         allocator = rcutils.rcutils_get_default_allocator()
@@ -60,25 +113,41 @@ class Taker:
         rcutils.rcutils_uint8_array_init(
             ctypes.byref(self._bytes), ctypes.c_size_t(_ROOM), ctypes.byref(allocator)
         )
-        self._handle = subscription.handle
         self._take = rcl.rcl_take_serialized_message
         self._take.argtypes, self._take.restype = [ctypes.c_void_p] * 4, ctypes.c_int
         self._places = ctypes.addressof(self._bytes), ctypes.addressof(self._info)
+        self._gid = self._places[1] + _Info.gid.offset
+        self._is_open = True
 
-    def take(self) -> tuple[bytes, bytes, int] | None:
-        """Oldest waiting message: its bytes, its sender, its number there; None if there is none.
+    def take(self) -> Taken | None:
+        """Oldest waiting message; None if there is none.
 
         A message that the middleware cannot hand over is passed over.
         """
-        while (answer := self._take(self._handle.pointer, *self._places, None)) != _NOTHING:
-            if answer != _OK:
-                self._forget_error()
-                return None
-            info = self._info
-            data = ctypes.string_at(self._bytes.buffer, self._bytes.length)
-            return data, bytes(info.gid), int(info.publication_sequence_number)
-        return None
+        if not self._is_open:
+            return None
+        answer = self._take(self.handle.pointer, *self._places, None)
+        if answer == _NOTHING:
+            return None
+        if answer != _OK:
+            self._forget_error()
+            return None
+        found, info = self._bytes, self._info
+        return Taken(
+            ctypes.string_at(found.buffer, found.length),
+            ctypes.string_at(self._gid, _GID),
+            info.publication_sequence_number,
+            info.source_timestamp,
+            info.received_timestamp,
+        )
 
     def close(self) -> None:
-        """Give back the room for a message; the subscription is its owner's to destroy."""
-        self._free(ctypes.byref(self._bytes))
+        """Stop listening."""
+        if self._is_open:
+            self._is_open = False
+            self._free(ctypes.byref(self._bytes))
+            self._node.destroy_subscription(self._own)
+
+
+def _ignore(data: bytes) -> None:
+    """Stand in for the callback that is never called."""

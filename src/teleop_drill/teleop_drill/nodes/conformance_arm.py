@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 from rclpy.context import Context
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from teleop_core.bags.messages import SECOND_NS
-from teleop_core.nodes.streams import Unattended, message_type
+from teleop_core.nodes.streams import message_type
+from teleop_core.nodes.taking import Taker
 from teleop_drill.conformance.rows import ROWS
 
 _ROWS = {row.name: row for row in ROWS}
@@ -20,7 +20,7 @@ _TURN = 0.005
 _SETTLED = 15  # tenths of a second without new ends after which all are known
 
 
-class Tap:
+class Tap(Taker):
     """What comes on one topic: how many messages, and the newest.
 
     Args:
@@ -31,49 +31,37 @@ class Tap:
     """
 
     def __init__(self, node: Node, name: str, ros_type: str, depth: int = 2000) -> None:
-        self._node, self._type = node, message_type(ros_type)
         quality = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self._own = node.create_subscription(
-            self._type, name, _ignore, quality, raw=True, callback_group=Unattended(),
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-        )  # fmt: skip
+        super().__init__(node, message_type(ros_type), name, quality)
         self.count = 0
         self.newest: Any = None
         self._kept: list[tuple[int, bytes]] = []
 
-    def take(self, every: Callable[[Any], None] | None = None) -> int:
-        """Take what has come; returns how many messages there were.
+    def read(self, every: Callable[[Any], None] | None = None) -> int:
+        """Read what has come; returns how many messages there were.
 
         Args:
             every: Called with each of them; without it only the newest is read.
         """
         data, count = None, 0
-        while (taken := self._own.handle.take_message(self._type, True)) is not None:
-            data = taken[0]
+        while (taken := self.take()) is not None:
+            data = taken.data
             count += 1
             if every is not None:
-                every(deserialize_message(data, self._type))
+                every(deserialize_message(data, self.type))
         if data is not None:
-            self.newest = deserialize_message(data, self._type)
+            self.newest = deserialize_message(data, self.type)
         self.count += count
         return count
 
     def drain(self) -> None:
         """Keep what has come, unread."""
-        while (taken := self._own.handle.take_message(self._type, True)) is not None:
-            self._kept.append((taken[1]["source_timestamp"], taken[0]))
+        while (taken := self.take()) is not None:
+            self._kept.append((taken.sent_ns, taken.data))
 
     def kept(self) -> list[tuple[int, Any]]:
         """Messages of :meth:`drain`, each with the time at which it was sent [ns]."""
-        return [(sent_ns, deserialize_message(data, self._type)) for sent_ns, data in self._kept]
-
-    def close(self) -> None:
-        """Stop listening."""
-        self._node.destroy_subscription(self._own)
-
-
-def _ignore(data: bytes) -> None:
-    """Stand in for the callback that is never called."""
+        return [(sent_ns, deserialize_message(data, self.type)) for sent_ns, data in self._kept]
 
 
 class Arm:
@@ -171,7 +159,7 @@ class Arm:
     def newest(self, name: str, timeout: float = 2.0) -> Any:
         """Newest message of a topic; None if there is none within a time [s]."""
         tap = self.tap(name)
-        self.wait(lambda: bool(tap.take()) or tap.newest is not None, timeout)
+        self.wait(lambda: bool(tap.read()) or tap.newest is not None, timeout)
         return tap.newest
 
     def send(self, name: str, message: Any) -> None:

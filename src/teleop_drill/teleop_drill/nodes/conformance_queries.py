@@ -36,10 +36,10 @@ def _listen(arm: Arm, row: Row, ends: list[Any]) -> Finding:
     """What comes on a topic with publishers of the right type."""
     messages: list[Any] = []
     tap = arm.tap(row.name)
-    arm.wait(lambda: tap.take(messages.append) > 0, _FIRST)
+    arm.wait(lambda: tap.read(messages.append) > 0, _FIRST)
     begin, before = time.monotonic(), tap.count
     while time.monotonic() - begin < _LOOK:
-        tap.take(messages.append)
+        tap.read(messages.append)
         arm.pause(0.01)
     rate = (tap.count - before) / (time.monotonic() - begin)
     arm.untap(row.name)

@@ -72,7 +72,7 @@ class Trials:
 
     def _fresh(self, name: str) -> dict[str, Array]:
         tap = self.arm.tap(name)
-        self.arm.wait(lambda: tap.take() > 0, 0.5)
+        self.arm.wait(lambda: tap.read() > 0, 0.5)
         if tap.newest is None and self.arm.newest(name) is None:
             raise SessionError(f"{self.arm.path(name)} fell silent in the middle: is the arm gone?")
         return numbers_of(tap.newest)
@@ -116,7 +116,7 @@ class Trials:
         self.arm.send("state_command", self.arm.message("state_command", string=word))
 
     def _state(self) -> str:
-        self.arm.tap("operating_state").take()
+        self.arm.tap("operating_state").read()
         return str(self.arm.newest("operating_state").state)
 
     def _reaches(self, command: str, state: str) -> bool:
@@ -162,7 +162,7 @@ class Trials:
         self, name: str, message: Any, off: Callable[[], float], way: float
     ) -> Outcome | None:
         tap, busy = self.arm.tap("operating_state"), [False]
-        tap.take()
+        tap.read()
 
         def watch(state: Any) -> None:
             busy[0] = busy[0] or state.is_busy
@@ -173,7 +173,7 @@ class Trials:
             return None
         if not self.arm.wait(lambda: off() < way * _NEAR, _PATIENCE):
             return Verdict.FAILED, f"{off():.2g} short of its goal after {_PATIENCE:g} s"
-        self.arm.wait(lambda: tap.take(watch) > 0 and not tap.newest.is_busy and busy[0], 2.0)
+        self.arm.wait(lambda: tap.read(watch) > 0 and not tap.newest.is_busy and busy[0], 2.0)
         if not busy[0]:
             return Verdict.FAILED, "is_busy never rose: who waits for the move waits for ever"
         return (Verdict.FAILED, "still busy at its goal") if tap.newest.is_busy else _OK

@@ -188,11 +188,8 @@ class Tap:
             for subscription in self._subscriptions:
                 heard = self._heard[subscription.topic.name]
                 while (taken := subscription.take()) is not None:
-                    data, about = taken
-                    number = about["publication_sequence_number"]
-                    sent_ns = about["source_timestamp"]
-                    if self._count(subscription.topic.name, sent_ns, data):
-                        heard.append((sent_ns, number, data))
+                    if self._count(subscription.topic.name, taken.sent_ns, taken.data):
+                        heard.append((taken.sent_ns, taken.number, taken.data))
 
     def _count(self, name: str, sent_ns: int, data: bytes) -> bool:
         """Count a message of a stream; False for one that the drill itself has forged."""
