@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 
 
 def run(name: str, folder: Path, **env: str) -> str:

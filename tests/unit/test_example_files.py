@@ -1,0 +1,53 @@
+"""Files of the examples: each needs what is public alone, and some test runs it."""
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+from example_runs import EXAMPLES, NAMES
+
+PUBLIC = {
+    "teleop_lab", "teleop_lab.calibration", "teleop_core.slave.operation",
+    "teleop_core.console.app", "teleop_core.console.controls", "teleop_core.console.link",
+    "teleop_core.console.recorded", "teleop_core.console.server",
+    "teleop_core", "teleop_core.evaluation", "teleop_core.chain.operators",
+    "teleop_core.chain.fixtures",
+    "teleop_core.slave.controllers", "teleop_core.robots", "teleop_core.graph.topics",
+    "teleop_drill", "teleop_lab.experiments", "numpy",
+    "numpy.typing", "pandas", "plotly.graph_objects",
+}  # fmt: skip
+ROS_EXAMPLES = {"crtk_client", "foreign_slave", "own_exercise", "ros_device"}
+ROS = {
+    "crtk_msgs.msg",
+    "rclpy",
+    "diagnostic_msgs.msg",
+    "rclpy.node",
+    "rclpy.qos",
+    "rclpy.signals",
+    "geometry_msgs.msg",
+    "sensor_msgs.msg",
+    "teleop_drill.nodes.drill",
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_example_needs_the_public_api_alone(name):
+    tree = ast.parse((EXAMPLES / f"{name}.py").read_text(encoding="utf-8"))
+    imported = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imported.add(node.module)
+    allowed = PUBLIC | (ROS if name in ROS_EXAMPLES else set())
+    standard = {module for module in imported if module.split(".")[0] in sys.stdlib_module_names}
+    assert imported - standard <= allowed
+
+
+def test_every_example_is_run_here_or_live():
+    tests = Path(__file__).parents[1]
+    runs = [tests / folder / "test_examples.py" for folder in ("scenario", "ros")]
+    own = "".join(file.read_text(encoding="utf-8") for file in runs)
+    assert all(f'run("{name}", tmp_path' in own or f'"{name}.py"' in own for name in NAMES)
