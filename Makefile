@@ -63,8 +63,8 @@ format: $(VENV)/.tested
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# Live tests come last, when the kernels are compiled; most of them wait, so that two run at a time,
-# but those alone that need both processors. In a worker a crash of the middleware inside a test
+# Live tests come last, when the kernels are compiled. Quick ones wait most of the time, so that two
+# run at once; slow ones run sessions of many processes, which need both processors. In a worker a crash of the middleware inside a test
 # costs that test, not the run; it is run again, which files that stay together would not allow:
 # stolen work allows it, and keeps nearly all tests of a file, and the session they share, in one
 # process. Elsewhere the tests of a file stay together: what they compile, one process does. All
@@ -82,8 +82,7 @@ test: lint crtk_msgs
 test-slow: $(VENV)/.tested crtk_msgs
 	@code=0; set -x; \
 	$(CORE) -m "slow and not ros and not soak" || code=1; \
-	$(LIVE) -m "ros and slow and not alone and not soak" || code=1; \
-	$(ALONE) -m "ros and alone and not soak" || code=1; \
+	$(ALONE) -m "ros and (slow or alone) and not soak" || code=1; \
 	exit $$code
 
 # Long tests whose law a shorter one tests in CI with another case; a quarter of an hour.

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from teleop_core.kernels import records
 from teleop_core.kernels.geometry import Array
 
-__all__ = ["Field", "Fields", "fields_of", "record", "record_array"]
+__all__ = ["Cells", "Field", "Fields", "fields_of", "record", "record_array"]
 
 Field = tuple[str, str] | tuple[str, str, tuple[int, ...]]
 """Name and type of a field, and its shape if it is an array."""
@@ -46,6 +46,30 @@ class Fields:
         def __getitem__(self, name: str) -> Any: ...
 
         def __setitem__(self, name: str, value: object) -> None: ...
+
+
+class Cells:
+    """Fields of a record by name, looked up once: NumPy takes 1 µs for each look.
+
+    ``cells["now_ns"]`` is a Python number, or the array of a field that is one; both are set by
+    assignment, in the record's own memory.
+
+    Args:
+        record: The record, which it keeps alive.
+    """
+
+    def __init__(self, record: Any) -> None:
+        whole = np.asarray(record)  # over the same memory
+        self._own: dict[str, Any] = {name: whole[name] for name in whole.dtype.names or ()}
+
+    def __getitem__(self, name: str) -> Any:
+        """Value of a field."""
+        own = self._own[name]
+        return own if own.ndim else own.item()
+
+    def __setitem__(self, name: str, value: object) -> None:
+        """Set a field."""
+        self._own[name][...] = value
 
 
 R = TypeVar("R", bound=Fields)

@@ -148,7 +148,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         """The stage at work, which :attr:`stage` is too; None for a node without one."""
         self.stage: Any = None
         self.row: Any = None
-        """The stage's signals, to be read and written by names of fields only."""
+        """The stage's signals, by the names of their fields."""
         self.lock = threading.Lock()  # held while the stage works or takes parameters
         self.gate = threading.Lock()  # held by a session while the node works in its thread
         self.ended, self.exit_code = Future(), 0

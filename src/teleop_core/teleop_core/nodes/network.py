@@ -48,6 +48,6 @@ class NetworkNode(TickingNode):
         """Whether a topic arrived, and anew."""
         if not has_come[THERE if topic in _THERE else BACK]:
             return False
-        before_ns, stamp_ns = self._passed[topic], int(self.row[f"{topic.field}_ns"])
+        before_ns, stamp_ns = self._passed[topic], self.row[f"{topic.field}_ns"]
         self._passed[topic] = stamp_ns
         return stamp_ns != before_ns or topic is NETWORK_SETPOINT_CP

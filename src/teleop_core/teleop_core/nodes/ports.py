@@ -14,7 +14,7 @@ from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import make_signals
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import SELDOM_NS, Kind, Topic
-from teleop_core.kernels import bare
+from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.streams import Input, Output
 
@@ -38,7 +38,7 @@ class Ports:
     Attributes:
         inputs: Per port, by its name, what feeds it; where there are several they are added.
         outputs: What is written, by the topic in its namespace.
-        row: The signals, to be read and written by names of fields only.
+        row: The signals, by the names of their fields.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Ports:
         publisher: Callable[[Topic], LifecyclePublisher],
         buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
-        self._arm, self._stage, self.row = arm, stage, bare(signals)
+        self._arm, self._stage, self.row = arm, stage, Cells(signals)
         self._must_check = stage.name not in BUILT_IN
         self.refused = 0
         """Steps whose outputs were not sent, because they held NaN or infinity."""
@@ -138,7 +138,7 @@ class Ports:
         for output, stamp_field in self._stamped:
             if output.name in silent:
                 continue
-            stamp_ns = int(row[stamp_field]) if stamp_field else now_ns
+            stamp_ns = row[stamp_field] if stamp_field else now_ns
             if output in self._passed_on:
                 if self._passed_on[output] == stamp_ns:
                     continue

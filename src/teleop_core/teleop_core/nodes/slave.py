@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 
 from teleop_core.bags.messages import Refusal
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION, SLAVE_SERVO_JP
+from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_SERVO_JP
 from teleop_core.nodes.crtk_slave import CrtkSlave
 from teleop_core.nodes.operation import CommandServices, StopInput
 from teleop_core.nodes.ticking import TickingNode
@@ -56,10 +56,10 @@ class SlaveNode(TickingNode):
             self._is_told = self.input(SLAVE_MEASURED_JS).stamp_ns is not None
             self._seen, self._missed = self.counts, self.counts.missed
             return
-        before_ns = int(self.row["slave_setpoint_js_ns"])
+        before_ns = self.row["slave_setpoint_js_ns"]
         self._look()
         super().work(ticks, report)
-        stamp_ns = int(self.row["slave_setpoint_js_ns"])
+        stamp_ns = self.row["slave_setpoint_js_ns"]
         if stamp_ns != before_ns:
             self.delay.put(time.time_ns() - stamp_ns)
 
@@ -107,8 +107,7 @@ class SlaveNode(TickingNode):
         super().send_report(stamp_ns)
         if self._reported is not before:
             self._crtk.note(stamp_ns)
-        values = self.stage.signals[SLAVE_OPERATION.field]
-        state = int(values[0])
+        state = int(self._state[0])
         if state != self._told_state and self.executor is not None:
             self._told_state = state
             text = operation_text(self.stage.operation, self.stage.robot.joint_names)
@@ -123,7 +122,7 @@ class SlaveNode(TickingNode):
         """A slave that holds still because nothing sound tells it where to go, or where it is."""
         if not self._is_told:
             return ["waits for slave/measured_js: nobody says where the arm is"]
-        status, values = CommandStatus(int(self.row["command_status"])), self.stage.operation
+        status, values = CommandStatus(self.row["command_status"]), self.stage.operation
         if status is CommandStatus.CLOSED or values["fault"] > 0.0:
             return [operation_text(values, self.stage.robot.joint_names)]
         if status is CommandStatus.MOVING:

@@ -43,7 +43,7 @@ class TickingNode(CoreNode):
 
     def tell(self) -> None:
         """Report the state that the last step led to, if it has changed."""
-        self.send_report(int(self.row["now_ns"]))
+        self.send_report(self.row["now_ns"])
 
     def advance(self, now_ns: int) -> None:
         """Make one step that starts at ``now_ns`` [ns]."""
