@@ -113,6 +113,18 @@ def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer, kind):
         assert is_led_home_without_a_jump(arm)
 
 
+def test_conformance_passes_unchanged_through_the_bridge(peer):
+    pytest.importorskip("crtk_msgs")
+    with real_arm(peer) as arm:
+        peer.wait(lambda: arm.is_at(ROBOT.home), "an arm at home")
+        command = [sys.executable, "-m", "teleop_core.cli", "conformance", "slave", "--yes"]
+        done = subprocess.run(
+            [*command, "--domain", peer.domain, "--wait", "30"],
+            check=False, capture_output=True, text=True, timeout=300,
+        )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 # What follows is done to one arm, so that no more processes run than it needs.
 
 
@@ -156,16 +168,6 @@ def test_another_order_of_names_changes_nothing(led_arm):
     led_arm.peer.wait(lambda: led_arm.measured.take() > 100, "samples in another order")
     assert np.abs(np.array(led_arm.measured.values)[:, :6] - ROBOT.home).max() < 1e-3
     assert not led_arm.peer.status("arm_bridge").message.count("not believed")
-
-
-def test_conformance_passes_unchanged_through_the_bridge(led_arm):
-    pytest.importorskip("crtk_msgs")
-    command = [sys.executable, "-m", "teleop_core.cli", "conformance", "slave", "--yes"]
-    done = subprocess.run(
-        [*command, "--domain", led_arm.peer.domain, "--wait", "30"],
-        check=False, capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(led_arm):
