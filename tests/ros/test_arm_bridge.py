@@ -125,6 +125,23 @@ def test_conformance_passes_unchanged_through_the_bridge(peer):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(peer):
+    with real_arm(peer) as arm:
+        peer.wait(lambda: arm.is_at(ROBOT.home), "an arm at home")
+        arm.misbehave("jump")
+        arm.holds("base jumped by")
+        count, sent = arm.measured.take(), set()
+
+        def is_at_fault():
+            if arm.says("jumped"):
+                sent.add(peer.status("arm_bridge").number("commands"))
+            return arm.operation("FAULT")
+
+        peer.wait(is_at_fault, "the server's fault")  # after 2 s of silence
+        assert len(sent) == 1  # the arm was told nothing more
+        peer.wait(lambda: arm.measured.take() > count, "an arm that begins anew")
+
+
 # What follows is done to one arm, so that no more processes run than it needs.
 
 
@@ -168,19 +185,3 @@ def test_another_order_of_names_changes_nothing(led_arm):
     led_arm.peer.wait(lambda: led_arm.measured.take() > 100, "samples in another order")
     assert np.abs(np.array(led_arm.measured.values)[:, :6] - ROBOT.home).max() < 1e-3
     assert not led_arm.peer.status("arm_bridge").message.count("not believed")
-
-
-def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(led_arm):
-    arm = led_arm
-    arm.misbehave("jump")
-    arm.holds("base jumped by")
-    count, sent = arm.measured.take(), set()
-
-    def is_at_fault():
-        if arm.says("jumped"):
-            sent.add(arm.peer.status("arm_bridge").number("commands"))
-        return arm.operation("FAULT")
-
-    arm.peer.wait(is_at_fault, "the server's fault")  # after 2 s of silence
-    assert len(sent) == 1  # the arm was told nothing more
-    arm.peer.wait(lambda: arm.measured.take() > count, "an arm that begins anew")
