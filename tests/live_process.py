@@ -76,7 +76,8 @@ class LiveProcess:
 
     def nodes(self, name: str = "") -> list[psutil.Process]:
         """Processes of its nodes, or those of one."""
-        found = psutil.Process(self.process.pid).children()
+        starter, *_ = [*psutil.Process(self.process.pid).children(), None]
+        found = starter.children() if starter else []
         return [process for process in found if not name or name in process.cmdline()]
 
     def signal(self, number: int) -> list[psutil.Process]:

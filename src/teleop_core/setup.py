@@ -61,7 +61,7 @@ setup(
     ],
     extras_require={
         "console": ["viser>=1.1,<1.2", "msgspec", "pygame-ce", "hidapi"],
-        "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
+        "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces", "setproctitle"],
         "test": [
             "EAIK",
             "coverage",

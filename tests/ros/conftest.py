@@ -1,6 +1,8 @@
 """Real nodes as processes, and a peer that talks to them over real topics."""
 
+import atexit
 import io
+import os
 import re
 import signal
 import subprocess
@@ -11,6 +13,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +42,10 @@ from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import live
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.quality import profile
+from teleop_core.nodes.starter import NODE, Started, Starter
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot
-from teleop_core.session.configuration import Configuration
+from teleop_core.session.configuration import Configuration, configure
 from teleop_core.slave.slave import SlaveParameters
 from teleop_core.slave.slave_sim import SlaveSimParameters
 
@@ -102,6 +106,34 @@ class Listener:
         self.stamps, self.values = [], []
 
 
+@cache
+def _starter() -> Starter:
+    """Who starts the nodes of all tests of this process; it ends with it."""
+    made = Starter(configure("coarse_box").text(), environment())
+    atexit.register(made.close)
+    return made
+
+
+def start_node(
+    words: list[str], env: Mapping[str, str], log: Path, *, is_fresh: bool = False
+) -> "subprocess.Popen[bytes] | Started":
+    """Start a node as ``teleop live`` does, or as a user does, in a fresh Python.
+
+    Args:
+        words: Name of the node and its arguments.
+        env: Its environment.
+        log: File for what it writes to standard error.
+        is_fresh: Whether its Python is to begin with this environment.
+    """
+    with log.open("wb") as file:
+        if is_fresh:
+            command = [sys.executable, "-m", "teleop_core.nodes", *words]
+            return subprocess.Popen(command, stderr=file, env=env)
+        with open(os.devnull, "wb") as nowhere:
+            files = {"out": nowhere.fileno(), "err": file.fileno()}
+            return _starter().start(["teleop_core.nodes", *words], env, files, main=NODE)
+
+
 class NodeProcess:
     """One node as a user starts it, in a namespace if ``arm`` is not empty."""
 
@@ -112,13 +144,12 @@ class NodeProcess:
         self.name = f"{arm}/{name}" if arm else name
         file = folder / f"{name}_{time.monotonic_ns()}.yaml"
         file.write_text(yaml.safe_dump({name: {"ros__parameters": parameters}}))
-        command = [sys.executable, "-m", "teleop_core.nodes", name]
-        command += ["--ros-args", "--params-file", str(file)]
-        command += ["-r", f"__ns:=/{arm}"] if arm else []
+        words = [name, "--ros-args", "--params-file", str(file)]
+        words += ["-r", f"__ns:=/{arm}"] if arm else []
         named = {"ROS_DOMAIN_ID": domain, "PYTHONFAULTHANDLER": "1", **(env or {})}
         self.stderr = file.with_suffix(".log")
-        with self.stderr.open("wb") as log:
-            self.process = subprocess.Popen(command, stderr=log, env=environment() | named)
+        is_fresh = bool(env) or "PYTHONPATH" in os.environ  # which a Python reads as it begins
+        self.process = start_node(words, environment() | named, self.stderr, is_fresh=is_fresh)
 
     def end(self, number: int = signal.SIGINT) -> int:
         """Send a signal; returns the exit code as :meth:`wait` does."""
@@ -362,7 +393,7 @@ def common_peer() -> Iterator[Peer]:
 @contextmanager
 def _composed(
     peer: Peer, folder: Path, namespace: str, parameters: dict[str, dict[str, Any]]
-) -> Iterator["subprocess.Popen[bytes]"]:
+) -> Iterator["subprocess.Popen[bytes] | Started"]:
     common = {
         "recorder": {"out": str(folder / "bag")},
         "slave": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
@@ -370,11 +401,10 @@ def _composed(
     file = folder / "session.yaml"
     groups = {name: {"ros__parameters": p} for name, p in (common | parameters).items()}
     file.write_text(yaml.safe_dump(groups))
-    command = [sys.executable, "-m", "teleop_core.nodes", "teleop_session"]
-    command += ["--ros-args", "--params-file", str(file)]
-    command += ["-r", f"__ns:=/{namespace}"] if namespace else []
+    words = ["teleop_session", "--ros-args", "--params-file", str(file)]
+    words += ["-r", f"__ns:=/{namespace}"] if namespace else []
     env = environment() | {"ROS_DOMAIN_ID": peer.domain}
-    process = subprocess.Popen(command, env=env)
+    process = start_node(words, env, folder / "session.log")
     try:
         for name in (*BUILT_IN, RECORDER_NAME):
             peer.wait_state(f"{namespace}/{name}" if namespace else name, "active")
@@ -393,7 +423,9 @@ def compose(peer, tmp_path):
     """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
     with ExitStack() as stack:
 
-        def start(namespace: str = "", **parameters: dict[str, Any]) -> "subprocess.Popen[bytes]":
+        def start(
+            namespace: str = "", **parameters: dict[str, Any]
+        ) -> "subprocess.Popen[bytes] | Started":
             return stack.enter_context(_composed(peer, tmp_path, namespace, parameters))
 
         yield start

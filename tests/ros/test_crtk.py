@@ -36,7 +36,9 @@ SPEED = 0.017
 seconds. Where commands come late it catches up no faster, or its motion would be over before its
 speeds could be told."""
 # A busy machine is no fault of the arm's.
-CALM = {"operation__longest_outage": 0.0, "start": MIDDLE, "start_speed": 1.0}
+CALM = {
+    "operation__longest_outage": 0.0, "command_timeout": 5.0, "start": MIDDLE, "start_speed": 1.0,
+}  # fmt: skip
 
 
 class StockClient:
@@ -141,7 +143,13 @@ def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client):
 def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client):
     goal = [a + 0.02 for a in MIDDLE]
     goal[2] = 0.36
-    client.send("servo_jp", JointState(position=goal))
+    peer, received = client.peer, 0.0
+    while not received:  # the first may be lost: the slave need not know its sender yet
+        client.send("servo_jp", JointState(position=goal))
+        sent = peer.status("slave").number("ticks")
+        peer.wait_value("slave", "ticks", lambda ticks, sent=sent: ticks > sent + 1500)
+        received = peer.status("slave").number("received.slave/servo_jp")
+    assert received == 1
     client.wait(lambda: np.allclose(client.joints(), goal, atol=1e-6), "the reference")
 
 

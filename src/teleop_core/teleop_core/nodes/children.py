@@ -17,6 +17,7 @@ from teleop_core.base.errors import SessionError
 from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.parent import VARIABLE
+from teleop_core.nodes.starter import NODE, Starter
 
 # Not by SIGINT, which a process that a shell started in the background ignores, and its children.
 _PATIENCE = ((signal.SIGTERM, 30.0), (signal.SIGKILL, 5.0))
@@ -80,6 +81,7 @@ class Child:
         name: Stage with its namespace, or a whole session.
         parameters: Open parameter file.
         env: Its environment.
+        starter: Who starts it.
         command: What it runs in place of the node of that name.
 
     Attributes:
@@ -89,8 +91,9 @@ class Child:
     """
 
     def __init__(
-        self, name: str, parameters: IO[Any], env: dict[str, str], command: Sequence[str] = ()
-    ) -> None:
+        self, name: str, parameters: IO[Any], env: dict[str, str], starter: Starter,
+        command: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         arm, _, stage = name.rpartition("/")
         self.name, self.doing = name, "starting"
         self.is_told = self._is_asked = False
@@ -99,24 +102,26 @@ class Child:
         self._text = b""
         # Closed with us: nobody else knows its name.
         self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
-        ours = [sys.executable, "-m", "teleop_core.nodes", stage]
-        ours += ["--ros-args", "--params-file", f"/dev/fd/{parameters.fileno()}"]
-        if arm:
-            ours += ["-r", f"__ns:=/{arm}"]
+        ours = [stage, "--ros-args", "--params-file", "/dev/fd/<parameters>"]
+        ours += ["-r", f"__ns:=/{arm}"] if arm else []
+        log = self._log.fileno()
+        files = {"out": log, "err": log, "line": theirs.fileno(), "parameters": parameters.fileno()}
         with theirs:
-            # A session of its own: Ctrl-C on the terminal reaches us, and we end it in order.
-            self._process = subprocess.Popen(
-                command or ours, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
-                env=env | {VARIABLE: str(theirs.fileno())}, start_new_session=True,
-                pass_fds=(theirs.fileno(), parameters.fileno()),
+            self._process = starter.start(
+                command or ["teleop_core.nodes", *ours], env | {VARIABLE: "<line>"}, files,
+                main="" if command else NODE,
             )  # fmt: skip
-
         self._chances, self._silent = Chances(self._process.pid), 0.0
 
     @property
     def pid(self) -> int:
         """Process id."""
         return self._process.pid
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
 
     def check(self) -> None:
         """Make sure that it runs and says what it is doing.

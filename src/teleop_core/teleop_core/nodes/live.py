@@ -2,6 +2,7 @@
 
 import tempfile
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
@@ -23,6 +24,7 @@ from teleop_core.nodes.observer import WARNING, Observer, Status
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.start import SESSION as SESSION_NODE
+from teleop_core.nodes.starter import Starter
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.links import link_texts
 from teleop_core.session.notes import notes_of
@@ -82,13 +84,14 @@ def live(
     # A file without a name: there is nothing to remove, however this ends.
     with (
         tempfile.TemporaryFile("w+") as parameters,
+        Starter("" if is_composed else configuration.text(), env) as starter,
         interrupt.caught(),
         announced(int(env["ROS_DOMAIN_ID"])),
         Observer(int(env["ROS_DOMAIN_ID"])) as observer,
     ):
         parameters.write(parameter_file(configuration, str(out)))
         parameters.flush()
-        session = _Session(configuration, console, observer, parameters, env, interrupt)
+        session = _Session(configuration, console, observer, parameters, env, interrupt, starter)
         session.crews = _crews(configuration.graph, is_composed=is_composed)
         session.tell_where(out)
         for note in notes_of(configuration, transport=_TRANSPORT[is_composed]):
@@ -108,11 +111,13 @@ class _Session:
         parameters: IO[Any],
         env: dict[str, str],
         interrupt: Interrupt,
+        starter: Starter,
     ) -> None:
         self._duration = float(configuration.groups[SESSION].duration)
         self._graph = configuration.graph
         self._console, self._observer = console, observer
         self._parameters, self._env, self._interrupt = parameters, env, interrupt
+        self._starter = starter
         self._children: dict[str, Child] = {}
         self._ready = 0.0
         self.crews = _crews(self._graph, is_composed=False)
@@ -139,6 +144,7 @@ class _Session:
     def _work(self) -> None:
         is_begun = False
         try:
+            self._await_starter()
             for crew in self.crews:
                 self._start(crew)
             if self._keys.is_there:
@@ -151,9 +157,18 @@ class _Session:
                 raise SessionError("stopped before all nodes were ready") from None
             self.say("stopped")
 
+    def _await_starter(self) -> None:
+        """Wait until all that the nodes share is loaded."""
+        progress = _Progress({"nodes": self._starter})
+        while not self._starter.is_ready(0.1):
+            self._interrupt.check()
+            for line in progress.news():
+                self.say(line)
+
     def _start(self, crew: Crew) -> None:
         for name in crew:
-            self._children[name] = Child(name, self._parameters, self._env)
+            child = Child(name, self._parameters, self._env, self._starter)
+            self._children[name] = child
         waiting = [node for nodes in crew.values() for node in nodes]
         home = {node: name for name, nodes in crew.items() for node in nodes}
         progress = _Progress(self._children)
@@ -287,7 +302,7 @@ class _Session:
 class _Progress:
     """What processes say while they start."""
 
-    def __init__(self, children: dict[str, Child]) -> None:
+    def __init__(self, children: Mapping[str, Child | Starter]) -> None:
         self._children = children
         self._seen: dict[str, str] = {}
         self._begin = self._last = self._told = time.monotonic()

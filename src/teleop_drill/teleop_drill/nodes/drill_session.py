@@ -20,6 +20,7 @@ from teleop_core.nodes.children import Child, end_all
 from teleop_core.nodes.live import parameter_file
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.start import SESSION as SESSION_NODE
+from teleop_core.nodes.starter import Starter
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill.exercise import Master
 
@@ -54,6 +55,7 @@ class DrillSession:
         self._configuration, self._folder, self._env = configuration, folder, env
         self._observer, self._is_composed = observer, is_composed
         self._has_device, self._drives = master is Master.DEVICE, tuple(drives)
+        self._starter = Starter("" if is_composed else configuration.text(), env)
         self._children: dict[str, Child] = {}
         self._files: list[IO[str]] = []
         self._others: list[subprocess.Popen[Any]] = []
@@ -96,7 +98,7 @@ class DrillSession:
         if process in self._children:
             self._children[process].end()
         command = self._drives if self._is_foreign(process) else ()
-        self._children[process] = Child(process, file, self._env, command)
+        self._children[process] = Child(process, file, self._env, self._starter, command)
 
     def _is_foreign(self, process: str) -> bool:
         return bool(self._drives) and process == _SIMULATOR
@@ -117,7 +119,7 @@ class DrillSession:
         while not all(self._observer.is_active(name) for name in nodes):
             self._observer.listen(0.05)
             for child in self._children.values():
-                if not self._is_alive(child):
+                if not child.is_running:
                     child.check()
             if time.monotonic() > deadline:
                 raise SessionError(f"{', '.join(nodes)}: not at work after {START_TIMEOUT:g} s")
@@ -135,6 +137,7 @@ class DrillSession:
         end_all(self._children.values())
         end_all([recorder] if recorder else [])
         self._children.clear()
+        self._starter.close()
         for file in self._files:
             file.close()
 
@@ -148,18 +151,11 @@ class DrillSession:
     def is_running(self, node: str) -> bool:
         """Whether the process of a node runs."""
         child = self._children.get(self._process(node))
-        return child is not None and self._is_alive(child)
+        return child is not None and child.is_running
 
     def dead(self) -> list[str]:
         """Processes that have ended."""
         return [name for name in self._children if not self.is_running(name)]
-
-    @staticmethod
-    def _is_alive(child: Child) -> bool:
-        try:  # looked at only: who has started it is to learn how it ended
-            return os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
-        except ChildProcessError:
-            return False
 
     def _process(self, node: str) -> str:
         return SESSION_NODE if self._is_composed else node

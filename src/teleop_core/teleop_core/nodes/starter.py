@@ -1,0 +1,358 @@
+"""Starter: a process that has loaded what nodes need, and starts each as a copy of itself.
+
+Python, numba, the middleware and a node's kernels take two seconds of processor time and 200 MB to
+load. A copy of a process that has loaded them begins at once, and shares that memory as long as it
+does not write there. The starter itself takes no part in the middleware and has a single thread,
+so that it can be copied at any time.
+
+It obeys over one socket: each message tells what to start, with the files that the new process
+gets. Over another, which came with that message, it tells the process's number and, later, its exit
+code. It ends when the first socket does; what it started goes on.
+"""
+
+import faulthandler
+import gc
+import inspect
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import traceback
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from typing import IO, Any, cast
+
+from setproctitle import setproctitle
+
+from teleop_core.base.errors import SessionError
+
+NODE = "teleop_core.nodes.start:main"
+"""What runs a node: a function without arguments, which reads ``sys.argv``."""
+LOST = 255
+"""Exit code of a process whose starter ended before it: nobody knows the true one."""
+_KIND = socket.SOCK_SEQPACKET  # messages stay whole, and an end is seen
+_LARGEST = 1 << 20  # bytes of a message
+_TELLS = 0.1  # from word to word while loading [s]
+
+
+class Starter:
+    """Starts processes that have loaded already what they need.
+
+    It loads while the caller goes on; the first :meth:`start` waits for it.
+
+    Args:
+        configuration: Text of the configuration whose stages and kernels are loaded; empty: of
+            none, for a single process, which loads its own as fast.
+        env: Environment in which it loads.
+    """
+
+    def __init__(self, configuration: str, env: Mapping[str, str]) -> None:
+        self._line, theirs = socket.socketpair(type=_KIND)
+        self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
+        self._lock, self._is_ready, self.doing = threading.Lock(), False, "starting"
+        with theirs, tempfile.TemporaryFile("w+", encoding="utf-8") as file:
+            file.write(configuration)
+            file.flush()
+            numbers = (theirs.fileno(), file.fileno())
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", __name__, *map(str, numbers)], pass_fds=numbers,
+                stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log, env=dict(env),
+                start_new_session=True,
+            )  # fmt: skip
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    def is_ready(self, timeout: float) -> bool:
+        """Whether it has loaded; waits so long for news of it [s].
+
+        Raises:
+            SessionError: It has ended, with what it wrote.
+        """
+        while not self._is_ready and select.select([self._line], (), (), timeout)[0]:
+            word = self._line.recv(_LARGEST).decode()
+            if not word:
+                self._process.wait()
+                text = os.pread(self._log.fileno(), 20_000, 0).decode(errors="replace").strip()
+                code = self._process.returncode
+                raise SessionError(f"the starter of the nodes ended with {code}: {text}")
+            self._is_ready, self.doing = word == "ready", word
+            timeout = 0.0
+        return self._is_ready
+
+    def start(
+        self, command: Sequence[str], env: Mapping[str, str], files: Mapping[str, int],
+        main: str = "",
+    ) -> "Started":  # fmt: skip
+        """Start a process in a session of its own; nothing is on its standard input.
+
+        Args:
+            command: What it runs, as in ``sys.argv``.
+            env: Its environment.
+            files: Files that it gets: ``out`` and ``err`` for what it writes, and others, whose
+                numbers take the place of their names in angle brackets (``<parameters>``) in
+                ``command`` and in ``env``.
+            main: ``module:function`` that runs in the copy; empty: the program that ``command``
+                names, in place of the copy.
+
+        Raises:
+            SessionError: The starter has ended.
+        """
+        while not self.is_ready(1.0):
+            pass
+        request = {
+            "command": list(command), "env": dict(env), "files": list(files), "main": main,
+            "folder": os.getcwd(),
+        }  # fmt: skip
+        ours, theirs = socket.socketpair(type=_KIND)
+        try:
+            with theirs, self._lock:
+                numbers = [theirs.fileno(), *files.values()]
+                socket.send_fds(self._line, [json.dumps(request).encode()], numbers)
+            return Started(ours)
+        except OSError as error:
+            ours.close()
+            raise SessionError(f"the starter of the nodes has ended: {error}") from error
+
+    def __enter__(self) -> "Starter":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End it; what it has started goes on."""
+        self._line.close()
+        self._process.terminate()  # it may be loading
+        self._process.wait()
+        self._log.close()
+
+
+class Started:
+    """A process that a :class:`Starter` started, to be used as a :class:`subprocess.Popen`.
+
+    Args:
+        line: Where the starter tells of it.
+
+    Attributes:
+        pid: Process id.
+        returncode: Exit code; None while it runs; minus the number of the signal that ended it.
+    """
+
+    def __init__(self, line: socket.socket) -> None:
+        self._line = line
+        self.returncode: int | None = None
+        text = line.recv(64)
+        if not text:
+            raise OSError("it told nothing of the process")
+        self.pid = int(text)
+
+    def poll(self) -> int | None:
+        """Exit code; None while it runs."""
+        return self._look(0.0)
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Exit code, once it has ended.
+
+        Raises:
+            subprocess.TimeoutExpired: It still runs after so long [s].
+        """
+        code = self._look(timeout)
+        if code is None:
+            raise subprocess.TimeoutExpired(str(self.pid), timeout or 0.0)
+        return code
+
+    def _look(self, timeout: float | None) -> int | None:
+        if self.returncode is None and select.select([self._line], (), (), timeout)[0]:
+            self.returncode = int(self._line.recv(64) or LOST)
+            self._line.close()
+        return self.returncode
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """End it at once."""
+        self.send_signal(signal.SIGKILL)
+
+
+# -- in the process of the starter ---------------------------------------------------------------
+
+
+class _Copies:
+    """What the starter's process does, once it has loaded.
+
+    Args:
+        line: Where it is told what to start.
+    """
+
+    def __init__(self, line: socket.socket) -> None:
+        self._line = line
+        self._told: dict[int, socket.socket] = {}
+        self._ended, self._wakes = os.pipe()
+        os.set_blocking(self._wakes, False)
+        signal.set_wakeup_fd(self._wakes, warn_on_full_buffer=False)
+        signal.signal(signal.SIGCHLD, lambda *_: None)
+
+    def serve(self) -> None:
+        """Start what is asked for, and tell of what ends, until nobody asks any more."""
+        self._line.send(b"ready")
+        while True:
+            ready = select.select([self._line, self._ended], (), ())[0]
+            if self._ended in ready:
+                os.read(self._ended, 4096)
+                self._tell_ends()
+            if self._line in ready:
+                data, files, _, _ = socket.recv_fds(self._line, _LARGEST, 32)
+                if not data:
+                    return
+                self._copy(json.loads(data), files)
+
+    def _tell_ends(self) -> None:
+        while self._told:
+            pid, status = os.waitpid(-1, os.WNOHANG)
+            if not pid:
+                return
+            with self._told.pop(pid) as line:
+                _tell(line, str(os.waitstatus_to_exitcode(status)))
+
+    def _copy(self, request: dict[str, Any], files: list[int]) -> None:
+        line = socket.socket(fileno=files[0])
+        pid = os.fork()
+        if not pid:
+            signal.set_wakeup_fd(-1)
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            for other in (self._line, line, *self._told.values()):
+                other.close()
+            os.close(self._ended)
+            os.close(self._wakes)
+            _become(request, dict(zip(request["files"], files[1:], strict=True)))
+        for number in files[1:]:
+            os.close(number)
+        self._told[pid] = line
+        _tell(line, str(pid))
+
+
+def _tell(line: socket.socket, text: str) -> None:
+    try:
+        line.send(text.encode())
+    except OSError:  # who asked is gone
+        return
+
+
+def _become(request: dict[str, Any], files: dict[str, int]) -> None:
+    """Be the process that is asked for; does not return."""
+    code = 1
+    try:
+        os.setsid()
+        os.chdir(request["folder"])
+        os.dup2(files.pop("out"), 1)
+        os.dup2(files.pop("err"), 2)
+
+        def filled(text: str) -> str:
+            for name, number in files.items():
+                text = text.replace(f"<{name}>", str(number))
+            return text
+
+        command = [filled(word) for word in request["command"]]
+        env = {name: filled(text) for name, text in request["env"].items()}
+        for number in files.values():
+            os.set_inheritable(number, True)
+        if not request["main"]:
+            signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+            os.execvpe(command[0], command, env)
+        if env.get("PYTHONFAULTHANDLER"):
+            faulthandler.enable()
+        os.environ.clear()
+        os.environ.update(env)
+        sys.argv[:] = command
+        module, _, function = request["main"].partition(":")
+        setproctitle(" ".join([sys.executable, "-m", module.removesuffix(".start"), *command[1:]]))
+        code = int(getattr(import_module(module), function)() or 0)
+    except SystemExit as error:
+        code = error.code if isinstance(error.code, int) else int(error.code is not None)
+    except BaseException:  # whatever it is: this process ends here, and says why
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _load(configuration: str) -> None:
+    """Load what the nodes of a session use; what cannot be loaded, its node tells of."""
+    from teleop_core.bags.ros_types import typestore
+    from teleop_core.base.own_parts import load_own_parts
+    from teleop_core.graph.signals import DT
+    from teleop_core.nodes import recorder, start, teleop_session  # noqa: F401
+    from teleop_core.nodes.making import node_class
+    from teleop_core.nodes.streams import message_type
+    from teleop_core.graph.layers import parse_text
+    from teleop_core.session.configuration import Configuration
+    from teleop_core.session.model import Model
+
+    if not configuration:
+        return
+    load_own_parts()
+    typestore()
+    inspect.getmodule(inspect.currentframe())  # rclpy asks for it with a node's first line
+    loaded = Configuration.from_layers([parse_text(configuration, "the configuration")])
+    for member in loaded.graph.members:
+        node_class(member.stage)
+        for topic in member.stage.ports:
+            message_type(topic.ros_type)
+        try:
+            member.stage.run(loaded.groups[member.name], DT).load()
+        except Exception:  # of a part, ours or a user's: its node meets it again
+            traceback.print_exc()
+    Model(loaded)
+
+
+def _loaded(configuration: str, line: socket.socket) -> None:
+    """Load, and tell meanwhile that it does; no other thread is left afterwards."""
+    from teleop_core.kernels.progress import compiled_count, is_compiling
+
+    is_done = threading.Event()
+
+    def tell() -> None:
+        while not is_done.wait(_TELLS):
+            count = f"compiling kernels ({compiled_count()} so far)"
+            _tell(line, count if is_compiling() else "loading")
+
+    thread = threading.Thread(target=tell)
+    thread.start()
+    try:
+        _load(configuration)
+    finally:
+        is_done.set()
+        thread.join()
+
+
+def main() -> None:
+    """Load, then start what is asked for: ``starter LINE CONFIGURATION``, both numbers of files."""
+    line = socket.socket(fileno=int(sys.argv[1]))
+    line.set_inheritable(False)
+    with open(int(sys.argv[2]), encoding="utf-8") as file:  # noqa: PTH123
+        file.seek(0)
+        configuration = file.read()
+    _loaded(configuration, line)
+    gc.collect()
+    gc.freeze()  # a copy looks through none of it, so that its memory stays shared
+    _Copies(line).serve()
+
+
+if __name__ == "__main__":
+    main()
