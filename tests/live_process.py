@@ -78,7 +78,7 @@ class LiveProcess:
         """Processes of its nodes, or those of one."""
         starter, *_ = [*psutil.Process(self.process.pid).children(), None]
         found = starter.children() if starter else []
-        return [process for process in found if not name or name in process.cmdline()]
+        return [process for process in found if not name or name in words(process)]
 
     def signal(self, number: int) -> list[psutil.Process]:
         """Send a signal to the command alone; returns its nodes."""
@@ -145,6 +145,14 @@ def has_recorded(status: Any, counts: Mapping[str, int]) -> bool:
     return status is not None and all(
         status.number(f"received.{name}") > count for name, count in counts.items()
     )
+
+
+def words(process: psutil.Process) -> list[str]:
+    """Words of a process's command line; none once it has ended."""
+    try:
+        return " ".join(process.cmdline()).replace("\0", " ").split()
+    except psutil.NoSuchProcess:
+        return []
 
 
 def are_gone(processes: list[Any]) -> bool:

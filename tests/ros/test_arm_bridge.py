@@ -88,7 +88,8 @@ def real_arm(peer, kind="joint_state", **parameters):
     try:
         arm = RealArm(peer, kind)
         peer.start("arm_bridge", kind=kind, **NAMED, **parameters)
-        peer.start("slave", has_arm=False)
+        # A busy machine is no outage of the arm's.
+        peer.start("slave", has_arm=False, operation__longest_outage=0.0)
         yield arm
     finally:
         controller.terminate()

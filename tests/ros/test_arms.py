@@ -66,7 +66,14 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer, tmp_path)
 
 @pytest.mark.slow
 @pytest.mark.alone
-@pytest.mark.parametrize("is_composed", [False, True], ids=["processes", "composed"])
+@pytest.mark.parametrize(
+    "is_composed",
+    # Fourteen processes need more than two processors: the law is tested composed.
+    [
+        pytest.param(False, id="processes", marks=pytest.mark.soak),
+        pytest.param(True, id="composed"),
+    ],
+)
 def test_two_arms_are_recorded_together_and_scored_one_by_one(peer, session_until, is_composed):
     robots = {"": "rcrt1", "left": "puma560"}
     # Ten processes need more than two processors: an arm that hears too seldom of its hand holds.

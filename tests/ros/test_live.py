@@ -14,7 +14,7 @@ import pytest
 from rich.console import Console
 from rosbags.highlevel import AnyReader
 
-from live_process import wait_until
+from live_process import wait_until, words
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, RecordingError, SessionError
 from teleop_core.graph import topics
@@ -48,7 +48,7 @@ def children(name=""):
     """Processes of nodes that this test has started."""
     found = []
     for process in psutil.Process().children(recursive=True):
-        line = process.cmdline() if process.is_running() else []
+        line = words(process)
         if "teleop_core.nodes" in line and (not name or name in line):
             found.append(process)
     return found

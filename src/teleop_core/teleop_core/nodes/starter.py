@@ -211,11 +211,12 @@ class _Copies:
         """Start what is asked for, and tell of what ends, until nobody asks any more."""
         self._line.send(b"ready")
         while True:
-            ready = select.select([self._line, self._ended], (), ())[0]
+            waited: list[int] = [self._line.fileno(), self._ended]
+            ready = select.select(waited, (), ())[0]
             if self._ended in ready:
                 os.read(self._ended, 4096)
                 self._tell_ends()
-            if self._line in ready:
+            if waited[0] in ready:
                 data, files, _, _ = socket.recv_fds(self._line, _LARGEST, 32)
                 if not data:
                     return
@@ -296,11 +297,11 @@ def _load(configuration: str) -> None:
     """Load what the nodes of a session use; what cannot be loaded, its node tells of."""
     from teleop_core.bags.ros_types import typestore
     from teleop_core.base.own_parts import load_own_parts
+    from teleop_core.graph.layers import parse_text
     from teleop_core.graph.signals import DT
     from teleop_core.nodes import recorder, start, teleop_session  # noqa: F401
     from teleop_core.nodes.making import node_class
     from teleop_core.nodes.streams import message_type
-    from teleop_core.graph.layers import parse_text
     from teleop_core.session.configuration import Configuration
     from teleop_core.session.model import Model
 
@@ -345,7 +346,7 @@ def main() -> None:
     """Load, then start what is asked for: ``starter LINE CONFIGURATION``, both numbers of files."""
     line = socket.socket(fileno=int(sys.argv[1]))
     line.set_inheritable(False)
-    with open(int(sys.argv[2]), encoding="utf-8") as file:  # noqa: PTH123
+    with open(int(sys.argv[2]), encoding="utf-8") as file:
         file.seek(0)
         configuration = file.read()
     _loaded(configuration, line)
