@@ -1,0 +1,110 @@
+"""Starter: copies of a process that has loaded already, and what is known of their ends."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+
+import pytest
+
+from teleop_core.base.errors import SessionError
+from teleop_core.nodes.children import environment
+from teleop_core.nodes.starter import LOST, Starter
+
+PATIENCE = 60.0
+
+
+@pytest.fixture(scope="module")
+def starter():
+    with Starter("", environment()) as made:
+        yield made
+
+
+@pytest.fixture
+def start(starter, tmp_path, monkeypatch):
+    """Start something, with a file ``given`` beside those for what it writes."""
+    monkeypatch.chdir(tmp_path)
+    with (tmp_path / "written").open("wb") as written, tempfile.TemporaryFile() as given:
+        given.write(b"what was given")
+        given.flush()
+        files = {"out": written.fileno(), "err": written.fileno(), "given": given.fileno()}
+
+        def started(*command, main="", **env):
+            return starter.start(command, os.environ | env, files, main=main)
+
+        yield started
+
+
+def written(tmp_path):
+    return (tmp_path / "written").read_text()
+
+
+def test_a_program_has_the_words_environment_folder_and_files_that_it_was_given(start, tmp_path):
+    text = (
+        "import os, sys; print(os.environ['COLOUR'], os.getcwd(), open(sys.argv[1]).read(), "
+        "'numba' in sys.modules)"
+    )
+    process = start(sys.executable, "-c", text, "/dev/fd/<given>", COLOUR="blue")
+    assert process.wait(PATIENCE) == 0
+    assert written(tmp_path) == f"blue {tmp_path} what was given False\n"
+
+
+def test_a_copy_runs_what_it_is_told_with_nothing_on_its_standard_input(start, tmp_path):
+    process = start("a copy", main="code:interact", PYTHON_BASIC_REPL="1")
+    assert process.wait(PATIENCE) == 0  # at the end of the input
+    assert "InteractiveConsole" in written(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("main", "code", "words"),
+    [
+        ("teleop_core.nodes.start:main", 2, "stage is 'nobody'"),
+        ("this:nothing", 1, "AttributeError"),
+        ("no_such_module:main", 1, "ModuleNotFoundError"),
+    ],
+)
+def test_the_code_of_a_copy_is_told_and_what_it_raised_is_written(
+    start, tmp_path, main, code, words
+):
+    assert start("teleop_core.nodes", "nobody", main=main).wait(PATIENCE) == code
+    assert words in written(tmp_path)
+
+
+def test_a_program_that_there_is_not_ends_with_its_reason(start, tmp_path):
+    assert start("/no/such/program").wait(PATIENCE) == 1
+    assert "FileNotFoundError" in written(tmp_path)
+
+
+def test_a_process_is_known_to_run_until_a_signal_ends_it(start):
+    process = start(sys.executable, "-c", "import signal; signal.pause()")
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(0.0)
+    assert process.poll() is None
+    process.kill()
+    assert process.wait(PATIENCE) == -signal.SIGKILL
+    process.terminate()  # nobody any more
+    assert process.poll() == -signal.SIGKILL
+
+
+def test_what_a_starter_that_was_killed_has_started_goes_on_and_nobody_knows_its_end(tmp_path):
+    waits = (sys.executable, "-c", "import signal; signal.pause()")
+    with Starter("", environment()) as starter, (tmp_path / "log").open("wb") as log:
+        files = {"out": log.fileno(), "err": log.fileno()}
+        process = starter.start(waits, os.environ, files)
+        os.kill(starter.pid, signal.SIGKILL)
+        assert process.wait(PATIENCE) == LOST
+        os.kill(process.pid, signal.SIGKILL)  # it is there
+        with pytest.raises(SessionError, match="ended"):
+            starter.start(waits, os.environ, files)
+
+
+def test_a_starter_that_cannot_load_says_why():
+    with Starter("robot: [", environment()) as broken:
+
+        def wait():
+            while not broken.is_ready(PATIENCE):
+                pass
+
+        with pytest.raises(SessionError, match="the configuration"):
+            wait()
