@@ -5,9 +5,11 @@ import signal
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
 import pytest
 
+from patience import wait_until
 from teleop_core.base.errors import SessionError
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.starter import LOST, Starter
@@ -54,6 +56,14 @@ def test_a_copy_runs_what_it_is_told_with_nothing_on_its_standard_input(start, t
     process = start("a copy", main="code:interact", PYTHON_BASIC_REPL="1")
     assert process.wait(PATIENCE) == 0  # at the end of the input
     assert "InteractiveConsole" in written(tmp_path)
+
+
+def test_a_copy_is_found_by_what_it_runs(start):
+    process = start("teleop_core.nodes", "slave", main="signal:pause")
+    title = Path(f"/proc/{process.pid}/cmdline")
+    wait_until(lambda: " slave" in title.read_text().replace("\0", " "), "its title", PATIENCE)
+    process.kill()
+    assert process.wait(PATIENCE) == -signal.SIGKILL
 
 
 @pytest.mark.parametrize(

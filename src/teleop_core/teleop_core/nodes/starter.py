@@ -275,13 +275,14 @@ def _become(request: dict[str, Any], files: dict[str, int]) -> None:
         if not request["main"]:
             signal.signal(signal.SIGPIPE, signal.SIG_DFL)
             os.execvpe(command[0], command, env)
+        module, _, function = request["main"].partition(":")
+        # Before the environment changes, by whose place in memory the title's is found.
+        setproctitle(" ".join([sys.executable, "-m", module.removesuffix(".start"), *command[1:]]))
         if env.get("PYTHONFAULTHANDLER"):
             faulthandler.enable()
         os.environ.clear()
         os.environ.update(env)
         sys.argv[:] = command
-        module, _, function = request["main"].partition(":")
-        setproctitle(" ".join([sys.executable, "-m", module.removesuffix(".start"), *command[1:]]))
         code = int(getattr(import_module(module), function)() or 0)
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else int(error.code is not None)
