@@ -164,11 +164,13 @@ class _Session:
             self._interrupt.check()
             for line in progress.news():
                 self.say(line)
+            if progress.age() > START_TIMEOUT:
+                text = f"loading what the nodes need got no further for {START_TIMEOUT:g} s"
+                raise SessionError(text)
 
     def _start(self, crew: Crew) -> None:
         for name in crew:
-            child = Child(name, self._parameters, self._env, self._starter)
-            self._children[name] = child
+            self._children[name] = Child(name, self._parameters, self._env, self._starter)
         waiting = [node for nodes in crew.values() for node in nodes]
         home = {node: name for name, nodes in crew.items() for node in nodes}
         progress = _Progress(self._children)
