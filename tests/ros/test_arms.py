@@ -76,7 +76,7 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(peer, tmp_path)
 )
 def test_two_arms_are_recorded_together_and_scored_one_by_one(peer, session_until, is_composed):
     robots = {"": "rcrt1", "left": "puma560"}
-    # Ten processes need more than two processors: an arm that hears too seldom of its hand holds.
+    # In processes of their own, on two processors, an arm that hears too seldom of its hand holds.
     moving = topics.SLAVE_MEASURED_JS if is_composed else topics.MASTER_MEASURED_CP
     listeners = {arm: peer.listen(moving.of_arm(arm)) for arm in robots}
     settings = [
