@@ -183,8 +183,6 @@ def _is_of_hand(key: str) -> bool:
 class Peer:
     """A ROS node of the test beside the nodes under test, on a domain of its own."""
 
-    wait = staticmethod(wait_until)
-
     def __init__(self, folder: Path) -> None:
         self.domain, self._folder = free_domain(), folder
         environment()
@@ -217,6 +215,19 @@ class Peer:
         self._executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
+
+    def wait(self, condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
+        """Result of ``condition`` as soon as it is true.
+
+        Raises:
+            AssertionError: It did not become true; with what each node says.
+        """
+        try:
+            return wait_until(condition, what, timeout)
+        except AssertionError as error:
+            self.observer.listen(0.0)
+            said = (f"{name}: {each.message}" for name, each in self.observer.statuses.items())
+            raise AssertionError("\n".join([str(error), *said])) from error
 
     # -- nodes -----------------------------------------------------------------------------------
 
@@ -279,7 +290,7 @@ class Peer:
             status = self.status(name)
             return status is not None and status.values["state"] == state
 
-        wait_until(reached, f"{name} {state}")
+        self.wait(reached, f"{name} {state}")
 
     def _newest(self, name: str) -> NodeProcess:
         return next(node for node in reversed(self.nodes) if node.name == name)
@@ -292,7 +303,7 @@ class Peer:
             number = status.number(key) if status else 0.0
             return (number,) if status and accept(number) else None
 
-        return wait_until(accepted, f"{name} {key}")[0]
+        return self.wait(accepted, f"{name} {key}")[0]
 
     def has_recorded(self, counts: Mapping[str, int], recorder: str = "recorder") -> bool:
         """Whether a recorder reports more samples than these of each topic."""
@@ -321,7 +332,7 @@ class Peer:
             reliable = profile(topic) if readers else QoSProfile(depth=10)
             self._publishers[topic.name] = self.node.create_publisher(kind, topic.name, reliable)
         own = self._publishers[topic.name]
-        wait_until(lambda: own.get_subscription_count() >= readers, f"readers of {topic.name}")
+        self.wait(lambda: own.get_subscription_count() >= readers, f"readers of {topic.name}")
         return own
 
     def send(self, topic: Topic, stamp_ns: int, values: Any, readers: int = 1) -> None:
@@ -344,7 +355,7 @@ class Peer:
         """Answer of a service."""
         client = self.node.create_client(service, name)
         try:
-            wait_until(client.service_is_ready, f"service {name}")
+            self.wait(client.service_is_ready, f"service {name}")
             future = client.call_async(request)
             self._executor.spin_until_future_complete(future, TIMEOUT)
             assert future.done(), f"no answer from {name}"

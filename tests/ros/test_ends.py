@@ -15,6 +15,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.nodes.children import free_domain
+from teleop_core.nodes.observer import Observer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = [*BUILT_IN, RECORDER_NAME]
@@ -136,9 +137,9 @@ def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_fir
     session = start("--composed")
     session.wait_running()
     lines = [line for line in session.text.splitlines() if not line.startswith("note: ")]
-    (environ,) = {node.environ()["ROS_DOMAIN_ID"] for node in session.nodes()}
-    assert lines[0].endswith(f"ROS_DOMAIN_ID={environ}")
     assert lines[1] == f"recording to {session.bag}"
+    with Observer(int(lines[0].rpartition("ROS_DOMAIN_ID=")[2])) as observer:
+        wait_until(lambda: observer.listen(0.1) or "slave" in observer.statuses, "its nodes there")
     session.signal(signal.SIGINT)
     assert session.wait() == 0
 

@@ -13,8 +13,9 @@ ALONE = """
 import importlib.metadata, sys
 
 sys.modules["teleop_lab"] = sys.modules["teleop_drill"] = None  # cannot be imported
-found = importlib.metadata.entry_points
-importlib.metadata.entry_points = lambda **asked: () if asked else found()  # numba asks for all
+entries = (entry for found in importlib.metadata.distributions() for entry in found.entry_points)
+others = [entry for entry in entries if not entry.group.startswith("teleop_")]
+importlib.metadata.entry_points = importlib.metadata.EntryPoints(others).select
 from teleop_core import cli
 
 sys.exit(cli.main(sys.argv[1:]))

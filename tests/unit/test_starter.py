@@ -118,3 +118,13 @@ def test_a_starter_that_cannot_load_says_why():
 
         with pytest.raises(SessionError, match="the configuration"):
             wait()
+
+
+def test_a_starter_that_gets_no_further_is_given_up(tmp_path):
+    with Starter("", environment(), patience=0.5) as starter, (tmp_path / "log").open("wb") as log:
+        os.kill(starter.pid, signal.SIGSTOP)
+        try:
+            with pytest.raises(SessionError, match=r"no further for 0\.5 s"):
+                starter.start(["true"], os.environ, {"out": log.fileno(), "err": log.fileno()})
+        finally:
+            os.kill(starter.pid, signal.SIGCONT)

@@ -10,11 +10,13 @@ A program adds them with :meth:`Registry.add`. Nothing is imported before it is 
 """
 
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import is_dataclass
+from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Generic, TypeVar
 
 from teleop_core.base.errors import PartError, UnknownNameError
@@ -118,7 +120,7 @@ class Registry(Generic[Part]):
     def _entries(self) -> dict[str, EntryPoint]:
         if self._installed is None:
             found: dict[str, EntryPoint] = {}
-            for entry in entry_points(group=self.group):
+            for entry in _entry_points(tuple(sys.path))(group=self.group):
                 if entry.name in self._builtin or entry.name in found:
                     package = self.group.partition(".")[0]
                     other = found[entry.name].value if entry.name in found else package
@@ -141,6 +143,12 @@ class Registry(Generic[Part]):
             reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
             expected = f"loadable from {entry.value} ({reason})"
             raise PartError(self.kind, name, expected) from error
+
+
+@cache
+def _entry_points(_path: tuple[str, ...]) -> Callable[..., EntryPoints]:
+    """Selection from all there are in the folders of ``sys.path``, read once for all registries."""
+    return entry_points().select
 
 
 def part_check(kind: str, form: type[Part], *calls: str) -> Callable[[str, object], Part]:

@@ -24,13 +24,11 @@ from teleop_core.nodes.observer import WARNING, Observer, Status
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.start import SESSION as SESSION_NODE
-from teleop_core.nodes.starter import Starter
+from teleop_core.nodes.starter import START_TIMEOUT, Starter
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.links import link_texts
 from teleop_core.session.notes import notes_of
 
-START_TIMEOUT = 180.0
-"""A node that is not at work, and gets no further, for this long never will be [s]."""
 SILENCE = 30.0
 """A node at work that has not reported for this long serves nobody [s].
 
@@ -164,9 +162,6 @@ class _Session:
             self._interrupt.check()
             for line in progress.news():
                 self.say(line)
-            if progress.age() > START_TIMEOUT:
-                text = f"loading what the nodes need got no further for {START_TIMEOUT:g} s"
-                raise SessionError(text)
 
     def _start(self, crew: Crew) -> None:
         for name in crew:

@@ -22,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import traceback
 from collections.abc import Mapping, Sequence
 from importlib import import_module
@@ -33,6 +34,8 @@ from teleop_core.base.errors import SessionError
 
 NODE = "teleop_core.nodes.start:main"
 """What runs a node: a function without arguments, which reads ``sys.argv``."""
+START_TIMEOUT = 180.0
+"""Time without any news after which what starts is given up [s]."""
 LOST = 255
 """Exit code of a process whose starter ended before it: nobody knows the true one."""
 _KIND = socket.SOCK_SEQPACKET  # messages stay whole, and an end is seen
@@ -49,9 +52,13 @@ class Starter:
         configuration: Text of the configuration whose stages and kernels are loaded; empty: of
             none, for a single process, which loads its own as fast.
         env: Environment in which it loads.
+        patience: Time for which it may get no further before it is given up [s].
     """
 
-    def __init__(self, configuration: str, env: Mapping[str, str]) -> None:
+    def __init__(
+        self, configuration: str, env: Mapping[str, str], patience: float = START_TIMEOUT
+    ) -> None:
+        self._patience, self._last = patience, time.monotonic()
         self._line, theirs = socket.socketpair(type=_KIND)
         self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
         self._lock, self._is_ready, self.doing = threading.Lock(), False, "starting"
@@ -74,7 +81,7 @@ class Starter:
         """Whether it has loaded; waits so long for news of it [s].
 
         Raises:
-            SessionError: It has ended, with what it wrote.
+            SessionError: It has ended, with what it wrote, or got no further for too long.
         """
         while not self._is_ready and select.select([self._line], (), (), timeout)[0]:
             word = self._line.recv(_LARGEST).decode()
@@ -83,8 +90,14 @@ class Starter:
                 text = os.pread(self._log.fileno(), 20_000, 0).decode(errors="replace").strip()
                 code = self._process.returncode
                 raise SessionError(f"the starter of the nodes ended with {code}: {text}")
+            if word != self.doing:
+                self._last = time.monotonic()
             self._is_ready, self.doing = word == "ready", word
             timeout = 0.0
+        if not self._is_ready and time.monotonic() - self._last > self._patience:
+            raise SessionError(
+                f"what the nodes share got no further for {self._patience:g} s: {self.doing}"
+            )
         return self._is_ready
 
     def start(
@@ -103,7 +116,7 @@ class Starter:
                 names, in place of the copy.
 
         Raises:
-            SessionError: The starter has ended.
+            SessionError: The starter has ended, or has got no further for too long.
         """
         while not self.is_ready(1.0):
             pass

@@ -54,10 +54,11 @@ class Tap(Taker):
         self.count += count
         return count
 
-    def drain(self) -> None:
-        """Keep what has come, unread."""
+    def drain(self) -> bool:
+        """Keep what has come, unread; returns whether anything is kept."""
         while (taken := self.take()) is not None:
             self._kept.append((taken.sent_ns, taken.data))
+        return bool(self._kept)
 
     def kept(self) -> list[tuple[int, Any]]:
         """Messages of :meth:`drain`, each with the time at which it was sent [ns]."""
@@ -141,10 +142,15 @@ class Arm:
         if name in self._taps:
             self._taps.pop(name).close()
 
-    def keep(self, names: list[str]) -> None:
-        """Keep all messages of some topics from now on, beside what :meth:`tap` takes."""
-        for name in names:
-            self._keeping[name] = Tap(self.node, self.path(name), _ROWS[name].ros_type)
+    def keep(self, names: list[str], timeout: float = 2.0) -> None:
+        """Keep all messages of some topics, beside what :meth:`tap` takes.
+
+        Returns once there is one of each, or after a time [s]: until a publisher has found a new
+        reader, nothing that it sends is kept, and a motion that begins earlier is not seen whole.
+        """
+        made = [Tap(self.node, self.path(name), _ROWS[name].ros_type) for name in names]
+        self._keeping.update(zip(names, made, strict=True))
+        self.wait(lambda: all([tap.drain() for tap in made]), timeout)
 
     def kept(self) -> dict[str, list[tuple[int, Any]]]:
         """What was kept, with the times at which it was sent [ns]; nothing is kept any longer."""

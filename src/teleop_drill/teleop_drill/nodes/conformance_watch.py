@@ -27,7 +27,6 @@ class Watch:
     def __init__(self, arm: Arm, fk: Callable[[Array], Array] | None) -> None:
         self._arm, self._fk = arm, fk
         arm.keep([name for name in _NAMES if arm.publishers(name)])
-        arm.pause(0.05)  # so that there are messages from before
 
     def lies(self) -> dict[str, str]:
         """What does not agree, by the topic that says it; ends the watch."""

@@ -20,12 +20,11 @@ from teleop_core.nodes.children import Child, end_all
 from teleop_core.nodes.live import parameter_file
 from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.start import SESSION as SESSION_NODE
-from teleop_core.nodes.starter import Starter
+from teleop_core.nodes.starter import START_TIMEOUT, Starter
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill.exercise import Master
 
 _NEVER_NS = 2**62
-START_TIMEOUT = 180.0
 _HAND, _MASTER, _SIMULATOR = "operator", "haptic_master", "slave_sim"
 _BUSY = "while True: pass"
 _BYSTANDER = "from teleop_drill.nodes.drill_tap import stand_by; stand_by()"
