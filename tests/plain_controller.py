@@ -55,10 +55,11 @@ class Controller(Node):
             (self.create_subscription(String, "misbehave", self._misbehave, 10), self._misbehave),
         ]
         self.place = dict(zip(JOINTS, STANDS, strict=True))
-        self.goal, self.speed = dict(self.place), dict.fromkeys(JOINTS, 0.0)
+        self.goal = dict(self.place)
         self.is_leading, self.arrival = False, 0.0
         self.first, self.largest, self.mode, self.frozen_ns = math.nan, 0.0, "", 0
         self.begun, self.steps = time.monotonic(), 0
+        self.told, self.told_at = dict(self.place), 0.0
 
     def until_next(self) -> float:
         """Time until the next step is due [s]."""
@@ -116,15 +117,19 @@ class Controller(Node):
         for name, most in zip(JOINTS, SPEED, strict=True):
             off = self.goal[name] - self.place[name]
             wanted = off / left if left > 1.0 / RATE else BANDWIDTH * off
-            self.speed[name] = min(max(wanted, -1.1 * most), 1.1 * most)
-            self.place[name] += self.speed[name] / RATE
+            self.place[name] += min(max(wanted, -1.1 * most), 1.1 * most) / RATE
 
     def _said(self) -> JointState:
         names = ["finger", *JOINTS]
         if self.mode == "order":
             names.reverse()
         message = JointState(name=names)
-        values, speeds = {"finger": 0.3, **self.place}, {"finger": 0.0, **self.speed}
+        # Speeds are means since the last message, which may be some steps ago on a busy machine.
+        now = time.monotonic()
+        went = {name: self.place[name] - self.told[name] for name in JOINTS}
+        speeds = {"finger": 0.0} | {name: way / (now - self.told_at) for name, way in went.items()}
+        self.told, self.told_at = dict(self.place), now
+        values = {"finger": 0.3, **self.place}
         message.position = [values[name] for name in names]
         message.velocity = [speeds[name] for name in names]
         message.effort = [math.nan] * len(names)  # as joint_state_broadcaster says what it lacks

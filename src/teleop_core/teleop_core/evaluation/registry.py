@@ -97,6 +97,7 @@ METRICS: Registry[type[Metric]] = Registry(
         "touch": f"{_FOLDER}.touch:TouchMetric",
         "network": f"{_FOLDER}.network:NetworkMetric",
         "passivity": f"{_FOLDER}.passivity:PassivityMetric",
+        "remote_centre": f"{_FOLDER}.remote_centre:RemoteCentreMetric",
         "force_sensing": f"{_FOLDER}.force_sensing:ForceSensingMetric",
         "tremor_filter": f"{_FOLDER}.tremor_filter:TremorFilterMetric",
         "motion": f"{_FOLDER}.motion:MotionMetric",

@@ -83,3 +83,7 @@ class Row(Fields):
     master_filtered_cp_ns: int
     master_filtered_out: Array
     master_filtered_out_ns: int
+    remote_centre_servo_cp: Array
+    remote_centre_servo_cp_ns: int
+    remote_centre_place: Array
+    remote_centre_place_ns: int

@@ -381,6 +381,7 @@ STAGES: Registry[Stage] = Registry(
         "motion_scaling": "teleop_core.chain.mapping.motion_scaling:MOTION_SCALING",
         "network": "teleop_core.chain.network.network:NETWORK",
         "passivity": "teleop_core.chain.passivity.slave_side:PASSIVITY",
+        "remote_centre": "teleop_core.chain.fixtures.remote_centre:REMOTE_CENTRE_STAGE",
         "inverse_kinematics": "teleop_core.chain.mapping.inverse_kinematics:INVERSE_KINEMATICS",
         "slave": "teleop_core.slave.slave:SLAVE",
         "slave_sim": "teleop_core.slave.slave_sim:SLAVE_SIM",

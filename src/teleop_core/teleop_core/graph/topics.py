@@ -345,6 +345,15 @@ PASSIVITY_SERVO_CP = Topic(
     "passivity/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"
 )
 """The slave's command as passivity lets it through."""
+REMOTE_CENTRE_SERVO_CP = Topic(
+    "remote_centre/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"
+)
+"""The slave's command, turned so that the tool passes through its remote centre."""
+REMOTE_CENTRE = Topic(
+    "remote_centre/place", Kind.NUMBERS, passed_on("slave/servo_cp"), "slave_base",
+    columns=("x", "y", "z", "shaft_x", "shaft_y", "shaft_z"), is_seldom=True,
+)  # fmt: skip
+"""The remote centre [m], and the shaft that passes through it, in the tip's frame."""
 NETWORK_MASTER_ENERGY = Topic(
     "network/master_energy", Kind.NUMBERS, arrived("master/energy"), "master_base", columns=ENERGY
 )
@@ -396,5 +405,6 @@ BY_NAME = {
     topic.name: topic
     for topic in (
         *ALL, *NETWORK_TOPICS, *PASSIVITY_TOPICS, MASTER_FILTERED_CP, MASTER_FILTERED_OUT,
+        REMOTE_CENTRE_SERVO_CP, REMOTE_CENTRE,
     )
 }  # fmt: skip

@@ -150,7 +150,7 @@ class Arm:
         """
         made = [Tap(self.node, self.path(name), _ROWS[name].ros_type) for name in names]
         self._keeping.update(zip(names, made, strict=True))
-        self.wait(lambda: all([tap.drain() for tap in made]), timeout)
+        self.wait(lambda: all(tap.drain() for tap in made), timeout)
 
     def kept(self) -> dict[str, list[tuple[int, Any]]]:
         """What was kept, with the times at which it was sent [ns]; nothing is kept any longer."""

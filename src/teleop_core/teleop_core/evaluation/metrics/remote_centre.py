@@ -1,0 +1,85 @@
+"""Remote centre: how far the tool's shaft passes from the place that it must pass through."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.metrics.motion import approach_end_ns
+from teleop_core.evaluation.rows import Row, row
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.topics import REMOTE_CENTRE, SLAVE_MEASURED_CP
+from teleop_core.kernels.geometry import Array, rotations_from_quaternions
+
+GROUP = "remote centre"
+
+
+@dataclass(frozen=True)
+class RemoteCentreScore:
+    """Distances after the approach; None without a remote centre."""
+
+    off_rms_mm: float | None = figure(
+        "mm", "RMS distance from the centre to the line of the shaft, of slave/measured_cp"
+    )
+    off_max_mm: float | None = figure("mm", "largest such distance")
+    least_depth_mm: float | None = figure("mm", "least distance from the centre to the tip")
+
+
+def distances(poses: Array, centre: Array, shaft: Array) -> tuple[Array, Array]:
+    """Distances (N,) [m] from a place to the shafts of tools, and to their tips.
+
+    Args:
+        poses: Of the tips, (N, 7).
+        centre: The place, (3,) or (N, 3) [m].
+        shaft: Along the shaft in the tip's frame, of length 1, (3,) or (N, 3).
+    """
+    ways = poses[:, :3] - centre
+    turned = rotations_from_quaternions(poses[:, 3:7]) * np.broadcast_to(shaft, ways.shape)[:, None]
+    off = np.cross(ways, turned.sum(axis=2))
+    return np.sqrt((off**2).sum(axis=1)), np.sqrt((ways**2).sum(axis=1))
+
+
+class RemoteCentreMetric(Metric):
+    """How well a tool keeps to its remote centre."""
+
+    name = "remote_centre"
+    keys = keys_of("remote_centre", RemoteCentreScore)
+    topics = (REMOTE_CENTRE, SLAVE_MEASURED_CP)
+
+    def __init__(self, context: Context) -> None:
+        self._begin_ns = approach_end_ns(context) if context.span is None else context.span.first_ns
+        self._count, self._squares, self._most, self._least = 0, 0.0, 0.0, np.inf
+        self._last: Array | None = None
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        places, poses = window.around(REMOTE_CENTRE), window.samples(SLAVE_MEASURED_CP)
+        counts = poses.stamp_ns >= self._begin_ns
+        if len(places):
+            self._last = places.values[-1]  # it stays as long as the session lasts
+        if self._last is None or not counts.any():
+            return
+        off, depth = distances(poses.values[counts, :7], self._last[:3], self._last[3:])
+        self._count += len(off)
+        self._squares += float((off**2).sum())
+        self._most = max(self._most, float(off.max()))
+        self._least = min(self._least, float(depth.min()))
+
+    def values(self) -> RemoteCentreScore:
+        """Score of everything so far."""
+        if not self._count:
+            return RemoteCentreScore(None, None, None)
+        rms = 1e3 * float(np.sqrt(self._squares / self._count))
+        return RemoteCentreScore(rms, 1e3 * self._most, 1e3 * self._least)
+
+    def rows(self) -> list[Row]:
+        """All three; nothing without a remote centre."""
+        score = self.values()
+        if score.off_rms_mm is None:
+            return []
+        return [
+            row(GROUP, "shaft beside the centre, RMS", "mm", score.off_rms_mm),
+            row(GROUP, "shaft beside the centre, max", "mm", score.off_max_mm),
+            row(GROUP, "least depth of the tip", "mm", score.least_depth_mm),
+        ]
