@@ -11,6 +11,7 @@ from pathlib import Path
 
 from teleop_core.base.parameters import specs
 from teleop_core.chain.filters.tremor_filter import TREMOR_FILTER
+from teleop_core.chain.fixtures.remote_centre import REMOTE_CENTRE_STAGE
 from teleop_core.evaluation import key_table
 from teleop_core.graph.graph import Graph, Link, build_graph
 from teleop_core.graph.layers import declared_groups
@@ -90,6 +91,9 @@ def topics_page(graph: Graph) -> str:
     with_filter = build_graph(stages=["tremor_filter"])
     writer = "[tremor_filter](tremor_filters.md), a further stage"
     rows += [topic_row(topic, writer, with_filter) for topic in TREMOR_FILTER.writes]
+    with_centre = build_graph(stages=["remote_centre"])
+    writer = "[remote_centre](remote_centre.md), a further stage"
+    rows += [topic_row(topic, writer, with_centre) for topic in REMOTE_CENTRE_STAGE.writes]
     return page([
         "# Topics",
         "CRTK names, standard messages, SI units. Streams are offered reliable with a queue of "

@@ -68,6 +68,14 @@ def test_own_tremor_filter_is_later_than_the_built_in_ones(tmp_path):
     assert late[0] > 4.0 * late[2] > 4.0 * late[4]
 
 
+def test_a_tool_keeps_to_its_port_within_a_millimetre(tmp_path):
+    text = run("remote_centre", tmp_path)
+    off, most = numbers(r"shaft ([\d.]+) mm", text), numbers(r"centre, ([\d.]+) at most", text)
+    assert len(off) == 2
+    assert 0.0 < max(off) < 0.6
+    assert max(off) < max(most) < 2.0
+
+
 def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path):
     at_once, late, later = numbers(r"([\d.]+) s to the goal", run("own_operator", tmp_path))
     # exp(-2 t) takes 29 mm to half a millimetre in 2.0 s; the device's friction makes it uneven.

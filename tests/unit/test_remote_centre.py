@@ -63,9 +63,7 @@ def test_wherever_a_command_jumps_the_tool_turns_no_faster_than_it_may_and_stays
     poses[:, :3] = rng.uniform(-0.3, 0.3, (len(poses), 3))  # beside, behind, at the centre
     centre = np.zeros(3)
     poses[::7, :3] = centre
-    answers, _ = led(
-        poses, place=(0.0, 0.0, 0.0), least_depth=0.02, turn_speed=3.0, begin_time=0.0
-    )
+    answers, _ = led(poses, place=(0.0, 0.0, 0.0), least_depth=0.02, turn_speed=3.0, begin_time=0.0)
     assert beside(answers, centre).max() < 1e-13
     depth = np.linalg.norm(answers[:, :3], axis=1)
     assert depth.min() >= 0.02 * (1.0 - 1e-12)

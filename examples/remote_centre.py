@@ -1,0 +1,25 @@
+"""Let the tool pass through a port, and see how far its shaft passes from it, with and without."""
+
+import teleop_core as tc
+
+
+def main() -> None:
+    """Print for two centres how well the tool keeps to them, and how far the tip lags."""
+    free = tc.run("coarse_box", duration=10.0)
+    error = free.score().position_error_mm
+    print(f"free: tip {error.rms:.2f} mm from its setpoint")
+    for depth in (0.1, 0.05):
+        kept = tc.run(
+            "coarse_box", duration=10.0, stages="remote_centre",
+            settings={"remote_centre.depth": depth},
+        )  # fmt: skip
+        score = kept.score()
+        off, most = (score.value(f"remote_centre.{key}_mm") for key in ("off_rms", "off_max"))
+        print(
+            f"{1e3 * depth:.0f} mm deep: shaft {off or 0.0:.2f} mm from the centre, "
+            f"{most or 0.0:.2f} at most; tip {score.position_error_mm.rms:.2f} mm from its setpoint"
+        )
+
+
+if __name__ == "__main__":
+    main()
