@@ -11,7 +11,8 @@ from teleop_core.base.errors import ParameterError, RecordingError, TeleopError,
 from teleop_core.robots import load_robot
 from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics
 from teleop_core.robots.kinematics import IkStatus
-from teleop_core.session.api import run
+from teleop_core.session.api import configuration, run
+from teleop_core.session.notes import notes_of
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "any_arm.urdf"
 TEXT = EXAMPLE.read_text()
@@ -202,6 +203,19 @@ def test_limits_of_zero_are_unknown_ones_and_never_zero(tmp_path):
     assert {"effort_limit", "speed_limit"} <= set(drives.assumed)
     assert (drives.effort_limit > 0.0).all()
     assert (drives.speed_limit > 0.0).all()
+
+
+def test_a_session_says_which_limits_are_assumed_and_nothing_of_a_file_that_gives_all(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(TEXT.replace('velocity="3.1"', 'velocity="0"'))
+    texts = [notes_of(configuration("coarse_box", robot=str(file), geometry=["tip=tool0"]))
+             for file in (path, EXAMPLE)]  # fmt: skip
+    assert texts[1] == []
+    (note,) = texts[0]
+    speeds = ", ".join(f"{v:g}" for v in load_robot(str(path), tip="tool0").drives.speed_limit)
+    assert f"{path} does not give every joint its limits of velocity" in note
+    assert f"velocity {speeds}" in note
+    assert "effort" not in note
 
 
 def test_friction_that_would_stop_the_links_in_no_time_has_a_motor_behind_it(tmp_path):

@@ -10,7 +10,10 @@ from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import MASTER_MEASURED_CP, MASTER_SERVO_CF
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
+from teleop_core.slave.slave import SLAVE, SlaveParameters
 
 _MASTER, _MAPPING = BUILT_IN[1:3]
 
@@ -35,6 +38,10 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
                 passive_note(master.device, mapping.fixture, delay),
             )
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
+        slave = configuration.group(SLAVE.name, arm)
+        if isinstance(slave, SlaveParameters) and slave.robot.endswith(".urdf"):
+            note = assumed_note(load_robot_set(slave.robot, slave.geometry), slave.robot)
+            found += [note] * (bool(note) and note not in found)
     return found
 
 
@@ -48,6 +55,21 @@ def _delay(configuration: Configuration, arm: str) -> float:
         if link.port.name in around
         and link.reader.arm == arm
         and link.reader.stage.name == ends[link.port.name]
+    )
+
+
+def assumed_note(robot: Robot, file: str) -> str:
+    """Which limits of drives a URDF leaves out, for one joint at least; empty where none is."""
+    words = {"effort_limit": "effort", "speed_limit": "velocity"}
+    drives = robot.drives
+    missing = [] if drives is None else [name for name in words if name in drives.assumed]
+    if drives is None or not missing:
+        return ""
+    entries = {words[name]: drives.entries()[name] for name in missing}
+    found = [f"{word} {', '.join(f'{v:g}' for v in row)}" for word, row in entries.items()]
+    return (
+        f"{file} does not give every joint its limits of {' and '.join(entries)}; with those that "
+        f"are assumed they are, in SI units: {'; '.join(found)}"
     )
 
 
