@@ -71,6 +71,7 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "shares": f"{_PLACE}.shares:SHARES",
         "points24": f"{_PLACE}.points24:POINTS24",
         "stability": f"{_PLACE}.stability:STABILITY",
+        "zwidth": f"{_PLACE}.zwidth:ZWIDTH",
         "mma_frames": f"{_PLACE}.mma_frames:MMA_FRAMES",
         "mma_balance": f"{_PLACE}.mma_spring:MMA_BALANCE",
         "hybrid": f"{_PLACE}.hybrid:HYBRID",

@@ -2,9 +2,11 @@
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from teleop_core.base.parameters import build
@@ -12,12 +14,14 @@ from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.graph.signals import DT, TICK_NS
+from teleop_core.kernels.geometry import Array
 
 _AXIS = 1  # of the master's base, along which the hand is pushed
 _KICK = 1e-5  # speed that the hand is given [m/s]: far from every limit
 _SETTLE, _LOOK = 1.0, 3.0  # before the growth is looked at, and for how long [s]
 _BLOCK = 500  # ticks
 _GRID = 4000
+_LEAST_HAND = 0.01  # least mass of a hand that the parameters allow [kg]
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,45 @@ def exact_boundary(grip: Grip, delay: float, period: float = DT) -> float:
     return min(stiffness for stiffness in found if stiffness > 0.0)
 
 
+def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float = DT) -> float:
+    """Stiffness [N/m] up to which a hand stays calm before a sampled wall, exactly.
+
+    Args:
+        grip: The hand.
+        ticks: Whole periods by which the wall's force comes late.
+        damping: Of the wall, on the difference of two samples [N·s/m].
+        period: Between two samples, for which a force is held [s].
+
+    Source:
+        Eigenvalues of the exact step of mass, spring and damper under a held force, with the
+        places and forces that are under way; the least K of which one leaves the unit circle.
+    """
+    free = np.zeros((3, 3))
+    free[0, 1], free[1] = 1.0, np.array([-grip.stiffness, -grip.damping, 1.0]) / grip.mass
+    step = expm(free * period)
+
+    def grows(stiffness: float) -> bool:
+        # State: place, speed, place before, then forces, the newest first.
+        matrix = np.eye(3 + ticks, k=-1)
+        matrix[:4] = 0.0
+        matrix[:2, :2], matrix[2, 0] = step[:2, :2], 1.0
+        force = np.zeros(3 + ticks)
+        force[0], force[2] = -stiffness - damping / period, damping / period
+        if ticks:
+            matrix[3], matrix[:2, -1] = force, matrix[:2, -1] + step[:2, 2]
+        else:
+            matrix[:2] += np.outer(step[:2, 2], force)
+        return bool(np.abs(np.linalg.eigvals(matrix)).max() > 1.0)
+
+    low, high = 0.0, 1.0
+    while not grows(high):
+        low, high = high, 1.1 * high
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    return low
+
+
 def growth(grip: Grip, delay: float, stiffness: float) -> float:
     """Rate [1/s] at which our hand, device and mapping swing up before a spring; negative: down.
 
@@ -77,7 +120,7 @@ def growth(grip: Grip, delay: float, stiffness: float) -> float:
         delay: Of the force, in whole ticks [s].
         stiffness: Of the spring [N/m], at the place where the slave's tip is commanded.
     """
-    master = HapticMaster(_device(grip))
+    master = HapticMaster(ideal_device(grip))
     mapping = MotionScaling(build(MotionScalingParameters, _MAPPING))
     felt, told = master.signals, mapping.signals
     feel, tell = master.load(), mapping.load()
@@ -107,27 +150,44 @@ def growth(grip: Grip, delay: float, stiffness: float) -> float:
             origin = command
         late.append(-stiffness * (command - origin))
         felt["master_servo_cf"] = told["master_servo_cf"]
-    speed = np.diff(place)[round(_SETTLE / DT) :]
+    return growth_rate(np.diff(place)[round(_SETTLE / DT) :])
+
+
+def growth_rate(speed: Array, period: float = DT) -> float:
+    """Rate [1/s] at which speeds (N,), a period [s] apart, grow from their first half to the last.
+
+    Returns:
+        The rate; negative where they die.
+    """
     half = len(speed) // 2
     before, after = (float(part @ part) for part in (speed[:half], speed[half:]))
-    return 0.5 * math.log(max(after, 1e-300) / max(before, 1e-300)) / (half * DT)
+    return 0.5 * math.log(max(after, 1e-300) / max(before, 1e-300)) / (half * period)
 
 
 def found_boundary(grip: Grip, delay: float) -> float:
-    """Stiffness [N/m] at which our hand, device and mapping neither swing up nor down.
+    """Stiffness [N/m] at which our hand, device and mapping neither swing up nor down."""
+    start = 0.3 * exact_boundary(grip, delay)
+    return boundary_from_below(lambda stiffness: growth(grip, delay, stiffness), start)
+
+
+def boundary_from_below(rate_at: Callable[[float], float], start: float) -> float:
+    """Stiffness [N/m] at which a rate of growth passes 0.
 
     Searched from below, for what swings far is bounded by the largest force and grows no more.
+
+    Args:
+        rate_at: Rate of growth [1/s] by stiffness [N/m].
+        start: A stiffness that is calm [N/m].
     """
-    exact = exact_boundary(grip, delay)
-    high, rate = 0.3 * exact, -math.inf
+    high, rate = start, -math.inf
     while rate < 0.0:
         low, before, high = high, rate, 1.15 * high
-        rate = growth(grip, delay, high)
+        rate = rate_at(high)
     if math.isinf(before):
-        before = growth(grip, delay, low)
+        before = rate_at(low)
     for _ in range(3):
         middle = low + (high - low) * min(max(before / (before - rate), 0.1), 0.9)
-        found = growth(grip, delay, middle)
+        found = rate_at(middle)
         if found < 0.0:
             low, before = middle, found
         else:
@@ -146,10 +206,17 @@ _IDEAL_DEVICE = {
 }  # fmt: skip
 
 
-def _device(grip: Grip) -> HapticMasterParameters:
+def ideal_device(grip: Grip, **own: float) -> HapticMasterParameters:
+    """Our hand and device with a grip: rigid, without friction and steps, never warm.
+
+    Args:
+        grip: The hand. Of one that is hardly heavier than our device, the device is lighter.
+        own: Parameters of the device in their place, such as ``friction``.
+    """
     parameters = build(HapticMasterParameters, _IDEAL_DEVICE)
-    own = {
-        "hand.mass": grip.mass - parameters.device.apparent_mass,
+    device = min(parameters.device.apparent_mass, grip.mass - _LEAST_HAND)
+    return build(HapticMasterParameters, _IDEAL_DEVICE | {
+        "device.apparent_mass": device, "hand.mass": grip.mass - device,
         "hand.stiffness": grip.stiffness, "hand.damping": grip.damping,
-    }  # fmt: skip
-    return build(HapticMasterParameters, _IDEAL_DEVICE | own)
+        **{f"device.{name}": value for name, value in own.items()},
+    })  # fmt: skip

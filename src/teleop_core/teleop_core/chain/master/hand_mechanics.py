@@ -67,7 +67,7 @@ def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: flo
 
     Two masses on each axis: the hand, which a spring and a damper pull along its path, and the
     device with its motors, encoders and dry friction; between them the device's structure, a spring
-    and a damper. Four equal Euler steps, implicit but for the hand's spring: stable for every hand
+    and a damper. Two equal Euler steps, implicit but for the hand's spring: stable for every hand
     and device that the parameters allow. Friction is a force of any direction up to its bound. It
     takes all speed that it can, so the device sticks, without creep, until what pulls is larger.
 

@@ -1,0 +1,215 @@
+"""Sampled wall: our device and the hand that holds it before a wall that is sampled and held."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.chain.mapping.walls import wall_force
+from teleop_core.chain.master.haptic_master import HapticMaster
+from teleop_core.graph.signals import DT
+from teleop_core.graph.topics import MASTER_CONTACT
+from teleop_core.kernels.geometry import Array
+from teleop_lab.experiments.one_axis import (
+    Grip,
+    boundary_from_below,
+    growth_rate,
+    ideal_device,
+    sampled_boundary,
+)
+
+AXIS = 1  # of the master's base, along which the hand is pushed
+FINE = 10
+"""Ticks of the device in a period of the wall: nearly the continuous device of the laws."""
+_BLOCK = 500  # ticks for which noise is drawn at once
+_KICK = 1e-4  # speed that the hand is given [m/s]
+_SECONDS, _SETTLE = 0.6, 0.1  # how long a hand swings, and before the growth is looked at [s]
+_DEAD = 1e-12  # mean square root of speeds [m/s] below which rounding speaks
+_SHARES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
+"""Parts of a step of the wall's force by which a push exceeds one step."""
+_TAKEN, _RETURNED = (MASTER_CONTACT.columns.index(name) for name in ("taken", "returned"))
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A wall on both sides of a plane, sampled once a period of 1 ms.
+
+    Attributes:
+        stiffness: Of its spring [N/m].
+        damping: On the difference of two samples [N·s/m].
+        late: Whole periods by which its force comes late.
+    """
+
+    stiffness: float
+    damping: float = 0.0
+    late: int = 0
+
+
+class Loop:
+    """Our device before a wall; between two samples the force is held.
+
+    The spring is the chain's own (``walls.wall_force``, what ``wall=soft`` renders), without the
+    bound of 5000 N/m that its parameter has.
+
+    Args:
+        grip: The hand.
+        wall: The wall, through the place where the device begins.
+        ticks: Ticks of the device in a period; 1: as in a session.
+        own: Parameters of the device.
+    """
+
+    def __init__(self, grip: Grip, wall: Wall, ticks: int = FINE, **own: float) -> None:
+        self.master = HapticMaster(ideal_device(grip, **own), DT / ticks)
+        self._wall, self._ticks, self._tick = wall, ticks, self.master.load()
+        self._most = float(self.master.parameters["peak_force"])
+        self._depth, self._push, self._left = np.zeros(3), np.zeros(3), 0
+        self._late = deque([0.0] * wall.late)
+        self.origin = self._before = self.reading
+        for name in ("position", "hand", "tip"):
+            self.master.state[name][AXIS] = self.origin
+        self.master.signals["hand_servo_cp_ns"] = 1
+
+    @property
+    def reading(self) -> float:
+        """What the device reads [m]."""
+        return float(self.master.signals["master_measured_cp"][AXIS])
+
+    @property
+    def place(self) -> float:
+        """Where the device is [m]."""
+        return float(self.master.state["position"][AXIS])
+
+    @property
+    def given(self) -> float:
+        """Energy that the present contact gave beyond what it took [J], by ``master/contact``."""
+        contact = self.master.signals["master_contact"]
+        return float(contact[_RETURNED] - contact[_TAKEN])
+
+    def move(self, speed: float) -> None:
+        """Give hand and device a speed [m/s]."""
+        self.master.state["speed"][AXIS] = self.master.state["hand_speed"][AXIS] = speed
+
+    def aim(self, place: float) -> None:
+        """Let the hand want to be at a place [m], without a blow."""
+        for name in ("wanted", "aim"):
+            self.master.state[name][AXIS] = place
+        self.master.signals["hand_servo_cp"][AXIS] = place
+
+    def step(self) -> float:
+        """Sample the wall and hold its force for a period; returns the force [N]."""
+        wall, reading, felt = self._wall, self.reading, self.master.signals
+        self._depth[AXIS] = reading - self.origin
+        length = abs(reading - self.origin)
+        wall_force(self._depth, length, wall.stiffness, self._most, self._push)
+        damper = wall.damping * (reading - self._before) / DT
+        self._before = reading
+        self._late.append(float(self._push[AXIS]) - damper)
+        force = self._late.popleft()
+        felt["master_servo_cf"][AXIS] = force
+        for _ in range(self._ticks):
+            if self._left == 0:
+                self.master.prepare(_BLOCK)
+                self._left = _BLOCK
+            self._left -= 1
+            felt["hand_servo_cp_ns"] += 1
+            self._tick()
+        return force
+
+
+def wall_growth(grip: Grip, wall: Wall, ticks: int = FINE) -> float:
+    """Rate [1/s] at which our hand and device swing up before a wall; negative: down."""
+    loop = Loop(grip, wall, ticks)
+    loop.move(_KICK)
+    place = np.empty(round(_SECONDS / DT))
+    for i in range(len(place)):
+        loop.step()
+        place[i] = loop.place
+    speed: Array = np.diff(place)[round(_SETTLE / DT) :] / DT
+    rest = speed[len(speed) // 2 :]
+    # What is dead does not grow; its rounding may.
+    return -1.0 / DT if np.sqrt(np.mean(rest * rest)) < _DEAD else growth_rate(speed)
+
+
+def wall_boundary(grip: Grip, damping: float, late: int, ticks: int = FINE) -> float:
+    """Stiffness [N/m] of a wall at which our hand and device neither swing up nor down.
+
+    Args:
+        grip: The hand.
+        damping: Of the wall [N·s/m].
+        late: Periods by which its force comes late.
+        ticks: Ticks of the device in a period.
+    """
+    start = 0.3 * sampled_boundary(grip, late, damping)
+    return boundary_from_below(
+        lambda stiffness: wall_growth(grip, Wall(stiffness, damping, late), ticks), start
+    )
+
+
+def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float:
+    """Energy [J] that a hand gets of a press in a wall: in at one speed, out at the same.
+
+    The hand is one that nothing stops. It has pressed once before, so the press begins within the
+    wall. The wall's work is that of ``master/contact``; our device has no viscous friction, so what
+    that takes of the press is counted here.
+
+    Args:
+        damping: Viscous friction of the device [N·s/m].
+        wall: The wall.
+        length: Periods in, and as many out.
+        speed: Of the hand [m/s].
+    """
+    loop = Loop(Grip(5.0, 1.0, 0.1), wall, 1)
+    loop.origin -= 0.25 * speed * DT  # no sample is on the plane: force 0 would end the contact
+    before, lost = 0.0, 0.0
+    for i in range(4 * length):
+        if i == 2 * length:
+            before, lost = loop.given, 0.0
+        loop.move(speed if (i // length) % 2 == 0 else -speed)
+        place = loop.place
+        loop.step()
+        lost += damping * (loop.place - place) ** 2 / DT
+    return loop.given - before - lost
+
+
+def passive_boundary(damping: float, wall_damping: float, length: int, speed: float) -> float:
+    """Stiffness [N/m] above which a press gives energy; the wall's work is linear in it."""
+    tried = 1000.0
+    soft, stiff = (
+        press_energy(damping, Wall(stiffness, wall_damping), length, speed)
+        for stiffness in (0.0, tried)
+    )
+    return tried * soft / (soft - stiff)
+
+
+def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> bool:
+    """Whether a wall moves on by itself that a loose hand presses, by dry friction and steps.
+
+    A push between two steps of the wall's force finds rest only where friction spans half a step:
+    so 2 f >= K Delta. The force is looked at after 0.3 s, for 0.3 s.
+
+    Args:
+        wall: The wall.
+        friction: Dry friction of the device [N].
+        resolution: Step of its reading [m].
+        push: Of the hand [steps of the wall's force].
+    """
+    grip = Grip(0.045, 1.0, 0.1)
+    loop = Loop(grip, wall, 1, friction=friction, position_resolution=resolution)
+    force = push * wall.stiffness * resolution
+    loop.aim(loop.origin + force / grip.stiffness)
+    forces = [loop.step() for _ in range(600)]
+    return bool(np.ptp(forces[-300:]) > 0.0)
+
+
+def restless_boundary(friction: float, resolution: float) -> float:
+    """Stiffness [N/m] above which some push of a loose hand leaves the wall restless, to 0.3 %."""
+
+    def some(stiffness: float) -> bool:
+        wall = Wall(stiffness)
+        return any(is_restless(wall, friction, resolution, 1.0 + share) for share in _SHARES)
+
+    low, high = 100.0, 50_000.0
+    for _ in range(11):
+        middle = (low * high) ** 0.5
+        low, high = (low, middle) if some(middle) else (middle, high)
+    return (low * high) ** 0.5

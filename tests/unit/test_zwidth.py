@@ -1,0 +1,164 @@
+"""Z-width: our device renders walls as stiff as the laws of sampled walls allow, and no stiffer."""
+
+import itertools
+
+import pytest
+
+from teleop_lab import experiments
+from teleop_lab.experiments.one_axis import Grip, exact_boundary, sampled_boundary
+from teleop_lab.experiments.sampled_wall import (
+    Loop,
+    Wall,
+    is_restless,
+    passive_boundary,
+    press_energy,
+    wall_boundary,
+    wall_growth,
+)
+from teleop_lab.experiments.stability import GRIPS
+from teleop_lab.experiments.zwidth import (
+    BARE,
+    DAMPINGS,
+    DEVICES,
+    LATE,
+    WALL_DAMPINGS,
+    linear_law,
+    passive_law,
+    press_law,
+    quiet_law,
+)
+
+PUSHES = [1.0 + share / 8.0 for share in range(1, 8)]
+FINE_TICKS, SESSION_TICKS = "device in ticks of 0.1 ms", "device in a session's ticks"
+
+
+@pytest.fixture(scope="module")
+def outcome():
+    return experiments.run("zwidth")
+
+
+def rows(outcome, *parts):
+    return [row for row in outcome.rows if all(part in row.group for part in parts)]
+
+
+# Stability.
+
+
+def test_our_device_stands_a_late_wall_as_the_linear_law_says(outcome):
+    found = rows(outcome, "linear law", "B = 0", FINE_TICKS)
+    assert len(found) == len(LATE)
+    assert all(row.agrees for row in found)
+
+
+@pytest.mark.parametrize("damping", WALL_DAMPINGS)
+def test_our_device_stands_the_wall_of_the_exact_axis_with_a_damper_too(outcome, damping):
+    found = rows(outcome, "exact sampled axis", f"B = {damping:g}", "0.1 ms")
+    assert len(found) == len(LATE)
+    assert all(abs(row.difference) < 0.06 * row.published for row in found)
+
+
+def test_what_misses_is_the_device_in_whole_ticks_and_the_law_with_a_damper(outcome):
+    missed = {(row.group, row.quantity) for row in outcome.rows if row.agrees is False}
+    whole = f"stable, linear law of Gil 2009, B = 0 N·s/m, {SESSION_TICKS}"
+    damped = f"stable, linear law of Gil 2009, B = 5 N·s/m, {FINE_TICKS}"
+    assert missed == {
+        *((whole, f"force {late} ms later") for late in (0, 1, 2, 3)),
+        *((damped, f"force {late} ms later") for late in (2, 3, 5, 10)),
+        ("diverges, b = B = 5 N·s/m, 0.25 kg, exact sampled axis", SESSION_TICKS),
+    }
+
+
+def test_more_delay_never_allows_a_stiffer_wall(outcome):
+    for row in rows(outcome, "stable"):
+        same = [other for other in outcome.rows if other.group == row.group]
+        for soon, late in itertools.pairwise(same):
+            assert late.published < soon.published
+            assert late.predicted < soon.predicted
+
+
+@pytest.mark.parametrize("late", [0, 1, 2])
+def test_in_ticks_of_a_session_a_wall_is_felt_a_quarter_of_a_tick_early(late):
+    found = wall_boundary(BARE, 0.0, late, 1)
+    assert found == pytest.approx(linear_law(2.0, 0.0, 1e-3 * late - 0.25e-3), rel=0.03)
+
+
+@pytest.mark.parametrize("damping", WALL_DAMPINGS)
+def test_a_wall_swings_up_above_the_exact_boundary_and_down_below_it(damping):
+    exact = sampled_boundary(BARE, 1, damping)
+    below, above = (wall_growth(BARE, Wall(share * exact, damping, 1)) for share in (0.9, 1.1))
+    assert below < 0.0 < above
+
+
+@pytest.mark.parametrize("grip", GRIPS.values(), ids=GRIPS)
+@pytest.mark.parametrize("late", [0, 1, 20, 100])
+def test_a_sampled_axis_has_the_boundary_of_one_that_is_late_by_half_a_tick_more(grip, late):
+    assert sampled_boundary(grip, late) == pytest.approx(
+        exact_boundary(grip, 1e-3 * late), rel=0.02
+    )
+
+
+# Energy.
+
+
+@pytest.mark.parametrize(("damping", "wall_damping"), DAMPINGS)
+@pytest.mark.parametrize("speed", [1e-3, 0.03, 0.3])
+def test_a_passive_wall_gives_no_energy_in_any_press_and_a_stiffer_one_does(
+    damping, wall_damping, speed
+):
+    law = passive_law(damping, wall_damping)
+    soft, stiff = (
+        max(
+            press_energy(damping, Wall(stiffness, wall_damping), n, speed) for n in (1, 2, 3, 7, 30)
+        )
+        for stiffness in (0.98 * law, 1.02 * law + 20.0)
+    )
+    assert soft < 0.0 < stiff
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 10])
+def test_a_press_gives_energy_from_the_stiffness_of_its_law_on_at_every_speed(length):
+    law = press_law(5.0, 3.0, length)
+    for speed in (1e-3, 0.03, 0.3):
+        assert passive_boundary(5.0, 3.0, length, speed) == pytest.approx(law, rel=5e-3)
+
+
+def test_a_wall_gives_energy_long_before_it_diverges():
+    loose = GRIPS["loose"]
+    assert passive_law(loose.damping, loose.damping) == 0.0
+    assert press_energy(loose.damping, Wall(100.0, loose.damping), 1, 0.05) > 0.0
+    assert wall_growth(loose, Wall(0.95 * 19_672.0, loose.damping)) < 0.0
+    assert wall_growth(loose, Wall(1.10 * 19_672.0, loose.damping)) > 0.0
+
+
+# Steps of the reading and dry friction.
+
+
+@pytest.mark.parametrize(("friction", "resolution"), DEVICES)
+def test_friction_holds_a_device_between_steps_up_to_its_law(friction, resolution):
+    law = quiet_law(friction, resolution)
+    below, above = Wall(0.97 * law), Wall(1.03 * law)
+    assert not any(is_restless(below, friction, resolution, push) for push in PUSHES)
+    assert any(is_restless(above, friction, resolution, push) for push in PUSHES)
+
+
+def test_a_restless_wall_pushes_by_one_step_of_its_force():
+    friction, resolution = DEVICES[0]
+    wall = Wall(1.1 * quiet_law(friction, resolution))
+    loop = Loop(Grip(0.045, 1.0, 0.1), wall, 1, friction=friction, position_resolution=resolution)
+    loop.aim(loop.origin + 1.5 * wall.stiffness * resolution)
+    forces = [loop.step() for _ in range(600)][-100:]
+    assert max(forces) - min(forces) == pytest.approx(wall.stiffness * resolution, rel=1e-9)
+
+
+def test_the_law_of_our_own_device_is_the_one_that_the_walls_know(outcome):
+    row = rows(outcome, "rests")[0]
+    assert row.published == pytest.approx(9454.5)
+    assert row.agrees
+    assert any("assumed" in note for note in outcome.notes)
+
+
+def test_figures_of_zwidth_have_numbers_and_words(outcome):
+    assert len(outcome.figures) == 2
+    for figure in outcome.figures:
+        assert figure.sentence.endswith(".")
+        assert all(len(trace["x"]) == len(trace["y"]) > 0 for trace in figure.traces)
