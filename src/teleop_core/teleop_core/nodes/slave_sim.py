@@ -15,5 +15,12 @@ class SlaveSimNode(TickingNode):
         is_silent = setpoint.age() > _SILENCE
         return [f"no slave/setpoint_js for {setpoint.age():.1f} s: stands"] if is_silent else []
 
+    def values(self) -> dict[str, str]:
+        """Punctures of the object, and how deep the needle is, where it can be punctured."""
+        stage = self.stage
+        if not (stage.parameters["puncture_force"] > 0.0 or stage.punctures):
+            return {}
+        return {"punctures": str(stage.punctures), "depth_mm": f"{1e3 * stage.depth:.2f}"}
+
 
 _SILENCE = 0.5  # s

@@ -19,7 +19,7 @@ from teleop_core.graph.topics import (
     SLAVE_TRUE_CP,
 )
 from teleop_core.kernels import pointer
-from teleop_core.kernels.fields import record
+from teleop_core.kernels.fields import fields_of, record
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import dh_kernels, load_robot_set
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
@@ -37,6 +37,7 @@ from teleop_core.slave.stability import Loop, check_friction, check_stable, loop
 from teleop_core.slave.transmission import LONGEST_DELAY
 from teleop_core.slave.world import WORLD_OBJECTS
 from teleop_core.slave.world.parameters import WorldParameters
+from teleop_core.slave.world.puncture import PunctureNumbers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,6 +170,16 @@ class SlaveSim(RunningStage):
         row["slave_measured_js"][: self.robot.n] = s["measured"]
         row["slave_measured_js_ns"] = NO_COMMAND_NS  # where it stands before the first tick
 
+    @property
+    def punctures(self) -> int:
+        """How often the tip has punctured the object so far."""
+        return int(self.state["punctures"])
+
+    @property
+    def depth(self) -> float:
+        """How deep the tip was in the channel of its last puncture a tick ago [m]; 0 outside."""
+        return max(-float(self.state["gap"]), 0.0) if self.state["is_open"] else 0.0
+
     def prepare(self, ticks: int) -> None:
         """Draw the noise of the force sensor for the next ticks."""
         if self.parameters["has_noise"]:
@@ -238,6 +249,8 @@ class SlaveSim(RunningStage):
             p["world_center"] = world.place or world.below(self._tip_at_start())
         p["world_stiffness"], p["world_damping"] = made_of.stiffness, made_of.damping
         p["world_friction"] = made_of.friction
+        for name, *_ in fields_of(PunctureNumbers):
+            p[name] = getattr(world, name)
         self.arm.shape[:] = world.shape
 
     def _tip_at_start(self) -> Array:

@@ -14,6 +14,8 @@ from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF
 
 GROUP = "what the slave touched"
+_NEXT_NS = 5_000_000
+"""Largest time between samples of which the later follows at once [ns]."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,9 @@ class TouchScore:
     peak_n: float | None = figure("N", "largest force on the tip; null without a touch")
     rms_n: float | None = figure("N", "root mean square of the samples with a force")
     share: float | None = figure("1", "share of the recorded time in touch")
+    drop_n: float | None = figure(
+        "N", "largest fall of the force from sample to sample within 5 ms, as of a puncture"
+    )
 
 
 class TouchMetric(Metric):
@@ -39,7 +44,8 @@ class TouchMetric(Metric):
     def __init__(self, context: Context) -> None:
         self._force = Moments()
         self._count, self._time_ns, self._seen = 0, 0, 0
-        self._last = (0, False)  # stamp, and whether it touched
+        self._last = (0, 0.0)  # stamp, and force
+        self._drop = 0.0
         self._begin_ns = 0
         self._trace = Envelope(context.bag.start_ns, context.bag.end_ns, columns=4)
 
@@ -53,23 +59,27 @@ class TouchMetric(Metric):
         magnitude = np.sqrt(np.einsum("ij,ij->i", force, force))
         touches = magnitude > 0.0
         if not self._seen:
-            self._begin_ns, self._last = int(samples.log_ns[0]), (int(samples.log_ns[0]), False)
+            self._begin_ns, self._last = int(samples.log_ns[0]), (int(samples.log_ns[0]), 0.0)
         self._seen += len(touches)
-        before = np.append(self._last[1], touches[:-1])
+        forces = np.append(self._last[1], np.where(np.isfinite(magnitude), magnitude, 0.0))
+        before = forces[:-1] > 0.0
         times = np.diff(np.append(self._last[0], samples.log_ns))
+        falls = -np.diff(forces)[times <= _NEXT_NS]
+        self._drop = max(self._drop, float(falls.max(initial=0.0)))
         self._count += int(np.sum(touches & ~before))
         self._time_ns += int(times[before].sum())  # a value holds until the next one
-        self._last = int(samples.log_ns[-1]), bool(touches[-1])
+        self._last = int(samples.log_ns[-1]), float(forces[-1])
         self._force.add(magnitude[touches])
         self._trace.add(samples.log_ns, np.column_stack((force, magnitude)))
 
     def values(self) -> TouchScore:
         """Score of everything so far."""
         if not self._seen:
-            return TouchScore(None, None, None, None)
+            return TouchScore(None, None, None, None, None)
         spread, whole = self._force.spread(), self._last[0] - self._begin_ns
         share = self._time_ns / whole if whole else 0.0
-        return TouchScore(self._count, spread.max, spread.rms, share)
+        drop = self._drop if self._count else None
+        return TouchScore(self._count, spread.max, spread.rms, share, drop)
 
     def rows(self) -> list[Row]:
         """Number of touches and the largest force; nothing where nothing was touched."""
@@ -79,6 +89,7 @@ class TouchMetric(Metric):
         return [
             Row(GROUP, "touches", "", str(score.count)),
             row(GROUP, "force on the tip, max", "N", score.peak_n),
+            row(GROUP, "largest fall of it", "N", score.drop_n),
             row(GROUP, "share of the time in touch", "%", 100.0 * (score.share or 0.0)),
         ]
 

@@ -12,15 +12,22 @@ from typing import Annotated
 import numpy as np
 
 from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, PerJoint, Vector3
+from teleop_core.kernels.fields import PerJoint, Vector3
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.arm import Arm
+from teleop_core.slave.world.puncture import (
+    PunctureNumbers,
+    PunctureState,
+    follow_channel,
+    puncture,
+    push_in_channel,
+)
 
 _NEAR = 5e-3
 """A tip that is farther outside [m] does not get there within a tick."""
 
 
-class WorldNumbers(Fields):
+class WorldNumbers(PunctureNumbers):
     """Fields of a parameter record with what the object is made of, and where it is."""
 
     has_world: int
@@ -30,23 +37,35 @@ class WorldNumbers(Fields):
     world_center: Vector3
 
 
-class ContactState(Fields):
+class ContactState(PunctureState):
     """Fields of a state record with the contact at the start of the tick."""
 
     is_near: int
-    gap: float
-    normal: Vector3
-    stuck: Vector3
     touch_q: PerJoint
     touch_J: Annotated[Array, 3, "joints"]  # noqa: N815
 
 
 @inner
-def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: Array) -> None:
+def _bend(p: WorldNumbers, s: ContactState, moved: Array, out: float, force: Array) -> float:
+    """Write what the bristle would carry (3,) [N], across the normal; returns its square."""
+    square = 0.0
+    for k in range(3):
+        force[k] = -p.world_stiffness * (s.stuck[k] + moved[k] - out * s.normal[k])
+        square += force[k] * force[k]
+    return square
+
+
+@inner
+def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: Array) -> float:
     """Write the force (3,) [N] on a tip that moved (3,) [m] since the tick began, at a speed (3,).
 
-    Along the normal a spring with the damper of Hunt and Crossley, which pulls nobody back; across
-    it a bristle as stiff, which holds until it carries the dry friction, and then slips.
+    Along the normal a spring with the damper of Hunt and Crossley, which pulls nobody back, and
+    pushes with the puncture force at most; across it a bristle as stiff, which holds until it
+    carries the dry friction, and then slips. In a channel the needle's push along it, and across
+    it the bristle, which does not slip there.
+
+    Returns:
+        The part along the normal [N].
 
     Source:
         Hunt and Crossley 1975, with exponent 1: F = K x (1 + a dx/dt). Dry friction as that of the
@@ -56,19 +75,24 @@ def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: A
     for k in range(3):
         out += s.normal[k] * moved[k]
         rate += s.normal[k] * speed[k]
-    depth = -(s.gap + out)
-    normal_force = p.world_stiffness * depth * (1.0 - p.world_damping * rate)
-    if depth <= 0.0 or normal_force <= 0.0:
-        force[0] = force[1] = force[2] = 0.0
-        return
-    square = 0.0
-    for k in range(3):
-        force[k] = -p.world_stiffness * (s.stuck[k] + moved[k] - out * s.normal[k])
-        square += force[k] * force[k]
-    most, asked = p.world_friction * normal_force, math.sqrt(square)
-    share = most / asked if asked > most else 1.0
+    if s.is_open:
+        normal_force = push_in_channel(p, s, p.world_stiffness, out)
+        _bend(p, s, moved, out, force)
+        share = 1.0 if s.gap < 0.0 else 0.0
+    else:
+        depth = -(s.gap + out)
+        normal_force = p.world_stiffness * depth * (1.0 - p.world_damping * rate)
+        if depth <= 0.0 or normal_force <= 0.0:
+            force[0] = force[1] = force[2] = 0.0
+            return 0.0
+        if p.puncture_force > 0.0:
+            normal_force = min(normal_force, p.puncture_force)
+        most = p.world_friction * normal_force
+        asked = math.sqrt(_bend(p, s, moved, out, force))
+        share = most / asked if asked > most else 1.0
     for k in range(3):
         force[k] = share * force[k] + normal_force * s.normal[k]
+    return normal_force
 
 
 @inner
@@ -152,12 +176,16 @@ def touch(p: WorldNumbers, s: ContactState, arm: Arm, q: Array, dq: Array, felt:
         arm.offset[k] = arm.T[k, 3] - p.world_center[k]
     if s.is_near:
         _slide(s, q)
-    s.gap = arm.distance(arm.offset, arm.shape, arm.normal)
+    before, s.gap = s.gap, arm.distance(arm.offset, arm.shape, arm.normal)
+    if s.punctures > 0:
+        follow_channel(p, s, p.world_stiffness, before, arm.offset, arm.normal)
     s.is_near = int(s.gap < _NEAR)
     if s.is_near:
         _begin_at(s, arm, q, dq, speed)
         _lay_flat(s)
-        _push(p, s, np.zeros(3), speed, force)
+        push = _push(p, s, np.zeros(3), speed, force)
         _keep_bend(p, s, force)
+        if not s.is_open:
+            puncture(p, s, p.world_stiffness, push, arm.offset)
     for k in range(3):
         felt[k], felt[3 + k] = force[k], 0.0

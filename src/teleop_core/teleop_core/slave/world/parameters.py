@@ -68,6 +68,27 @@ class WorldParameters:
         0.3, lower=0.0, upper=2.0, doc="over the normal force, if the material is own"
     )
 
+    puncture_force: float = parameter(
+        0.0, unit="N", lower=0.0, upper=100.0,
+        doc="push along the normal at which the surface gives way to the tip, of any material; "
+        "0: it never does",
+    )  # fmt: skip
+    cutting_force: float = parameter(
+        0.2, unit="N", lower=0.0, upper=100.0,
+        doc="push against a tip that goes deeper than before, behind a punctured surface",
+        source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
+    )  # fmt: skip
+    shaft_friction: float = parameter(
+        20.0, unit="N/m", lower=0.0, upper=1e4,
+        doc="dry friction of the needle's shaft over its depth behind a punctured surface",
+        source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
+    )  # fmt: skip
+    hole_radius: float = parameter(
+        0.002, unit="m", lower=1e-4, upper=0.1,
+        doc="how near to the last hole the tip enters it again without a puncture",
+        source="assumed",
+    )  # fmt: skip
+
     @property
     def made_of(self) -> Material:
         """The material, the own one or that of the name."""

@@ -1,0 +1,333 @@
+"""Puncture: a membrane that gives way, and the push on a needle in the channel behind it."""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import teleop_core as tc
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels import kernel, pointer
+from teleop_core.kernels.fields import record
+from teleop_core.kernels.parts import numbers_of
+from teleop_core.robots.kinematics import FK
+from teleop_core.session.configuration import configure
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.slave.simulation import SimulationNumbers, SimulationState
+from teleop_core.slave.world import WORLD_OBJECTS
+from teleop_core.slave.world.contact import add_push, touch
+
+DT = 1e-3
+PIECES = 16  # pieces of way in a tick, along each of which the push does its work
+TOP = -0.072  # of the block in the scenario ``puncture`` [m]
+
+
+@kernel
+def straight(q, geometry, jacobian):
+    """Jacobian of a tip whose three joints are its place."""
+    jacobian[:] = 0.0
+    for k in range(3):
+        jacobian[k, k] = 1.0
+
+
+class Needle(NamedTuple):
+    """What a contact takes of an arm, of three joints that are the tip's place [m]."""
+
+    jacobian: object
+    distance: object
+    tip: np.ndarray
+    tip_geometry: np.ndarray
+    T: np.ndarray
+    shape: np.ndarray
+    offset: np.ndarray
+    normal: np.ndarray
+    J: np.ndarray
+
+
+def needle(name):
+    """A needle before an object."""
+    part = WORLD_OBJECTS.find(name)
+    return Needle(
+        pointer(straight, FK), part.distance_pointer, np.zeros(3), np.zeros(3), np.zeros((4, 4)),
+        numbers_of(part.parameters()), np.zeros(3), np.zeros(3), np.zeros((6, 3)),
+    )  # fmt: skip
+
+
+@kernel
+def _stored(p, s):
+    """Energy that the object can give back [J]: by its surface, or by springs of the channel."""
+    stiffness, depth, square = p.world_stiffness, max(-s.gap, 0.0), 0.0
+    for k in range(3):
+        square += s.stuck[k] * s.stuck[k] if s.gap < 0.0 else 0.0
+    if s.is_open:
+        ahead = min(max(depth - s.cut, 0.0), p.cutting_force / stiffness)
+        return 0.5 * stiffness * (square + s.drawn * s.drawn + ahead * ahead)
+    most = p.puncture_force / stiffness if p.puncture_force > 0.0 else depth
+    spring = min(depth, most)
+    return 0.5 * stiffness * (square + spring * spring) + p.puncture_force * (depth - spring)
+
+
+@kernel
+def _lead(p, s, arm, way, felt, lost):
+    """Lead the tip along ``way`` (N, 3), a tick each ``PIECES`` rows.
+
+    Writes the force at the begin of each tick (ticks, 6), and the energy lost so far (ticks,): what
+    the tip gave less what is stored.
+    """
+    speed, push, middle, energy = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
+    for tick in range(len(felt)):
+        first = tick * PIECES
+        for k in range(3):
+            arm.T[k, 3] = way[first, k]
+            speed[k] = (way[first + 1, k] - way[first, k]) * PIECES / 1e-3
+        touch(p, s, arm, way[first], speed, felt[tick])
+        lost[tick] = energy - _stored(p, s)
+        if not s.is_near:
+            continue
+        for i in range(first, first + PIECES):
+            for k in range(3):
+                middle[k] = 0.5 * (way[i, k] + way[i + 1, k])
+                speed[k] = (way[i + 1, k] - way[i, k]) * PIECES / 1e-3
+                push[k] = 0.0
+            add_push(p, s, middle, speed, push)
+            for k in range(3):
+                energy -= push[k] * (way[i + 1, k] - way[i, k])
+
+
+def lead(way, name="plane", **numbers):
+    """Forces (ticks, 3) [N], energy lost (ticks,) [J] and state of a tip led through places.
+
+    Args:
+        way: Places (ticks, 3) [m] from the middle of the object.
+        name: Of the object.
+        numbers: Of it, beside those of soft tissue.
+    """
+    # Whole records: numba takes a record for another one that begins with the same fields.
+    p, s = record(SimulationNumbers, 3), record(SimulationState, 3)
+    known = {"world_stiffness": 200.0, "puncture_force": 0.5, "cutting_force": 0.1,
+             "shaft_friction": 20.0, "hole_radius": 2e-3}  # fmt: skip
+    for key, value in (known | numbers).items():
+        p[key] = value
+    times = np.arange(PIECES * (len(way) - 1) + 1) / PIECES
+    fine = np.column_stack([np.interp(times, np.arange(len(way)), column) for column in way.T])
+    felt, lost = np.zeros((len(way) - 1, 6)), np.zeros(len(way) - 1)
+    _lead(p, s, needle(name), fine, felt, lost)
+    return felt[:, :3], lost, s
+
+
+def along_z(*heights, speed=0.02):
+    """Straight way (N, 3) [m] through heights, at a speed [m/s]."""
+    legs = [
+        np.linspace(a, b, max(round(abs(b - a) / speed / DT), 200), endpoint=False)
+        for a, b in pairwise(heights)
+    ]
+    z = np.append(np.concatenate(legs), heights[-1])
+    return np.column_stack((np.zeros((len(z), 2)), z))
+
+
+def test_the_push_rises_to_the_puncture_force_and_falls_to_the_cutting_force():
+    for stiffness in (200.0, 50_000.0):
+        push = lead(along_z(2e-3, -12e-3), world_stiffness=stiffness)[0][:, 2]
+        first = int(push.argmax())
+        assert push[first] == pytest.approx(0.5, rel=1e-9)
+        assert (np.diff(push[:first]) >= 0.0).all()
+        assert push[first + 1] == pytest.approx(0.1, abs=5e-3)
+
+
+def test_a_push_below_the_puncture_force_is_that_of_a_surface_that_is_whole():
+    way = along_z(2e-3, -2.4e-3, 2e-3)
+    pricked, whole = (lead(way, puncture_force=force) for force in (0.5, 0.0))
+    np.testing.assert_array_equal(pricked[0], whole[0])
+    assert pricked[2].punctures == 0
+
+
+def test_friction_of_the_shaft_grows_with_depth_and_turns_with_the_motion():
+    way = along_z(2e-3, -15e-3, 2e-3)
+    push, _, s = lead(way)
+    depth, turned = -way[:-1, 2], int(way[:, 2].argmin())
+    inwards = slice(turned - 100, turned - 10)
+    np.testing.assert_allclose(push[inwards, 2], 0.1 + 20.0 * depth[inwards], rtol=1e-9)
+    outwards = slice(turned + 300, len(push))
+    expected = -20.0 * np.maximum(depth[outwards], 0.0)
+    np.testing.assert_allclose(push[outwards, 2], expected, atol=1e-9)
+    assert s.punctures == 1
+
+
+def test_a_needle_that_rests_is_held_by_its_friction_for_ever():
+    at_rest = np.full(3000, -12e-3)
+    z = np.concatenate((along_z(2e-3, -12e-3)[:, 2], at_rest, at_rest + 1e-4, at_rest))
+    push = lead(np.column_stack((np.zeros((len(z), 2)), z)))[0][:, 2]
+    starts = len(z) - 9000 + 3000 * np.arange(3)
+    for start in starts:
+        assert np.ptp(push[start + 1 : start + 2998]) == 0.0
+    assert push[starts[0] + 9] == pytest.approx(0.1 + 20.0 * 12e-3)
+    assert push[-9] == pytest.approx(push[starts[0] + 9])  # the short way bent it alone
+
+
+def test_a_second_entry_meets_the_shaft_alone_until_it_cuts_deeper():
+    push, _, s = lead(along_z(2e-3, -10e-3, 2e-3, -14e-3))
+    z = along_z(2e-3, -10e-3, 2e-3, -14e-3)[:-1, 2]
+    second = np.arange(len(z)) > len(z) - 700
+    in_old, deeper = second & (z < 0.0) & (z > -9e-3), second & (z < -11e-3)
+    np.testing.assert_allclose(push[in_old, 2], -20.0 * z[in_old], rtol=1e-6)
+    np.testing.assert_allclose(push[deeper, 2], 0.1 - 20.0 * z[deeper], rtol=1e-6)
+    assert s.punctures == 1
+
+
+def test_a_needle_out_of_its_channel_feels_nothing_and_meets_a_whole_surface_elsewhere():
+    way = along_z(2e-3, -8e-3, 2e-3, -8e-3, 2e-3)
+    for aside, punctures in ((1.9e-3, 1), (2.1e-3, 2)):
+        moved = way.copy()
+        moved[len(way) // 2 :, 0] = aside
+        push, _, s = lead(moved)
+        assert not push[way[:-1, 2] > 0.0].any()
+        assert s.punctures == punctures
+
+
+def test_a_needle_that_leaves_the_rim_of_its_hole_as_it_enters_is_in_the_hole():
+    entry = np.array([(1.95e-3, 0.0, 3e-4), (2.05e-3, 0.0, -3e-4), (2.05e-3, 0.0, -6e-4)])
+    rim = np.linspace((0.0, 0.0, 2e-3), entry[0], 200, endpoint=False)
+    way = np.concatenate((along_z(2e-3, -8e-3, 2e-3), rim, entry, entry[2:]))
+    push, lost, s = lead(way)
+    assert s.punctures == 1
+    np.testing.assert_allclose(push[-2:, 2], (20.0 * 3e-4, 20.0 * 6e-4), rtol=1e-9)
+    assert np.diff(lost).min() >= -1e-8
+
+
+def test_a_channel_holds_the_needle_sideways_with_the_stiffness_of_the_object():
+    way = along_z(2e-3, -10e-3, -10e-3)
+    way[-150:, 0] = np.linspace(0.0, 1e-3, 150)
+    push = lead(way)[0]
+    np.testing.assert_allclose(push[-100:, 0], -200.0 * way[-101:-1, 0], rtol=1e-9)
+
+
+def test_a_hole_is_entered_from_its_own_side_alone():
+    """By a tip that goes around a box of 30 mm, along the channel that was made from above."""
+    corners = np.array([(0.0, 17e-3), (0.05, 17e-3), (0.05, -17e-3), (0.0, -17e-3)])
+    around = np.concatenate([np.linspace(a, b, 300) for a, b in pairwise(corners)])
+    around = np.column_stack((np.zeros(len(around)), around))
+    below = along_z(-17e-3, -14e-3)
+    push, _, s = lead(np.concatenate((along_z(17e-3, 8e-3, 17e-3), around, below)), "box")
+    assert s.punctures == 1
+    assert push[-1, 2] == pytest.approx(-200.0 * 1e-3, rel=0.02)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(
+    seed=st.integers(0, 10_000), stiffness=st.floats(100.0, 50_000.0),
+    damping=st.floats(0.0, 3.0), friction=st.sampled_from([0.0, 0.4]),
+    puncture=st.floats(0.05, 10.0), cutting=st.floats(0.0, 15.0), shaft=st.floats(0.0, 10_000.0),
+    hole=st.floats(2e-4, 1e-2),
+)  # fmt: skip
+def test_no_motion_of_a_needle_gets_energy_from_what_it_punctures(
+    seed, stiffness, damping, friction, puncture, cutting, shaft, hole
+):
+    """In no tick: what it gave grows by what is stored, or more."""
+    way = wandering(seed)
+    _, lost, _ = lead(
+        way, world_stiffness=stiffness, world_damping=damping,
+        world_friction=friction, puncture_force=puncture, cutting_force=cutting,
+        shaft_friction=shaft, hole_radius=hole,
+    )  # fmt: skip
+    # Where the force has a corner, the sum over the pieces of a tick errs by as much.
+    piece = np.abs(np.diff(way, axis=0)).max() / PIECES
+    assert lost[0] == 0.0
+    assert np.diff(lost).min() >= -1e-5 * lost[-1] - 0.25 * stiffness * piece * piece
+
+
+def wandering(seed, ticks=3000):
+    """Way (N, 3) [m] that wanders through the surface at z = 0, and begins and ends above it."""
+    rng, times = np.random.default_rng(seed), DT * np.arange(ticks)
+    rates, phases = rng.uniform(0.3, 6.0, (6, 3)), rng.uniform(0.0, 2.0 * np.pi, (6, 3))
+    sizes = rng.normal(size=(6, 3)) * (1e-3, 1e-3, 5e-3)
+    way = np.einsum(
+        "ij,nij->nj", sizes, np.sin(2.0 * np.pi * times[:, None, None] * rates + phases)
+    )
+    share = np.minimum(1.0, np.minimum(times, times[::-1]) / 0.2)
+    way[:, 2] = share * (way[:, 2] - 2e-3) + (1.0 - share) * 0.01
+    return way
+
+
+@pytest.mark.parametrize("name", ["box", "sphere", "cylinder", "capsule"])
+def test_a_closed_motion_through_any_object_costs_energy(name):
+    top = {"box": 0.015, "sphere": 0.015, "cylinder": 0.015, "capsule": 0.01}[name]
+    for seed in range(20):
+        _, lost, s = lead(wandering(seed) + np.array((0.0, 0.0, top)), name)
+        assert lost.min() > -1e-6
+        assert lost[-1] > 0.0 or not s.punctures
+
+
+@pytest.fixture(scope="module")
+def pierced():
+    """Session of the scenario ``puncture``, and its signals."""
+    session = VirtualTime(configure("puncture"))
+    return session, session.run(24_000)
+
+
+def test_in_the_scenario_the_hand_pierces_a_membrane_once_and_enters_it_twice(pierced):
+    session, rows = pierced
+    stage, push, z = session.stages["slave_sim"], rows["slave_true_cf"], rows["slave_true_cp"][:, 2]
+    drops = np.flatnonzero(np.diff(push[:, 2]) < -0.3)
+    assert len(drops) == 1
+    assert push[:, 2].max() == push[drops[0], 2] == pytest.approx(0.5, rel=1e-9)
+    assert np.sum(np.diff((z < TOP - 5e-3).astype(int)) == 1) == 2
+    assert not push[z > TOP].any()
+    assert not rows["slave_operation"][:, 4].any()
+    assert (stage.punctures, stage.depth) == (1, 0.0)
+
+
+def test_the_hand_feels_the_membrane_give_way(pierced):
+    force = pierced[1]["master_servo_cf"][:, :3]
+    size = np.linalg.norm(force, axis=1)
+    assert size.max() == pytest.approx(0.5, rel=1e-2)
+    assert -np.diff(size).min() > 0.3
+
+
+def test_the_stage_tells_punctures_and_depth_and_forgets_them_at_its_begin():
+    session = VirtualTime(configure("puncture"))
+    rows, stage = session.run(11_800), session.stages["slave_sim"]
+    assert stage.punctures == 1
+    assert stage.depth == pytest.approx(TOP - rows["slave_true_cp"][-1, 2], abs=1e-4)
+    stage.reset()
+    assert (stage.punctures, stage.depth) == (0, 0.0)
+
+
+@pytest.mark.parametrize("plant", ["ideal", "hardware"])
+def test_an_arm_with_a_needle_is_given_no_energy_by_what_it_punctures(plant):
+    rows = VirtualTime(configure("puncture", settings=[f"plant={plant}"])).run(24_000)
+    force, tip = rows["slave_true_cf"][:, :3], rows["slave_true_cp"][:, :3]
+    power = np.einsum("ij,ij->i", 0.5 * (force[1:] + force[:-1]), np.diff(tip, axis=0))
+    given_to_it = np.cumsum(power)
+    assert force[:, 2].max() == pytest.approx(0.5, rel=1e-9)
+    assert given_to_it.min() < -1e-3
+    assert given_to_it.max() <= 1e-3 * np.abs(power).sum()
+
+
+def test_the_score_has_the_fall_of_the_force():
+    score = tc.run("puncture", duration=12.0).score()
+    assert score.value("touch.peak_n") == pytest.approx(0.5, rel=1e-3)
+    assert score.value("touch.drop_n") == pytest.approx(0.4, abs=0.02)
+    assert tc.run("palpation", duration=10.0).score().value("touch.drop_n") < 0.05
+
+
+def test_without_a_puncture_force_nothing_of_a_needle_changes_a_bit():
+    needles = ["world.cutting_force=3.0", "world.shaft_friction=500.0", "world.hole_radius=0.01"]
+    plain, other = (
+        VirtualTime(configure("palpation", settings=given)).run(10_000) for given in ([], needles)
+    )
+    assert plain["slave_true_cf"].any()
+    for name in plain.dtype.names:
+        np.testing.assert_array_equal(plain[name], other[name])
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ["puncture_force=-0.1", "cutting_force=-1.0", "shaft_friction=nan", "hole_radius=0.0"],
+)
+def test_numbers_that_no_needle_has_are_refused_by_name(setting):
+    with pytest.raises(ParameterError, match=setting.partition("=")[0]) as error:
+        configure("puncture", settings=[f"world.{setting}"])
+    assert "\n" not in str(error.value)
