@@ -251,7 +251,7 @@ def test_what_the_command_prints_and_writes_is_what_replay_takes(tmp_path, teleo
 
 
 @pytest.mark.slow
-def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop):
+def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop_again):
     bag = saved("da_vinci_30", 2.0, tmp_path)
     for arguments, expected in (
         (["nothing"], "recording or scenario is 'nothing'"),
@@ -262,7 +262,7 @@ def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop):
         ([bag, "--html", tmp_path / "no" / "x.html"], "make it first"),
         ([bag, "--arm", "left"], "arm of"),
     ):
-        said = teleop("reach", *arguments, code=2).stderr.splitlines()
+        said = teleop_again("reach", *arguments, code=2).stderr.splitlines()
         told = [line for line in said if not line.startswith("compiling")]
         assert len(told) == 1
         assert expected in told[0]
