@@ -104,9 +104,14 @@ SHORT = {"duration": 8.0, "approach_time": 1.0, "buttons.fixture": (1.5,)}
 
 
 @pytest.fixture(scope="module")
-def outcomes():
-    """Experiments with plots of every kind, of sessions that are shorter than the source's."""
-    bench = experiments.Bench(settings=SHORT)
+def bench():
+    """Sessions that are shorter than the source's, each run once for all tests."""
+    return experiments.Bench(settings=SHORT)
+
+
+@pytest.fixture(scope="module")
+def outcomes(bench):
+    """Experiments with plots of every kind."""
     names = ("resolution", "workspace", "master_slave", "gravity", "hybrid", "mma_frames")
     return experiments.run_several(names, bench=bench)
 
@@ -142,8 +147,8 @@ def test_sessions_that_several_experiments_need_run_once(outcomes):
     assert again.to_json() == found.to_json()
 
 
-def test_gravity_off_is_clearly_worse_under_the_sources_controller(outcomes):
-    found = next(outcome for outcome in outcomes if outcome.name == "gravity")
+def test_gravity_off_is_clearly_worse_under_the_sources_controller(bench):
+    found = experiments.run("gravity", bench=bench)
     for mode in ("coarse", "fine"):
         ratio = found.row("without over with", f"position error, RMS, {mode}")
         assert ratio.predicted > 1.5
