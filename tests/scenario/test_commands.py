@@ -73,8 +73,8 @@ def test_replay_with_the_same_configuration_is_bit_identical(teleop, recording, 
         assert np.array_equal(a.stamp_ns, b.stamp_ns), topic.name
 
 
-def test_replay_with_another_configuration_answers_what_if(teleop, recording, tmp_path):
-    teleop("replay", recording, "--out", tmp_path / "what_if", "--set", "fine_gain=0.5")
+def test_replay_with_another_configuration_answers_what_if(teleop_again, recording, tmp_path):
+    teleop_again("replay", recording, "--out", tmp_path / "what_if", "--set", "fine_gain=0.5")
     first, other = Bag(recording), Bag(tmp_path / "what_if")
     assert np.array_equal(
         first.read(topics.MASTER_MEASURED_CP).values, other.read(topics.MASTER_MEASURED_CP).values
@@ -123,6 +123,14 @@ def test_evaluate_prints_a_table_and_writes_json_and_page(teleop, recording, tmp
     assert "<html" in page.read_text()[:500].lower()
 
 
+def test_a_process_that_has_loaded_tells_wrong_use_as_a_fresh_one_does(
+    teleop, teleop_again, tmp_path
+):
+    wrong = ("sim", "--set", "robot=r2d2", "--out", tmp_path / "bag")
+    fresh, copied = (one_line(run(*wrong, code=2)) for run in (teleop, teleop_again))
+    assert copied == fresh
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -139,8 +147,8 @@ def test_evaluate_prints_a_table_and_writes_json_and_page(teleop, recording, tmp
         (["--config", "/nowhere.yaml"], ["/nowhere.yaml", "No such file"]),
     ],
 )
-def test_sim_refuses_wrong_input_in_one_line(teleop, tmp_path, arguments, words):
-    line = one_line(teleop("sim", *arguments, "--out", tmp_path / "bag", code=2))
+def test_sim_refuses_wrong_input_in_one_line(teleop_again, tmp_path, arguments, words):
+    line = one_line(teleop_again("sim", *arguments, "--out", tmp_path / "bag", code=2))
     for word in words:
         assert word in line
     assert not (tmp_path / "bag").exists()
@@ -157,10 +165,12 @@ def test_sim_refuses_wrong_input_in_one_line(teleop, tmp_path, arguments, words)
         ("slave: {ros__parameters: {command_timeout: 1}}", "float"),
     ],
 )
-def test_sim_refuses_wrong_parameter_files_in_one_line(teleop, tmp_path, text, word):
+def test_sim_refuses_wrong_parameter_files_in_one_line(teleop_again, tmp_path, text, word):
     file = tmp_path / "wrong.yaml"
     file.write_text(text)
-    assert word in one_line(teleop("sim", "--config", file, "--out", tmp_path / "bag", code=2))
+    assert word in one_line(
+        teleop_again("sim", "--config", file, "--out", tmp_path / "bag", code=2)
+    )
 
 
 @pytest.mark.slow
@@ -177,26 +187,26 @@ def make_foreign(path: Path) -> None:
         writer.write_block({topics.MASTER_BUTTONS: (stamps, np.zeros((2, 3)), stamps)})
 
 
-def test_replay_and_evaluate_name_what_a_bag_lacks(teleop, tmp_path):
+def test_replay_and_evaluate_name_what_a_bag_lacks(teleop_again, tmp_path):
     make_foreign(tmp_path / "foreign")
     replay, evaluate = ("replay", "--out", tmp_path / "out"), ("evaluate",)
     for command, lacking in ((replay, "no topic of poses"), (evaluate, "measured_cp")):
-        line = one_line(teleop(command[0], tmp_path / "foreign", *command[1:], code=2))
+        line = one_line(teleop_again(command[0], tmp_path / "foreign", *command[1:], code=2))
         assert lacking in line
         assert "master/buttons" in line
     assert not (tmp_path / "out").exists()
 
 
-def test_a_missing_a_truncated_and_an_empty_bag_are_told_apart(teleop, recording, tmp_path):
-    assert "does not exist" in one_line(teleop("evaluate", tmp_path / "none", code=2))
+def test_a_missing_a_truncated_and_an_empty_bag_are_told_apart(teleop_again, recording, tmp_path):
+    assert "does not exist" in one_line(teleop_again("evaluate", tmp_path / "none", code=2))
     cut = tmp_path / "cut"
     shutil.copytree(recording, cut)
     file = next(cut.glob("*.mcap"))
     os.truncate(file, file.stat().st_size // 2)
-    assert "recover" in one_line(teleop("evaluate", cut, code=2))
+    assert "recover" in one_line(teleop_again("evaluate", cut, code=2))
     with BagWriter(tmp_path / "empty", [topics.MASTER_BUTTONS], ()):
         pass
-    assert "no messages" in one_line(teleop("evaluate", tmp_path / "empty", code=2))
+    assert "no messages" in one_line(teleop_again("evaluate", tmp_path / "empty", code=2))
 
 
 def test_recover_saves_what_a_truncated_bag_holds(teleop, recording, tmp_path):

@@ -38,8 +38,8 @@ def test_experiment_prints_published_beside_predicted(teleop):
     assert shown.splitlines()[-1].endswith("rows are not judged")
 
 
-def test_help_teaches_what_a_mark_means(teleop):
-    shown = teleop("experiment", "--help").stdout
+def test_help_teaches_what_a_mark_means(teleop_again):
+    shown = teleop_again("experiment", "--help").stdout
     assert "teleop experiment all --html" in shown
     assert "not whether a number is small" in shown
 
@@ -65,19 +65,19 @@ def test_json_holds_every_number_exactly(teleop, tmp_path):
         (("resolution", "--seed", "one"), "invalid int value"),
     ],
 )
-def test_wrong_use_is_told_in_one_line_and_writes_nothing(teleop, tmp_path, arguments, told):
+def test_wrong_use_is_told_in_one_line_and_writes_nothing(teleop_again, tmp_path, arguments, told):
     texts = [argument.format(folder=tmp_path) for argument in arguments]
-    done = teleop("experiment", *texts, code=2)
+    done = teleop_again("experiment", *texts, code=2)
     assert told in one_line(done)
     assert not list(tmp_path.iterdir())
 
 
-def test_file_that_exists_is_kept_until_the_new_one_is_whole(teleop, tmp_path):
+def test_file_that_exists_is_kept_until_the_new_one_is_whole(teleop_again, tmp_path):
     file = tmp_path / "found.json"
     file.write_text("before")
-    teleop("experiment", "resolution", "nosuch", "--json", file, code=2)
+    teleop_again("experiment", "resolution", "nosuch", "--json", file, code=2)
     assert file.read_text() == "before"
-    teleop("experiment", "resolution", "--json", file)
+    teleop_again("experiment", "resolution", "--json", file)
     assert json.loads(file.read_text())["experiments"]
     assert [path.name for path in tmp_path.iterdir()] == ["found.json"]
 
@@ -104,9 +104,14 @@ SHORT = {"duration": 8.0, "approach_time": 1.0, "buttons.fixture": (1.5,)}
 
 
 @pytest.fixture(scope="module")
-def outcomes():
-    """Experiments with plots of every kind, of sessions that are shorter than the source's."""
-    bench = experiments.Bench(settings=SHORT)
+def bench():
+    """Sessions that are shorter than the source's, each run once for all tests."""
+    return experiments.Bench(settings=SHORT)
+
+
+@pytest.fixture(scope="module")
+def outcomes(bench):
+    """Experiments with plots of every kind."""
     names = ("resolution", "workspace", "master_slave", "gravity", "hybrid", "mma_frames")
     return experiments.run_several(names, bench=bench)
 
@@ -142,8 +147,8 @@ def test_sessions_that_several_experiments_need_run_once(outcomes):
     assert again.to_json() == found.to_json()
 
 
-def test_gravity_off_is_clearly_worse_under_the_sources_controller(outcomes):
-    found = next(outcome for outcome in outcomes if outcome.name == "gravity")
+def test_gravity_off_is_clearly_worse_under_the_sources_controller(bench):
+    found = experiments.run("gravity", bench=bench)
     for mode in ("coarse", "fine"):
         ratio = found.row("without over with", f"position error, RMS, {mode}")
         assert ratio.predicted > 1.5

@@ -107,10 +107,10 @@ def test_file_of_parts_takes_what_stands_beside_it_before_and_after_the_command(
         ("x = (\n", r"SyntaxError: .*line 1\)"),
     ],
 )
-def test_file_of_parts_that_raises_is_told_with_its_line(teleop, tmp_path, text, told):
+def test_file_of_parts_that_raises_is_told_with_its_line(teleop_again, tmp_path, text, told):
     file = tmp_path / "wrong.py"
     file.write_text(text)
-    (line,) = teleop("parts", "--parts", file, code=2).stderr.splitlines()
+    (line,) = teleop_again("parts", "--parts", file, code=2).stderr.splitlines()
     assert str(file) in line
     assert re.search(told, line), line
 

@@ -1,6 +1,7 @@
 """Reach: what it says of people's motions is what sessions do, and what it proposes is followed."""
 
 import re
+from functools import cache
 
 import numpy as np
 import pandas
@@ -27,6 +28,12 @@ def followed(session: tc.Recording) -> float:
     told = session["slave/reach"]
     held = np.diff(told.stamp_ns, append=2 * told.stamp_ns[-1] - told.stamp_ns[-2])
     return float(held[told["limit"] == Limit.NONE].sum() / held.sum())
+
+
+@cache
+def proposed(name: str, robot: str, seconds: float) -> lab.Reach:
+    """Answer for a person, looked for once: it takes seconds."""
+    return lab.reach(person(name, seconds), robot=robot)
 
 
 def pinocchio_rcrt1() -> pinocchio.Model:
@@ -90,10 +97,9 @@ def picked(axes: tuple[str, ...]) -> np.ndarray:
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("name", PEOPLE)
 def test_a_proposal_is_followed_by_the_session_as_it_says(name, robot):
-    hand = person(name, SECONDS)
-    reach = lab.reach(hand, robot=robot)
+    reach = proposed(name, robot, SECONDS)
     assert reach.proposed.share >= reach.goal == 0.99
-    session = tc.replay(hand, robot=robot, settings=reach.settings())
+    session = tc.replay(person(name, SECONDS), robot=robot, settings=reach.settings())
     assert abs(followed(session) - reach.proposed.share) <= AGREE
     assert followed(session) >= 0.985
     assert abs(session.score().value("reach.followed_share") - followed(session)) <= AGREE
@@ -180,7 +186,7 @@ def test_a_hand_at_rest_is_followed_where_it_is():
 
 
 def test_a_proposal_keeps_to_limits_and_gains():
-    reach = lab.reach(person("motion_capture", SECONDS), robot="rcrt1")
+    reach = proposed("motion_capture", "rcrt1", SECONDS)
     placement, arm = reach.proposed.placement, tc.load_robot("rcrt1")
     assert ((arm.lower <= placement.start) & (placement.start <= arm.upper)).all()
     assert 0.0 < placement.coarse_gain < 1.0
@@ -190,15 +196,16 @@ def test_a_proposal_keeps_to_limits_and_gains():
 
 
 def test_the_same_question_has_the_same_answer():
-    first, second = (lab.reach(person("da_vinci_36", 12.0), robot="rcrt1") for _ in range(2))
+    first = proposed("da_vinci_36", "rcrt1", 12.0)
+    second = lab.reach(person("da_vinci_36", 12.0), robot="rcrt1")
     assert first.settings() == second.settings()
     assert first.given.share == second.given.share
     assert first.proposed.share == second.proposed.share
 
 
 def test_a_lower_goal_is_never_paid_with_a_lower_gain():
-    hand = person("da_vinci_36", 12.0)
-    high, low = (lab.reach(hand, robot="rcrt1", share=s).proposed for s in (0.99, 0.9))
+    high = proposed("da_vinci_36", "rcrt1", 12.0).proposed
+    low = lab.reach(person("da_vinci_36", 12.0), robot="rcrt1", share=0.9).proposed
     assert low.share >= 0.9
     larger = (low.placement.rotation_gain, low.placement.coarse_gain)
     assert larger >= (high.placement.rotation_gain, high.placement.coarse_gain)
@@ -251,7 +258,7 @@ def test_what_the_command_prints_and_writes_is_what_replay_takes(tmp_path, teleo
 
 
 @pytest.mark.slow
-def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop):
+def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop_again):
     bag = saved("da_vinci_30", 2.0, tmp_path)
     for arguments, expected in (
         (["nothing"], "recording or scenario is 'nothing'"),
@@ -262,7 +269,7 @@ def test_the_command_tells_wrong_use_in_one_line(tmp_path, teleop):
         ([bag, "--html", tmp_path / "no" / "x.html"], "make it first"),
         ([bag, "--arm", "left"], "arm of"),
     ):
-        said = teleop("reach", *arguments, code=2).stderr.splitlines()
+        said = teleop_again("reach", *arguments, code=2).stderr.splitlines()
         told = [line for line in said if not line.startswith("compiling")]
         assert len(told) == 1
         assert expected in told[0]

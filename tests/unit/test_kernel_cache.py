@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -173,20 +174,56 @@ def write_all(folder: Path, modules: dict[str, str]) -> Path:
     return folder
 
 
-def test_kernels_of_unchanged_files_come_from_the_cache(tmp_path):
-    folder = write_all(tmp_path, CALLS)
+def again(folder: Path) -> Path:
+    """The folder as it was when this was first called for it; kernels are kept for its path."""
+    kept = folder.with_name(f"{folder.name}_kept")
+    if kept.exists():
+        shutil.rmtree(folder)
+        shutil.copytree(kept, folder)
+    else:
+        shutil.copytree(folder, kept)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def calls_run(tmp_path_factory):
+    folder = write_all(tmp_path_factory.mktemp("calls"), CALLS)
     assert run(folder) == ([70.0, 7.0], 0)
-    assert run(folder) == ([70.0, 7.0], 1)
+    return folder
+
+
+@pytest.fixture
+def calls(calls_run):
+    """Folder of calls after a first run, the same for each test."""
+    return again(calls_run)
+
+
+CONSTANT_VALUES = [20.0, 20.0, 11.0, 20.0, 15.0, 10.0, 20.0, 21.0]
+
+
+@pytest.fixture(scope="module")
+def constants_run(tmp_path_factory):
+    folder = write_all(tmp_path_factory.mktemp("constants"), CONSTANTS)
+    assert run(folder) == (CONSTANT_VALUES, 0)
+    return folder
+
+
+@pytest.fixture
+def constants(constants_run):
+    """Folder of constants after a first run, the same for each test."""
+    return again(constants_run)
+
+
+def test_kernels_of_unchanged_files_come_from_the_cache(calls):
+    assert run(calls) == ([70.0, 7.0], 1)
 
 
 @pytest.mark.parametrize("name", ["inner.py", "middle.py", "outer.py"])
-def test_change_of_one_digit_in_a_called_file_reaches_its_cached_callers(tmp_path, name):
-    folder = write_all(tmp_path, CALLS)
-    run(folder)
+def test_change_of_one_digit_in_a_called_file_reaches_its_cached_callers(calls, name):
     changed = CALLS[name].replace("2.0 * x", "5.0 * x").replace("+ 1.0", "+ 4.0")
-    write(folder / name, changed.replace("10.0 *", "20.0 *"))
+    write(calls / name, changed.replace("10.0 *", "20.0 *"))
     assert (
-        run(folder)
+        run(calls)
         == {
             "inner.py": ([160.0, 16.0], 0),
             "middle.py": ([100.0, 10.0], 0),
@@ -195,24 +232,19 @@ def test_change_of_one_digit_in_a_called_file_reaches_its_cached_callers(tmp_pat
     )
 
 
-def test_changed_constant_of_another_module_reaches_every_cached_kernel_that_uses_it(tmp_path):
-    folder = write_all(tmp_path, CONSTANTS)
-    before = [20.0, 20.0, 11.0, 20.0, 15.0, 10.0, 20.0, 21.0]
-    assert run(folder) == (before, 0)
-    assert run(folder) == (before, len(before))
+def test_changed_constant_of_another_module_reaches_every_cached_kernel_that_uses_it(constants):
+    assert run(constants) == (CONSTANT_VALUES, len(CONSTANT_VALUES))
     text = CONSTANTS["values.py"]
     for old, new in CHANGES.items():
         assert old in text
         text = text.replace(old, new)
-    write(folder / "values.py", text)
-    assert run(folder) == ([10.0, 10.0, 13.0, 40.0, 17.0, 20.0, 10.0, 23.0], 0)
+    write(constants / "values.py", text)
+    assert run(constants) == ([10.0, 10.0, 13.0, 40.0, 17.0, 20.0, 10.0, 23.0], 0)
 
 
-def test_constant_that_no_kernel_uses_leaves_the_cache_alone(tmp_path):
-    folder = write_all(tmp_path, CONSTANTS)
-    first = run(folder)[0]
-    write(folder / "values.py", CONSTANTS["values.py"] + "OTHER = 1\n")
-    assert run(folder) == (first, len(first))
+def test_constant_that_no_kernel_uses_leaves_the_cache_alone(constants):
+    write(constants / "values.py", CONSTANTS["values.py"] + "OTHER = 1\n")
+    assert run(constants) == (CONSTANT_VALUES, len(CONSTANT_VALUES))
 
 
 def test_kernel_from_generated_source_is_compiled_once_for_all_processes(tmp_path):
@@ -252,13 +284,13 @@ print(sum(module.factor.stats.cache_hits.values()))
 
 
 @pytest.mark.parametrize("left", [0, 0.5])
-def test_broken_files_of_the_cache_are_made_again(tmp_path, left):
-    folder = write_all(tmp_path, CALLS)
-    run(folder)
-    for file in (folder / "c").rglob("*.nb?"):
+def test_broken_files_of_the_cache_are_made_again(calls, left):
+    files = list((calls / "c").rglob("*.nb?"))
+    assert files
+    for file in files:
         file.write_bytes(file.read_bytes()[: int(left * file.stat().st_size)])
-    assert run(folder) == ([70.0, 7.0], 0)
-    assert run(folder) == ([70.0, 7.0], 1)
+    assert run(calls) == ([70.0, 7.0], 0)
+    assert run(calls) == ([70.0, 7.0], 1)
 
 
 def test_kernel_works_where_its_cache_cannot_be_written_any_more(tmp_path):
@@ -326,31 +358,36 @@ def in_store(folder: Path, place: Path) -> tuple[list[float], int]:
     return [float(value) for value in values.split()], int(hits)
 
 
-def test_a_second_copy_of_a_source_finds_what_the_first_one_compiled(tmp_path):
-    first, second = tmp_path / "first", tmp_path / "second"
-    for folder in (first, second):
-        folder.mkdir()
-        write_all(folder, CALLS)
-    assert in_store(first, tmp_path / "kept") == ([70.0, 7.0], 0)
-    assert in_store(second, tmp_path / "kept") == ([70.0, 7.0], 1)
-    assert not list(tmp_path.glob("*/__pycache__/*.nb?"))
+@pytest.fixture(scope="module")
+def stored_run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stored")
+    for copy in (folder / "first", folder / "second"):
+        copy.mkdir()
+        write_all(copy, CALLS)
+    assert in_store(folder / "first", folder / "kept") == ([70.0, 7.0], 0)
+    return folder
 
 
-def test_a_copy_that_differs_takes_nothing_of_the_other_and_leaves_it_there(tmp_path):
-    first, second = tmp_path / "first", tmp_path / "second"
-    for folder in (first, second):
-        folder.mkdir()
-        write_all(folder, CALLS)
+@pytest.fixture
+def stored(stored_run):
+    """Two copies of a source and the store, after a run of the first; the same for each test."""
+    return again(stored_run)
+
+
+def test_a_second_copy_of_a_source_finds_what_the_first_one_compiled(stored):
+    assert in_store(stored / "second", stored / "kept") == ([70.0, 7.0], 1)
+    assert not list(stored.glob("*/__pycache__/*.nb?"))
+
+
+def test_a_copy_that_differs_takes_nothing_of_the_other_and_leaves_it_there(stored):
+    first, second, place = (stored / name for name in ("first", "second", "kept"))
     write(second / "inner.py", CALLS["inner.py"].replace("2.0 * x", "5.0 * x"))
-    in_store(first, tmp_path / "kept")
-    assert in_store(second, tmp_path / "kept") == ([160.0, 16.0], 0)
-    assert in_store(first, tmp_path / "kept") == ([70.0, 7.0], 1)
+    assert in_store(second, place) == ([160.0, 16.0], 0)
+    assert in_store(first, place) == ([70.0, 7.0], 1)
 
 
-def test_what_nobody_used_for_long_is_removed_from_the_store(tmp_path, monkeypatch):
-    folder = write_all(tmp_path, CALLS)
-    place = tmp_path / "kept"
-    in_store(folder, place)
+def test_what_nobody_used_for_long_is_removed_from_the_store(stored, monkeypatch):
+    place = stored / "kept"
     monkeypatch.setenv("TELEOP_KERNELS", str(place))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     old = sorted(place.rglob("factor-*.nbi"))
@@ -359,7 +396,7 @@ def test_what_nobody_used_for_long_is_removed_from_the_store(tmp_path, monkeypat
         os.utime(file, (1e9, 1e9))
     assert store.prune() >= 2 * len(old)
     assert not list(place.rglob("factor-*"))
-    assert in_store(folder, place)[0] == [70.0, 7.0]
+    assert in_store(stored / "first", place)[0] == [70.0, 7.0]
 
 
 LATE = """

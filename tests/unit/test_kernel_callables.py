@@ -41,6 +41,22 @@ def test_plain_function_serves_in_place_of_a_kernel():
     raise_pending()
 
 
+def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_each_time():
+    @kernel
+    def compiled(row):
+        return row[0]
+
+    def plain(row):
+        return row[0]
+
+    whole, real = types.int64(ROW), types.float64(ROW)
+    assert pointer(compiled, real) is pointer(compiled, real)
+    if IS_COMPILED:  # of one Python function there is nothing else to make
+        assert pointer(compiled, real) is not pointer(compiled, whole)
+        assert pointer(plain, real) is not pointer(plain, real)
+    assert pointer(compiled, real)(np.full(1, 2.5)) == 2.5
+
+
 def test_plain_function_gets_tables_flags_and_counts():
     seen = []
 

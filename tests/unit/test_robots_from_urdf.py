@@ -120,6 +120,16 @@ def test_efforts_and_accelerations_of_the_links_are_those_of_pinocchio(seed, tmp
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
 
 
+@pytest.mark.parametrize("dynamics", ["independent", "links"])
+def test_a_start_is_looked_for_when_it_is_asked_for_and_not_before(dynamics, tmp_path):
+    text, tip = random_urdf(5, 6)
+    path = tmp_path / "arm.urdf"
+    path.write_text(text.replace('effort="20"', 'effort="1e4"'))
+    arm = load_robot(str(path), tip=tip, dynamics=dynamics)
+    assert vars(arm)["start"] is None
+    assert ((arm.lower <= arm.start) & (arm.start <= arm.upper)).all()
+
+
 def test_motors_of_a_row_add_to_the_inertia_and_to_the_efforts():
     arm = load_robot(str(EXAMPLE), tip="tool0", dynamics="links")
     row, q, still = arm.dynamics.parameters.copy(), arm.home.copy(), np.zeros(6)

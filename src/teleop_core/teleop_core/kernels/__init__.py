@@ -177,7 +177,8 @@ def pointer(function: Callable[P, R], signature: Any) -> Callable[P, R]:
         signature: numba signature, the same for all that may stand in this place.
 
     Returns:
-        The callable to hand to a kernel; called from Python, it runs the Python function.
+        The callable to hand to a kernel, one for each kernel and signature; called from Python, it
+        runs the Python function.
 
     Raises:
         KernelError: The function cannot be compiled, or called, with this signature.

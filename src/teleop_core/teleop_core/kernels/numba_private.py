@@ -193,6 +193,10 @@ def c_function(function: Any, signature: Any) -> Any:
     """
     arguments, result = normalize_signature(signature)
     is_compiled = isinstance(function, CPUDispatcher)
+    # To load one from disk takes 5 ms, and every robot asks anew for those of its kernels.
+    made = vars(function).setdefault("_pointers", {}) if is_compiled else {}
+    if (arguments, result) in made:
+        return made[arguments, result]
     target = function.py_func if is_compiled else entry_of(function, arguments, result)
     callback: Any = Pointer(target, (arguments, result), locals={}, options=_ERRORS)
     if is_compiled:
@@ -203,6 +207,7 @@ def c_function(function: Any, signature: Any) -> Any:
         raise kernel_error(error, target, arguments) from error
     if not is_compiled:
         callback._entry, callback._pyfunc = target, function  # keeps the way in alive
+    made[arguments, result] = callback
     return callback
 
 

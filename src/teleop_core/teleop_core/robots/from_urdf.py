@@ -135,7 +135,8 @@ def load_urdf(
         return robot
     row = chain_row(kinds, fixed, bodies, np.maximum(drives.inertia - np.diag(inertia), 0.0))
     _refuse_weak(moving, drives, home, row)
-    return replace(robot, dynamics=chain_dynamics(row))
+    # Without its start, for which a second's search would begin here: who needs it asks for it.
+    return replace(robot, dynamics=chain_dynamics(row), start=None)
 
 
 def _refuse_weak(moving: list[_Joint], drives: Drives, home: Array, row: Array) -> None:

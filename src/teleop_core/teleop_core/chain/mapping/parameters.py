@@ -13,7 +13,7 @@ from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.mapping.walls import WALLS
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation
-from teleop_core.kernels.portable import dot, product
+from teleop_core.kernels.portable import product
 
 MODES = ("coarse", "fine")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -145,7 +145,7 @@ def axis_map(name: str, axes: tuple[str, ...]) -> Array:
     matrix = np.zeros((3, 3))
     for row, axis in enumerate(axes):
         matrix[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
-    if not math.isclose(float(dot(np.cross(matrix[0], matrix[1]), matrix[2])), 1.0):
+    if not math.isclose(float(np.linalg.det(matrix)), 1.0):
         raise ParameterError(name, axes, "three axes at right angles that do not mirror")
     return matrix
 
