@@ -145,7 +145,8 @@ def axis_map(name: str, axes: tuple[str, ...]) -> Array:
     matrix = np.zeros((3, 3))
     for row, axis in enumerate(axes):
         matrix[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
-    if not math.isclose(float(np.linalg.det(matrix)), 1.0):
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    if a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) != 1.0:  # exact, of 0 and ±1
         raise ParameterError(name, axes, "three axes at right angles that do not mirror")
     return matrix
 
