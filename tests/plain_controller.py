@@ -12,7 +12,6 @@ speed makes up in a period of its own.
 import math
 import signal
 import sys
-import threading
 import time
 
 import rclpy
@@ -58,21 +57,21 @@ class Controller(Node):
         self.goal = dict(self.place)
         self.is_leading, self.arrival = False, 0.0
         self.first, self.largest, self.mode, self.frozen_ns = math.nan, 0.0, "", 0
-        self.begun, self.steps = time.monotonic(), 0
-        self.told, self.told_at = dict(self.place), 0.0
-
-    def until_next(self) -> float:
-        """Time until the next step is due [s]."""
-        return max(self.begun + (self.steps + 1) / RATE - time.monotonic(), 0.0)
+        self.speed, self.now, self.cycles = dict.fromkeys(JOINTS, 0.0), time.monotonic(), 0
 
     def cycle(self) -> None:
-        """Take all that has come, then make the steps that are due."""
+        """Take all that has come, go on by the time since the last cycle, and say where it is."""
         for subscription, take in self._taken:
             handle, kind = subscription.handle, subscription.msg_type
             with handle:
                 while (taken := handle.take_message(kind, False)) is not None:
                     take(taken[0])
-        self._tick()
+        self._go_on()
+        self.cycles += 1
+        if self.mode != "mute":
+            self._sender.publish(self._said())
+        if self.cycles % 50 == 0:
+            self._witness.publish(Float64MultiArray(data=[self.first, self.largest]))
 
     def _misbehave(self, message: String) -> None:
         self.mode, self.frozen_ns = message.data, time.time_ns()
@@ -102,34 +101,23 @@ class Controller(Node):
         self.arrival = time.monotonic() + ahead
         self._go(dict(zip(message.joint_names, point.positions, strict=True)))
 
-    def _tick(self) -> None:
-        due = int(RATE * (time.monotonic() - self.begun)) - self.steps
-        for _ in range(due):
-            self._step()
-        self.steps += due
-        if self.mode != "mute":
-            self._sender.publish(self._said())
-        if self.steps % 50 < due:
-            self._witness.publish(Float64MultiArray(data=[self.first, self.largest]))
-
-    def _step(self) -> None:
-        left = self.arrival - time.monotonic()  # to the end of a trajectory's point
-        for name, most in zip(JOINTS, SPEED, strict=True):
-            off = self.goal[name] - self.place[name]
-            wanted = off / left if left > 1.0 / RATE else BANDWIDTH * off
-            self.place[name] += min(max(wanted, -1.1 * most), 1.1 * most) / RATE
+    def _go_on(self) -> None:
+        begun, self.now = self.now, time.monotonic()
+        passed = self.now - begun
+        left = self.arrival - begun  # to the end of a trajectory's point
+        share = passed / left if left > passed else 1.0 - math.exp(-BANDWIDTH * passed)
+        for name, rated in zip(JOINTS, SPEED, strict=True):
+            most = 1.1 * rated * passed
+            way = min(max(share * (self.goal[name] - self.place[name]), -most), most)
+            self.place[name] += way
+            self.speed[name] = way / passed
 
     def _said(self) -> JointState:
         names = ["finger", *JOINTS]
         if self.mode == "order":
             names.reverse()
         message = JointState(name=names)
-        # Speeds are means since the last message, which may be some steps ago on a busy machine.
-        now = time.monotonic()
-        went = {name: self.place[name] - self.told[name] for name in JOINTS}
-        speeds = {"finger": 0.0} | {name: way / (now - self.told_at) for name, way in went.items()}
-        self.told, self.told_at = dict(self.place), now
-        values = {"finger": 0.3, **self.place}
+        values, speeds = {"finger": 0.3, **self.place}, {"finger": 0.0, **self.speed}
         message.position = [values[name] for name in names]
         message.velocity = [speeds[name] for name in names]
         message.effort = [math.nan] * len(names)  # as joint_state_broadcaster says what it lacks
@@ -148,14 +136,16 @@ class Controller(Node):
 
 def main() -> int:
     """Be a controller until it is told to end."""
-    ended = threading.Event()
+    ended: list[int] = []  # an event's lock may be held where the signal comes
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
+        signal.signal(number, lambda number, _: ended.append(number))
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    controller = Controller(sys.argv[1])
+    controller, due = Controller(sys.argv[1]), time.monotonic()
     # No executor: it would wait, wake and look through its entities for each message anew, and on a
     # slow machine fall ever farther behind what it is told.
-    while not ended.wait(controller.until_next()):
+    while not ended:
+        due = max(due + 1.0 / RATE, time.monotonic())
+        time.sleep(max(due - time.monotonic(), 0.0))
         controller.cycle()
     return 0
 
