@@ -114,6 +114,9 @@ def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer, kind):
         assert is_led_home_without_a_jump(arm)
 
 
+# Five processes share two cores here, and an arm that stands still for a tenth of a second in the
+# middle of a motion does not agree with its setpoint: CI tests the bridge and conformance apart.
+@pytest.mark.soak
 def test_conformance_passes_unchanged_through_the_bridge(peer):
     pytest.importorskip("crtk_msgs")
     with real_arm(peer) as arm:
