@@ -59,7 +59,12 @@ def _delay(configuration: Configuration, arm: str) -> float:
 
 
 def assumed_note(robot: Robot, file: str) -> str:
-    """Which limits of drives a URDF leaves out, for one joint at least; empty where none is."""
+    """Which limits of drives a URDF leaves out, for one joint at least; empty where none is.
+
+    Args:
+        robot: As it was loaded from the file.
+        file: Its path, for the text.
+    """
     words = {"effort_limit": "effort", "speed_limit": "velocity"}
     drives = robot.drives
     missing = [] if drives is None else [name for name in words if name in drives.assumed]
@@ -68,8 +73,8 @@ def assumed_note(robot: Robot, file: str) -> str:
     entries = {words[name]: drives.entries()[name] for name in missing}
     found = [f"{word} {', '.join(f'{v:g}' for v in row)}" for word, row in entries.items()]
     return (
-        f"{file} does not give every joint its limits of {' and '.join(entries)}; with those that "
-        f"are assumed they are, in SI units: {'; '.join(found)}"
+        f"{file} does not give every joint its limits of {' and '.join(entries)}; the rest is "
+        f"assumed. All joints, in SI units: {'; '.join(found)}"
     )
 
 
