@@ -29,6 +29,7 @@ class PageClient:
 
     def __init__(self, port, *, comes_up=True):
         self.port, self.name, self.status = port, "", ""
+        self.has_all = False  # that was there when it came
         self.elements, self.gizmos, self.commands, self.values = {}, [], {}, {}
         self.socket = connect(
             f"ws://127.0.0.1:{port}/", origin=f"http://127.0.0.1:{port}", compression=None,
@@ -38,7 +39,7 @@ class PageClient:
         self._reader.start()
         if comes_up:
             self.say(CAMERA)
-            until(lambda: self.name and (self.gizmos or self.elements), "the page comes up")
+            until(lambda: self.name and self.has_all, "the page comes up")
 
     def __enter__(self):
         return self
@@ -103,7 +104,9 @@ class PageClient:
         content = message.get("updates", message.get("props", {})).get("content", "")
         if "t-status" in content:
             self.status = content
-        if kind == "TransformControlsMessage":
+        if kind == "ReplayDoneMessage":
+            self.has_all = True
+        elif kind == "TransformControlsMessage":
             self.gizmos.append(message["name"])
         elif kind == "RegisterCommandMessage":
             self.commands[message["props"]["label"]] = message["uuid"]

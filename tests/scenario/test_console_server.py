@@ -1,6 +1,9 @@
 """Console's server: used by real browsers, refused to pages from elsewhere."""
 
+import asyncio
 import threading
+from collections import deque
+from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import numpy as np
@@ -10,6 +13,7 @@ pytest.importorskip("viser")
 
 import viser
 from viser import _messages
+from viser.infra import _infra
 
 from browser import Tab, handshake, until
 from teleop_core.base.errors import SessionError
@@ -237,3 +241,28 @@ def test_other_addresses_than_the_loopback_are_served_with_a_token_alone():
             assert first in told
     with ConsoleServer(0) as server:
         assert server.token == ""
+
+
+def test_message_that_is_drawn_just_before_its_reader_waits_is_sent():
+    async def read():
+        # As viser makes its buffers, once the console's hooks are in place.
+        buffer = _infra.AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
+        message = _messages.RunJavascriptMessage("drawn")
+        buffer.message_event._waiters = AfterDrawing(partial(buffer.push, message))
+        return await asyncio.wait_for(anext(buffer.window_generator(0)), 20) == [message]
+
+    assert asyncio.run(read())
+
+
+class AfterDrawing(deque):
+    """Who waits for an event; each comes only after another thread has drawn once."""
+
+    def __init__(self, draw):
+        super().__init__()
+        self._draw = draw
+
+    def append(self, waiter):
+        drawing = threading.Thread(target=self._draw)
+        drawing.start()
+        drawing.join()
+        super().append(waiter)

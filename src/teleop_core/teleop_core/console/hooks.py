@@ -4,14 +4,16 @@ viser 1.1 opens its port itself, answers every request, counts ports up where on
 banner and offers to lead the page out through a tunnel. It has no settings for these. What it is
 given here instead is the function with which it opens its server: ours hands a socket that listens
 already to the same library, asks the guard before viser sees a request, and the filter before it
-sees a message. The version bound in ``setup.py`` belongs to this module.
+sees a message. Its buffers of messages wake their readers from the right thread. The version bound
+in ``setup.py`` belongs to this module.
 """
 
+import asyncio
 import http
 import logging
 import threading
 from collections.abc import Awaitable, Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from socket import socket
 from types import SimpleNamespace
@@ -22,7 +24,7 @@ import viser
 import websockets
 import websockets.asyncio.server as ws
 from viser import _messages
-from viser.infra import _infra
+from viser.infra import _async_message_buffer, _infra
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 from websockets.typing import Data, Subprotocol
@@ -50,6 +52,32 @@ class ServeOptions(TypedDict, total=False):
     compression: str | None
     subprotocols: list[Subprotocol] | None
     select_subprotocol: Callable[[ws.ServerConnection, Sequence[Subprotocol]], Subprotocol | None]
+
+
+class Wake(asyncio.Event):
+    """Event that is set on an event loop alone.
+
+    viser sets its event from the drawing thread, and then asks the loop to set it too. A reader
+    that has looked at the event but does not wait yet misses the first. The second does nothing,
+    since the event is set already, nor does any later one: its page shows what is old for ever.
+    """
+
+    def set(self) -> None:
+        """Wake who waits; in another thread nothing, since the loop is asked too."""
+        with suppress(RuntimeError):  # no loop runs in this thread
+            asyncio.get_running_loop()
+            super().set()
+
+
+class _Buffer(_async_message_buffer.AsyncMessageBuffer):
+    """Messages on their way to pages."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.message_event = Wake()
+
+
+setattr(_infra, "AsyncMessageBuffer", _Buffer)  # noqa: B010
 
 
 class Server(viser.ViserServer):
