@@ -3,6 +3,7 @@
 Run it here, or have the command know it: ``teleop --parts examples/own_exercise.py drill shaken``.
 """
 
+import math
 import sys
 import tempfile
 from pathlib import Path
@@ -10,14 +11,13 @@ from pathlib import Path
 from teleop_core.slave.operation import State
 from teleop_drill import Cure, Exercise, Motion, Rig, hand, register_exercise
 
+AMPLITUDE, FREQUENCY = 0.0003, 10.0  # m, Hz
+
 
 def shake(rig: Rig) -> None:
-    """Let the hand's samples scatter by 0.3 mm for a second.
-
-    Much more is no tremor: what no hand can do is held, and each hold lets go of some way.
-    """
+    """Let the hand swing across its way for a second, as hands that tremble do."""
     rig.mark()  # the fault begins
-    rig.distort(hand.scattered(0.0003))
+    rig.distort(hand.shaken(AMPLITUDE, FREQUENCY))
     rig.wait(1.0)
 
 
@@ -29,12 +29,13 @@ def steady(rig: Rig) -> None:
 SHAKEN = register_exercise(
     Exercise(
         name="shaken",
-        text="hand trembles by 0.3 mm",
+        text="hand trembles by 0.3 mm, ten times a second",
         inject=shake,
         undo=steady,
         motion=Motion.GOES_ON,
         states=(State.ENABLED,),
         cures=(Cure.NOTHING,),
+        hand_speed=math.hypot(hand.SPEED, 2.0 * math.pi * FREQUENCY * AMPLITUDE),
     )
 )
 

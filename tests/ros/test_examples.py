@@ -33,8 +33,6 @@ def test_plain_ros_node_leads_the_slave_in_place_of_the_simulated_master(tmp_pat
 
 
 @pytest.mark.alone
-# The speed of a tip that is led by a shaking hand comes near its bound, and now and then beyond.
-@pytest.mark.soak
 def test_a_session_is_broken_in_a_way_of_ones_own(tmp_path):
     text = run("own_exercise", tmp_path)
     assert "\u2713 shaken: ENABLED" in text
