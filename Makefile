@@ -8,7 +8,7 @@ SECONDS_LIVE ?= 60
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 
-.PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format docs docs-links bench bench-setup endurance fuzz drill-mutants flaky clean
+.PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format docs docs-links bench bench-setup endurance fuzz mutants drill-mutants flaky clean
 
 # Python compiles a module when it is first imported: most of them never are.
 INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check \
@@ -129,6 +129,11 @@ bench: bench-setup
 COUNT ?= 100
 endurance: $(VENV)/.tested
 	$(BIN)/python benchmarks/endurance.py --count $(COUNT)
+
+# Copies of teleop_core with one line broken each: quick tests must find every one; a quarter of an
+# hour. MUTANTS names some of them.
+mutants: $(VENV)/.tested
+	$(BIN)/python tests/code_mutants.py $(MUTANTS)
 
 # Copies of teleop_core with one safety broken each: the drill must find every one, in both forms,
 # and nothing in a sound copy; about an hour on a busy machine. MUTANTS names some of them.

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mutants import MUTANTS, changed
+from code_mutants import CODE_MUTANTS
+from mutants import MUTANTS, ROOT, changed
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import UnknownNameError
@@ -372,6 +373,13 @@ def test_every_mutant_fits_the_source_and_names_rows_that_there_are(mutant):
     for is_composed in (False, True):
         rows = mutant.rows_of(is_composed=is_composed)
         assert {one.name for one in chosen(rows, is_composed=is_composed)} >= set(rows)
+
+
+@pytest.mark.parametrize("mutant", CODE_MUTANTS, ids=lambda one: one.name)
+def test_every_code_mutant_fits_the_source_and_names_files_of_tests(mutant):
+    assert changed(mutant)
+    assert mutant.rows
+    assert all((ROOT / file).is_file() for file in mutant.rows)
 
 
 def test_the_short_form_is_there_in_five_processes():

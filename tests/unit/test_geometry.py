@@ -227,3 +227,17 @@ def test_rotation_vectors_run_on_beyond_half_a_turn(seed):
     quaternions = (start * Rotation.from_rotvec(vectors)).as_quat(scalar_first=True)
     quaternions *= rng.choice((-1.0, 1.0), (50, 1))
     assert np.allclose(geometry.rotation_vectors(quaternions), vectors, rtol=0, atol=1e-12)
+
+
+@given(quaternions, quaternions)
+def test_a_turn_between_two_attitudes_is_scipys_and_never_the_long_way(a, b):
+    start, end = (Rotation.from_quat(q, scalar_first=True) for q in (a, b))
+    vector = np.empty(3)
+    geometry.turn_between(a, b, vector)
+    assert np.linalg.norm(vector) <= math.pi + ROUNDING
+    turned = Rotation.from_rotvec(vector) * start
+    assert (turned * end.inv()).magnitude() < TWICE_ROUNDED
+    geometry.turn_within(a, b, vector)
+    assert np.linalg.norm(vector) <= math.pi + ROUNDING
+    turned = start * Rotation.from_rotvec(vector)
+    assert (turned * end.inv()).magnitude() < TWICE_ROUNDED

@@ -217,8 +217,18 @@ def test_tip_at_its_stop_is_at_rest(sign):
     far = operator(kind="hold", center=(0.2 * sign,) * 3, approach_time=0.5, rotation=0.0)
     master = held(parameters(operator=far, device=QUIET, hand={"tremor_amplitude": 0.0}))
     run(master, 2000)
-    # The hand still pulls with 20 N; what it would gather against the stop is not kept.
+    # The hand still pulls with 20 N; what it would gather against the stop is not kept, and bends
+    # nothing between hand and device.
     assert not master.state["speed"].any()
+    assert np.array_equal(master.state["hand"], master.state["position"])
+
+
+def test_a_push_below_the_friction_moves_the_device_nowhere():
+    master = held(parameters(device=QUIET, hand={"tremor_amplitude": 0.0}))
+    run(master, 100)
+    before = master.state["position"].copy()
+    run(master, 2000, (0.9 * FRICTION, 0.0, 0.0))
+    assert np.array_equal(master.state["position"], before)
 
 
 def test_tip_leaves_its_stop_again():

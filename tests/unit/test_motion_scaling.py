@@ -258,6 +258,14 @@ def test_clutched_turning_moves_nothing_and_turning_goes_on_from_there():
     assert np.allclose(desk.attitude(), expected, rtol=0, atol=1e-13)
 
 
+def test_a_command_of_many_scaled_turns_stays_a_turn():
+    desk = Desk(rotation_gain=0.5)
+    for _ in range(5000):
+        desk.step(turn=rotation("x", 0.3))
+    size = np.linalg.norm(desk.row["slave_servo_cp"][3:])
+    assert abs(size - 1.0) <= 2.0 * np.finfo(float).eps
+
+
 def test_clutching_without_turning_keeps_the_attitude_absolute():
     desk = Desk()
     desk.turn = rotation("x", REST_TILT)

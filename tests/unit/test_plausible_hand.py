@@ -65,6 +65,15 @@ def test_a_teleport_moves_nothing_and_the_hand_is_followed_from_there(period_ns)
     assert np.linalg.norm(after[:3] - before[:3]) == pytest.approx(19 * 2e-4, rel=1e-6)
 
 
+def test_a_hand_that_moves_on_after_a_teleport_loses_that_step_and_the_next():
+    hand = Hand()
+    before = hand.rest()
+    there = moved(REST, [0.1, 0.0, 0.0])
+    for k in range(21):
+        after = hand.give(moved(there, [0.0, 2e-4 * k, 0.0]))
+    assert np.linalg.norm(after[:3] - before[:3]) == pytest.approx(19 * 2e-4, rel=1e-6)
+
+
 @settings(max_examples=100, deadline=None)
 @given(
     st.lists(

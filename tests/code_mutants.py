@@ -1,0 +1,198 @@
+"""Code mutants: copies of the package with one line broken, each of which a quick test must find.
+
+    python tests/code_mutants.py --list
+    python tests/code_mutants.py sticking touch_drop
+
+Safeties that only a running session has are broken in :mod:`mutants`, and found by the drill. Here
+are the rest: what a tick computes, what a score says, what the console lets through. A mutant is
+found when a test of its files fails; each file passes with the package as it is.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+
+from mutants import ROOT, Mutant, tree
+
+UNIT = "tests/unit/test_"
+
+
+def _mutant(
+    name: str, text: str, file: str, before: str, after: str, *tests: str
+) -> Mutant:  # fmt: skip
+    files = tuple(one if "/" in one else f"{UNIT}{one}.py" for one in tests)
+    return Mutant(name, text, ((file, before, after),), files)
+
+
+_CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
+_SCALING, _LINK = "chain/mapping/motion_scaling.py", "chain/network/link.py"
+_TDPA, _CENTRE = "chain/passivity/tdpa.py", "chain/fixtures/remote_centre.py"
+_CENTRE_SCORE, _TOUCH = "evaluation/metrics/remote_centre.py", "evaluation/metrics/touch.py"
+_PID, _WAY = "slave/controllers/pid.py", "slave/interpolation.py"
+_HAND, _OBSERVER = "chain/master/hand_mechanics.py", "slave/force_observer.py"
+CODE_MUTANTS = (
+    # kernels and robots
+    _mutant("far_turn", "a turn beyond half a turn goes the long way", "kernels/geometry.py",
+            "sign = -1.0 if turn[0] < 0.0 else 1.0", "sign = 1.0", "geometry"),
+    _mutant("kernels_kept", "kernels are thrown away while they are used", "kernels/store.py",
+            "if index.stat().st_mtime < oldest:", "if index.stat().st_mtime > oldest:",
+            "kernel_cache"),
+    _mutant("inertia_off", "a body's inertia lacks its distance from the axis",
+            "robots/chain_dynamics.py", "turned + (square + along if i == j else 0.0)",
+            "turned + (square if i == j else 0.0)", "robots_from_urdf"),
+    _mutant("far_arc", "of the swivel's legal arcs the farthest is taken", "robots/swivel_arcs.py",
+            "if abs(psi) < abs(best):", "if abs(psi) > abs(best):", "closed_forms"),
+    # chain
+    _mutant("edge_missed", "a held mode button toggles at every sample", _SCALING,
+            "if buttons[2] > s.buttons[2]:", "if buttons[2] > 0.0:", "motion_scaling"),
+    _mutant("fixture_slips", "a fixture stays behind when the hand is aligned anew", _SCALING,
+            "s.center[i] += stylus[i] - s.stylus[i]", "s.center[i] += 0.0", "motion_scaling",
+            "fixtures"),
+    _mutant("unit_lost", "commanded turns drift off unit length", _SCALING,
+            "s.command[i] *= 1.5 - 0.5 * square", "s.command[i] *= 1.0", "motion_scaling"),
+    _mutant("wild_hand", "the sample after a wild one is compared with it",
+            "chain/mapping/plausibility.py", "s.is_doubted = 0 if is_sound else 1",
+            "s.is_doubted = 0", "plausible_hand"),
+    _mutant("sticking", "the device's friction never holds it", _HAND,
+            "if square > rubbed * rubbed else 0.0", "if square > rubbed * rubbed else 1.0",
+            "haptic_master"),
+    _mutant("stops_bend", "a hand that leans on the device's stop bends its wrist", _HAND,
+            "s.hand[i], s.hand_speed[i] = s.position[i], 0.0", "pass", "haptic_master"),
+    _mutant("wobble", "the gimbal's noise exceeds its bound", "chain/master/device.py",
+            "min(max(0.5 * noise[i], -1.0), 1.0)", "0.5 * noise[i]", "haptic_master"),
+    _mutant("centre_short", "the tool turns 1 % too little towards its centre", _CENTRE,
+            "room.turn[i] *= angle", "room.turn[i] *= 0.99 * angle", "remote_centre"),
+    _mutant("centre_near", "the tip may come nearer to its centre than allowed", _CENTRE,
+            "max(p.least - along, 0.0)", "max(0.5 * p.least - along, 0.0)", "remote_centre"),
+    _mutant("centre_jerk", "the tool turns at once as far as it must", _CENTRE,
+            "if angle > most:", "if angle > 1e9:", "remote_centre"),
+    # network and passivity
+    _mutant("order_lost", "packets that shall keep their order overtake", _LINK,
+            "due = max(due, s.last_due[k])", "due = max(due, 0)", "network"),
+    _mutant("old_arrives", "a packet that was overtaken is taken for the newest", _LINK,
+            "if not is_due or way.number[at] <= s.newest[k]:", "if not is_due:", "network"),
+    _mutant("burst_short", "a burst of losses ends as if none had begun",
+            "chain/network/gilbert_elliott.py",
+            "border = numbers[1] if memory[1] > 0.0 else numbers[0]", "border = numbers[0]",
+            "network"),
+    _mutant("told_twice", "what was told to the other side is also spent here", _TDPA,
+            "        port[MARGIN] -= told\n", "        port[MARGIN] -= 0.0\n", "passivity"),
+    _mutant("overdrawn", "the arm may give twice of what was paid", _TDPA,
+            "if inwards > left and not is_free:", "if inwards > 2.0 * left and not is_free:",
+            "passivity"),
+    _mutant("tank_keeps", "the tank keeps what an earlier touch left", "chain/passivity/tank.py",
+            "    if square == 0.0:  # the touch is over\n        memory[0] = 0.0\n",
+            "", "passivity"),
+    # slave
+    _mutant("creeping", "a bristle bends on where it should slip", "slave/friction.py",
+            "s.bent[i] = min(max(bent, -most), most)", "s.bent[i] = bent", "friction"),
+    _mutant("resting", "friction wanders at rest", "slave/friction.py",
+            "if p.wander[i] > 0.0 and s.slipped[i] > 0.0:", "if p.wander[i] > 0.0:", "friction",
+            "hardware_plant"),
+    _mutant("winding_up", "the integral grows while the drive is at its limit", _PID,
+            "if abs(effort) <= limit or effort * error < 0.0:", "if effort == effort:", "pid"),
+    _mutant("weight_lost", "the setpoint's weight is always 1", _PID,
+            "return weight * near + (1.0 - weight) * memory[_LAGGED]", "return near",
+            "setpoint_weight"),
+    _mutant("way_jumps", "the arm goes from command to command within a tick", _WAY,
+            "span = max(1, round(period_ns * 1e-9 / dt))", "span = 1", "interpolation"),
+    _mutant("way_bends", "a way of another length keeps its acceleration", _WAY,
+            "bend * longer * longer", "bend * longer", "interpolation"),
+    _mutant("pulling", "the damper of a contact pulls the tip in", _CONTACT,
+            "if depth <= 0.0 or normal_force <= 0.0:", "if depth <= 0.0:", "contacts", "world"),
+    _mutant("glued", "dry friction of an object holds whatever pulls", _CONTACT,
+            "share = most / asked if asked > most else 1.0", "share = 1.0", "contacts", "world"),
+    _mutant("remembered", "a tip that left an object is still held by it", _CONTACT,
+            "out, kept = 0.0, 1.0 if s.gap < 0.0 else 0.0", "out, kept = 0.0, 1.0", "contacts",
+            "world"),
+    _mutant("no_drop", "a punctured surface gives all its force on to the needle", _PUNCTURE,
+            "kept = min(p.cutting_force, p.puncture_force) / stiffness",
+            "kept = p.puncture_force / stiffness", "puncture"),
+    _mutant("side_door", "a needle enters its channel from anywhere", _PUNCTURE,
+            "return along >= 0.0 if s.gap >= 0.0 else abs(along - s.gap) <= p.hole_radius",
+            "return True", "puncture"),
+    _mutant("shaft_glued", "the shaft's friction has no bound", _PUNCTURE,
+            "s.drawn = min(max(drawn, -most), most)", "s.drawn = drawn", "puncture"),
+    _mutant("observer_late", "the observer takes the speed of a tick ago", _OBSERVER,
+            "* 0.5 * (s.speed[j] + s.last_speed[j])", "* s.last_speed[j]", "force_observer"),
+    _mutant("noise_repeats", "a sensor's noise is the same at every tick", "slave/force_sensor.py",
+            "s.next_noise += p.has_noise", "s.next_noise += 0 * p.has_noise", "force_sensor"),
+    _mutant("resume_early", "resume is taken while the arm moves", "slave/operation/states.py",
+            "and s.is_moving:", "and s.is_moving > 1:", "operation_states"),
+    # scores
+    _mutant("touch_drop", "a fall of the force over a pause counts as a puncture", _TOUCH,
+            "falls = -np.diff(forces)[times <= _NEXT_NS]", "falls = -np.diff(forces)", "puncture",
+            "evaluation_metrics"),
+    _mutant("touch_count", "every sample in touch counts as one", _TOUCH,
+            "np.sum(touches & ~before)", "np.sum(touches)", "evaluation_metrics", "world"),
+    _mutant("centre_mean", "the largest miss of a remote centre is a mean", _CENTRE_SCORE,
+            "float(off.max())", "float(off.mean())", "remote_centre"),
+    _mutant("centre_begin", "what was before the session begins counts", _CENTRE_SCORE,
+            "counts = poses.stamp_ns >= self._begin_ns", "counts = poses.stamp_ns >= 0",
+            "remote_centre"),
+    _mutant("quantile_low", "a percentile is that of a sample less", "evaluation/accumulators.py",
+            "math.ceil(share * self.count)", "math.floor(share * self.count)",
+            "evaluation_statistics"),
+    _mutant("upright_lost", "roll and yaw count where they are not defined",
+            "evaluation/tracking.py", "difference[is_degenerate, ::2] = np.nan", "pass",
+            "evaluation_metrics"),
+    # graph, parts, nodes, console
+    _mutant("delay_of_all", "a delay for one reader is one for all", "graph/graph.py",
+            'if d.reader in {"", reader.name}', "", "graph"),
+    _mutant("part_replaced", "a part takes the name of another without being asked",
+            "base/registry.py", "if not is_ours and name in self.names():",
+            "if not is_ours and name in ():", "registry"),
+    _mutant("overtaken", "a message that was overtaken counts as lost", "nodes/sender.py",
+            "if number > self._number:", "if number != self._number:", "sender"),
+    _mutant("for_ever", "a start that gets no further is waited for", "nodes/starter.py",
+            "time.monotonic() - self._last > self._patience", "time.monotonic() < 0.0", "starter"),
+    _mutant("held_on", "who takes control holds what the one before held", "console/drivers.py",
+            "self._driver, self._holds = page, False", "self._driver = page", "console_drivers"),
+    _mutant("two_hosts", "a request under two names is answered", "console/guard.py",
+            "if len(hosts) != 1 or not", "if not", "console_guard"),
+    _mutant("gap_long", "a pause of a minute is drawn as a line", "console/tails.py",
+            "time > before + _GAP", "time > before + 60.0", "console_scene", "console_history"),
+    _mutant("page_stands", "a page is woken from any thread", "console/hooks.py",
+            "self.message_event = Wake()", "pass", "tests/scenario/test_console_server.py"),
+)  # fmt: skip
+"""All of them."""
+
+
+def found_by(mutant: Mutant) -> str:
+    """Test that finds a mutant; empty if none does."""
+    own = str(tree(mutant))
+    env = os.environ | {"PYTHONPATH": own, "TELEOP_KERNELS": f"{own}/kernels"}
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *mutant.rows]
+    done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
+    lines = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return lines[0].partition(" - ")[0] if done.returncode == 1 and lines else ""
+
+
+def main() -> int:
+    """Test the mutants that are named, or all; 0 if each was found."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("names", nargs="*", help="mutants (default: all)")
+    parser.add_argument("--list", action="store_true", dest="is_list")
+    asked = parser.parse_args()
+    chosen = [one for one in CODE_MUTANTS if not asked.names or one.name in asked.names]
+    if unknown := set(asked.names) - {one.name for one in chosen}:
+        parser.error(f"no mutant {', '.join(sorted(unknown))}; see --list")
+    if asked.is_list:
+        for one in CODE_MUTANTS:
+            print(f"{one.name:15} {one.text} ({', '.join(one.rows)})")
+        return 0
+    missed = 0
+    for one in chosen:
+        begin = time.monotonic()
+        test = found_by(one)
+        missed += not test
+        took = time.monotonic() - begin
+        print(f"{'found' if test else 'MISSED'} {one.name} ({took:.0f} s): {test}", flush=True)
+    print(f"{len(chosen) - missed} of {len(chosen)} mutants found")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
