@@ -25,6 +25,8 @@ from teleop_core.graph.topics import (
     DIAGNOSTICS,
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
+    REMOTE_CENTRE,
+    SLAVE_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_REACH,
     SLAVE_SERVO_CP,
@@ -172,6 +174,40 @@ def test_without_state_and_force_their_scores_are_not_applicable(recipe, path):
     assert score.session.gain is None
     assert score.fixture.penetration_max_mm is None
     assert score.force_n.max is None
+    for name in ("touch.count", "touch.drop_n", "touch.share", "remote_centre.off_rms_mm"):
+        assert score.value(name) is None
+
+
+def test_a_fall_of_the_force_on_the_tip_counts_from_sample_to_sample_but_not_over_a_pause(
+    recipe, path
+):
+    force = np.zeros((len(recipe.stamps), 6))
+    force[100:200, 0], force[200:300, 0] = -2.0, -1.5  # falls by 0.5 N, and then by 1.5
+    force[1000:1100, 2] = 3.0
+    recipe.rows[SLAVE_MEASURED_CF] = (recipe.stamps, force, recipe.stamps)
+    recipe.drop(SLAVE_MEASURED_CF, np.arange(1050, 1200))  # nobody saw how 3 N went
+    score = evaluate(recipe.write(path))
+    assert score.value("touch.count") == 2
+    assert score.value("touch.peak_n") == pytest.approx(3.0)
+    assert score.value("touch.drop_n") == pytest.approx(1.5)
+
+
+def test_a_tool_misses_its_remote_centre_by_the_distance_of_its_shaft(recipe, path):
+    poses = recipe.values(SLAVE_MEASURED_CP)
+    poses[:, 3:7] = [1.0, 0.0, 0.0, 0.0]
+    beside = np.where(np.arange(len(poses)) % 2, 3e-3, 4e-3)
+    centre = [0.3, 0.0, 0.2, 0.0, 0.0, 1.0]  # m, and the shaft along z
+    poses[:, :3] = centre[:3]
+    poses[:, 0] += beside
+    poses[:, 2] -= np.linspace(0.15, 0.10, len(poses))
+    rows = np.tile(centre, (len(poses), 1))
+    recipe.topics.append(REMOTE_CENTRE)
+    recipe.rows[REMOTE_CENTRE] = (recipe.stamps, rows, recipe.stamps)
+    score = evaluate(recipe.write(path))
+    assert score.value("remote_centre.off_max_mm") == pytest.approx(4.0, abs=EXACT_MM)
+    assert score.value("remote_centre.off_rms_mm") == pytest.approx(12.5**0.5, abs=EXACT_MM)
+    least = 1e3 * np.hypot(3e-3, 0.10)
+    assert score.value("remote_centre.least_depth_mm") == pytest.approx(least, abs=EXACT_MM)
 
 
 # -- latency, ticks, gaps --------------------------------------------------------------------------
