@@ -20,6 +20,7 @@ from teleop_core.chain.passivity.port import (
     hear_energy,
 )
 from teleop_core.chain.passivity.slave_side import PASSIVITY, PassivityParameters
+from teleop_core.chain.passivity.tank import tank_hand
 from teleop_core.chain.passivity.tdpa import tdpa_hand, tdpa_slave
 from teleop_core.graph.topics import ENERGY
 from teleop_core.session.configuration import configure
@@ -154,18 +155,33 @@ def slave_law(numbers=(0.2, 0.03, 0.01, 1e-3, 2.0)):
     return command
 
 
-def test_a_command_goes_against_the_force_as_far_as_credit_and_hand_pay_for():
+@pytest.mark.parametrize("step", [1e-4, 9e-5])
+def test_a_command_goes_against_the_force_as_far_as_credit_and_hand_pay_for(step):
     command, heard, rng = slave_law(), 0.0, np.random.default_rng(4)
     for k in range(400):
         gained = rng.choice([0.0, 1e-5])
         heard += gained
-        port, height = command(-1e-4 * k, heard=gained)
+        port, height = command(-step * k, heard=gained)
         assert -2.0 * height <= 1e-3 + heard + 1e-15
-    assert height > -1e-4 * k + 0.02
-    np.testing.assert_allclose(port[DRIFT : DRIFT + 3], [0.0, 0.0, -1e-4 * k - height], atol=1e-15)
+    assert height > -step * k + 0.02
+    np.testing.assert_allclose(port[DRIFT : DRIFT + 3], [0.0, 0.0, -step * k - height], atol=1e-15)
     for _ in range(3000):  # in the air, which costs nothing
-        height = command(-1e-4 * k, push=0.0)[1]
-    assert height == pytest.approx(-1e-4 * k, abs=1e-6)
+        height = command(-step * k, push=0.0)[1]
+    assert height == pytest.approx(-step * k, abs=1e-6)
+
+
+def test_a_touch_that_is_over_leaves_nothing_in_the_tank():
+    memory, port, push, still = np.zeros(12), np.zeros(len(ENERGY)), np.zeros(3), np.zeros(3)
+
+    def sample(wanted, last, moved):
+        push[:] = wanted, 0.0, 0.0
+        pushed, way = np.array([last, 0.0, 0.0]), np.array([moved, 0.0, 0.0])
+        tank_hand(still, memory, pushed, way, still, port, port, push, 1.0, 1e-3)
+        return push[0]
+
+    assert sample(1.0, -2.0, 1e-2) == 1.0  # the hand pushed 20 mJ in
+    assert sample(0.0, 0.0, 0.0) == 0.0
+    assert sample(1.0, 0.0, 1e-3) < 0.01
 
 
 def test_what_the_arm_lent_is_paid_back_before_the_hand_gets_any():
