@@ -8,6 +8,7 @@ VERSION = "0.6.0"  # released together with teleop_lab and teleop_drill
 NODES = (
     "operator",
     "haptic_master",
+    "master_bridge",
     "motion_scaling",
     "inverse_kinematics",
     "network",

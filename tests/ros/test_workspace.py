@@ -21,6 +21,7 @@ COLCON = Path(sys.executable).with_name("colcon")
 NODES = {
     "operator",
     "haptic_master",
+    "master_bridge",
     "motion_scaling",
     "inverse_kinematics",
     "slave",

@@ -377,6 +377,7 @@ STAGES: Registry[Stage] = Registry(
     {
         "operator": "teleop_core.chain.master.operator:OPERATOR",
         "haptic_master": "teleop_core.chain.master.haptic_master:HAPTIC_MASTER",
+        "master_bridge": "teleop_core.chain.master.master_bridge:MASTER_BRIDGE",
         "tremor_filter": "teleop_core.chain.filters.tremor_filter:TREMOR_FILTER",
         "motion_scaling": "teleop_core.chain.mapping.motion_scaling:MOTION_SCALING",
         "network": "teleop_core.chain.network.network:NETWORK",

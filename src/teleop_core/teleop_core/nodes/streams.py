@@ -70,7 +70,7 @@ class Subscription(Taker):
         overrides: QualityOverrides = getattr(node, "overrides", NO_OVERRIDES)
         wanted = profile(topic, depth, "subscription")
         wanted = overrides.apply(node.resolve_topic_name(name), "subscription", wanted)
-        super().__init__(node, message_type(topic.kind.ros_type), name, wanted)
+        super().__init__(node, message_type(topic.ros_type), name, wanted)
 
 
 class Waiter:

@@ -17,6 +17,7 @@ class JointMap:
         signs: 1 or -1 for each of our joints; empty: 1.
         offsets: Of each of our joints [rad or m]; empty: 0.
         order: The arm's joints in the order of its commands; empty: in that of ours.
+        owner: What the names of the parameters begin with, for messages.
 
     Attributes:
         theirs: The arm's names, in our order.
@@ -33,16 +34,17 @@ class JointMap:
         signs: Sequence[float] = (),
         offsets: Sequence[float] = (),
         order: Sequence[str] = (),
+        owner: str = "arm_bridge.",
     ) -> None:
-        self.ours, self.theirs = tuple(ours), _theirs(ours, renamed)
+        self.ours, self.theirs = tuple(ours), _theirs(ours, renamed, f"{owner}joints")
         n = len(self.ours)
         if len(signs) not in {0, n} or any(abs(sign) != 1.0 for sign in signs):
-            raise ParameterError("arm_bridge.signs", tuple(signs), f"{n} of 1.0 or -1.0, or empty")
+            raise ParameterError(f"{owner}signs", tuple(signs), f"{n} of 1.0 or -1.0, or empty")
         if len(offsets) not in {0, n}:
-            raise ParameterError("arm_bridge.offsets", tuple(offsets), f"{n} numbers, or empty")
+            raise ParameterError(f"{owner}offsets", tuple(offsets), f"{n} numbers, or empty")
         if order and sorted(order) != sorted(self.theirs):
             needed = f"each of {', '.join(self.theirs)} once, or empty"
-            raise ParameterError("arm_bridge.order", tuple(order), needed)
+            raise ParameterError(f"{owner}order", tuple(order), needed)
         self._signs = np.array(signs, dtype=float) if signs else np.ones(n)
         self._offsets = np.array(offsets, dtype=float) if offsets else np.zeros(n)
         self.order = tuple(order) or self.theirs
@@ -87,15 +89,15 @@ class JointMap:
         return (self._signs * ours)[self._sent]
 
 
-def _theirs(ours: Sequence[str], renamed: Sequence[str]) -> tuple[str, ...]:
+def _theirs(ours: Sequence[str], renamed: Sequence[str], parameter: str) -> tuple[str, ...]:
     found = {name: name for name in ours}
     for text in renamed:
         own, equals, other = (part.strip() for part in text.partition("="))
         if not equals or own not in found or not other:
             needed = f"ours=theirs, with ours one of {', '.join(ours)}"
-            raise ParameterError("arm_bridge.joints", text, needed)
+            raise ParameterError(parameter, text, needed)
         found[own] = other
     theirs = tuple(found.values())
     if len(set(theirs)) < len(theirs):
-        raise ParameterError("arm_bridge.joints", tuple(renamed), "another joint for each of ours")
+        raise ParameterError(parameter, tuple(renamed), "another joint for each of ours")
     return theirs

@@ -1,0 +1,106 @@
+"""Device listener: where a device says that its stylus is, for whoever looks before a session."""
+
+import time
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+
+from teleop_core.base.errors import SessionError
+from teleop_core.chain.master.master_bridge import POSE_MESSAGES
+from teleop_core.graph.topics import Kind, Topic
+from teleop_core.kernels.geometry import Array
+from teleop_core.nodes.master_bridge import pose_of
+from teleop_core.nodes.streams import Subscription, Waiter
+
+PATIENCE = 5.0
+"""Time in which the topic must be found, and a message must come [s]."""
+_POSES = POSE_MESSAGES[:-1]
+
+
+class DeviceListener:
+    """Listener to one device, with a middleware context of its own; to be used with ``with``.
+
+    Args:
+        topic: Where the device says its poses.
+        domain: ROS domain.
+        patience: Time in which the topic must be found [s].
+
+    Attributes:
+        message: Type of the messages.
+
+    Raises:
+        SessionError: There is no such topic, or none with poses; the text names those with poses.
+    """
+
+    def __init__(self, topic: str, domain: int, patience: float = PATIENCE) -> None:
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain)
+        self._node = Node(
+            "teleop_map_device", context=self._context, use_global_arguments=False,
+            enable_rosout=False, start_parameter_services=False,
+        )  # fmt: skip
+        self._subscription: Subscription | None = None
+        try:
+            self.topic = topic if topic.startswith("/") else f"/{topic}"
+            self.message = self._find(domain, patience)
+            heard = Topic(self.topic, Kind.POSE, message=self.message)
+            self._subscription = Subscription(self._node, heard, self.topic, 1)
+            self._waiter = Waiter(self._context, self._subscription)
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> "DeviceListener":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the device as it is."""
+        if self._subscription is not None:
+            self._subscription.close()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def place(self, patience: float = PATIENCE) -> Array:
+        """Where the stylus is now, (3,) in the device's unit.
+
+        Raises:
+            SessionError: No message came.
+        """
+        assert self._subscription is not None
+        newest, end = self._newest(), time.monotonic() + patience
+        while (later := self._newest()) is not None or newest is None:
+            newest = later if later is not None else newest
+            if newest is None:
+                if time.monotonic() > end:
+                    raise SessionError(f"{self.topic} is there, but silent: does the driver run?")
+                self._waiter.wait(0.1)
+        found: Array = pose_of(newest)[:3]
+        return found
+
+    def _newest(self) -> Any:
+        """Message that waits, if any; of those before it nothing is kept."""
+        assert self._subscription is not None
+        taken = self._subscription.take()
+        return None if taken is None else deserialize_message(taken.data, self._subscription.type)
+
+    def _find(self, domain: int, patience: float) -> str:
+        end = time.monotonic() + patience
+        while True:
+            known = dict(self._node.get_topic_names_and_types())
+            found = [kind for kind in known.get(self.topic, ()) if kind in _POSES]
+            if found:
+                return found[0]
+            if time.monotonic() > end:
+                break
+            time.sleep(0.05)
+        others = sorted(name for name, kinds in known.items() if set(kinds) & set(_POSES))
+        what = f"is {', '.join(known[self.topic])}" if self.topic in known else "is not there"
+        raise SessionError(
+            f"{self.topic} {what} on ROS domain {domain}; topics with poses: "
+            f"{', '.join(others) or 'none'}"
+        )

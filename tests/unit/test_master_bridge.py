@@ -1,0 +1,203 @@
+"""Master bridge: a device's poses, buttons and forces, against scipy's rotations."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import build
+from teleop_core.chain.mapping.parameters import AXES
+from teleop_core.chain.master.device_axes import UNITS, axis_of, device_axes
+from teleop_core.chain.master.master_bridge import (
+    POSE_MESSAGES,
+    MasterBridge,
+    MasterBridgeParameters,
+)
+from teleop_core.robots import load_robot
+
+MASTERS = sorted((Path(__file__).parents[2] / "config" / "masters").glob("*.yaml"))
+NOW_NS = 1_700_000_000_000_000_000
+TURNED = ("+y", "+z", "+x")
+ROWS = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]])  # of TURNED
+
+
+def frames():
+    """All right-handed triples of axes."""
+    for x in AXES:
+        for y in AXES:
+            for z in AXES:
+                if rows((x, y, z)) is not None:
+                    yield x, y, z
+
+
+def rows(axes):
+    matrix = np.zeros((3, 3))
+    for row, axis in enumerate(axes):
+        matrix[row, "xyz".index(axis[1])] = -1.0 if axis[0] == "-" else 1.0
+    return matrix if np.linalg.det(matrix) == 1.0 else None
+
+
+FRAMES = list(frames())
+
+
+def bridge(**values):
+    return MasterBridge(MasterBridgeParameters(**values))
+
+
+def pose(place=(0.0, 0.0, 0.0), turn=None):
+    turn = Rotation.identity() if turn is None else turn
+    return np.array([*place, *turn.as_quat(scalar_first=True)])
+
+
+def said(stage):
+    found = np.array(stage.signals["master_measured_cp"])
+    return found[:3], Rotation.from_quat(found[3:], scalar_first=True)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_pose_is_seen_in_the_axes_of_the_master_in_metres(seed):
+    rng = np.random.default_rng(seed)
+    base, stylus = (FRAMES[k] for k in rng.integers(0, 24, 2))
+    stage = bridge(device_axes=base, stylus_axes=stylus, unit=0.001)
+    place, turn = rng.uniform(-200.0, 200.0, 3), Rotation.random(rng=rng)
+    assert stage.hear(pose(place, turn), NOW_NS, NOW_NS)
+    at, turned = said(stage)
+    assert np.allclose(at, 1e-3 * rows(base) @ place, rtol=0, atol=1e-15)
+    expected = Rotation.from_matrix(rows(base) @ turn.as_matrix() @ rows(stylus).T)
+    assert (turned * expected.inv()).magnitude() < 1e-12
+
+
+def test_a_force_is_given_along_the_axes_of_the_device_and_never_above_its_bound():
+    stage = bridge(device_axes=TURNED, force_gain=0.5, largest_force=2.0)
+    stage.hear(pose(), NOW_NS, NOW_NS)
+    for asked in ([1.0, 0.0, 0.0], [0.5, -1.0, 2.0], [30.0, 0.0, -40.0]):
+        stage.signals["master_servo_cf"][:3] = asked
+        given_force, expected = stage.force(0.01, NOW_NS), 0.5 * ROWS.T @ asked
+        expected *= min(1.0, 2.0 / np.linalg.norm(expected))
+        assert np.allclose(given_force, expected, rtol=0, atol=1e-15)
+
+
+def test_what_the_device_does_and_what_it_feels_make_the_same_work_in_both_frames():
+    rng = np.random.default_rng(2)
+    stage = bridge(device_axes=TURNED, unit=0.01)
+    for k in range(20):
+        place, force = rng.uniform(-5.0, 5.0, 3), rng.uniform(-1.0, 1.0, 3)
+        assert stage.hear(pose(place), NOW_NS + k + 1, NOW_NS)
+        stage.signals["master_servo_cf"][:3] = force
+        ours = said(stage)[0] @ force
+        assert 0.01 * place @ stage.force(0.0, NOW_NS) == pytest.approx(ours, abs=1e-15)
+
+
+@pytest.mark.parametrize("late", ["force", "device", "never", "nan"])
+def test_a_device_is_given_no_force_where_either_side_is_silent(late):
+    stage = bridge(force_timeout=0.1)
+    if late != "never":
+        stage.hear(pose(), NOW_NS, NOW_NS)
+    stage.signals["master_servo_cf"][0] = np.nan if late == "nan" else 1.0
+    now_ns = NOW_NS + (200_000_000 if late == "device" else 0)
+    assert not stage.force(0.2 if late == "force" else 0.0, now_ns).any()
+
+
+WRONG = {
+    "nan": (pose((np.nan, 0.0, 0.0)), 0, "form"),
+    "no quaternion": (np.zeros(7), 0, "form"),
+    "old": (pose(), -200_000_000, "stamp"),
+    "ahead": (pose(), 200_000_000, "stamp"),
+    "again": (pose(), -10_000_000, "stamp"),
+}
+
+
+@pytest.mark.parametrize(("given_pose", "off_ns", "reason"), WRONG.values(), ids=WRONG)
+def test_a_pose_that_is_none_is_refused_counted_and_told_and_a_sound_one_ends_that(
+    given_pose, off_ns, reason
+):
+    stage = bridge()
+    assert stage.hear(pose((0.1, 0.0, 0.0)), NOW_NS - 10_000_000, NOW_NS)
+    before = stage.signals["master_measured_cp"].copy()
+    assert not stage.hear(given_pose, NOW_NS + off_ns, NOW_NS)
+    assert np.array_equal(stage.signals["master_measured_cp"], before)
+    assert stage.refused == {reason: 1}
+    assert "not believed" in stage.concerns()[0]
+    assert stage.hear(pose(), NOW_NS, NOW_NS)
+    assert not stage.concerns()
+
+
+def test_buttons_are_taken_from_where_they_are_and_missing_ones_are_released():
+    stage = bridge(button_places=(2, -1, 0))
+    assert stage.press([1, 1, 0])
+    assert stage.signals["master_buttons"].tolist() == [0.0, 0.0, 1.0]
+    assert stage.press([0, 0, 1])
+    assert stage.signals["master_buttons"].tolist() == [1.0, 0.0, 0.0]
+    assert not stage.press([1, 0])
+    assert stage.refused == {"buttons": 1}
+
+
+def test_a_jointed_device_is_where_the_forward_kinematics_of_its_robot_says():
+    robot = load_robot("scara")
+    stage = bridge(
+        pose_message=POSE_MESSAGES[-1], handle="scara", device_axes=TURNED,
+        handle_joints=[f"{robot.joint_names[0]}=turn"], handle_signs=[-1.0] + [1.0] * 3,
+    )  # fmt: skip
+    names = ["turn", *robot.joint_names[1:], "gripper"]
+    q = robot.home + 0.1
+    assert stage.hear_joints(names, [-q[0], *q[1:], 0.0], NOW_NS, NOW_NS)
+    at, turned = said(stage)
+    T = robot.fk(q)
+    assert np.allclose(at, ROWS @ T[:3, 3], rtol=0, atol=1e-12)
+    assert np.allclose(turned.as_matrix(), ROWS @ T[:3, :3], rtol=0, atol=1e-12)
+    assert not stage.hear_joints(names[1:], [*q[1:], 0.0], NOW_NS + 1, NOW_NS)
+    assert "turn" in stage.concerns()[0]
+    assert stage.refused == {"names": 1}
+
+
+@pytest.mark.parametrize(
+    ("values", "name"),
+    [
+        ({"device_axes": ("+x", "+y", "-z")}, "device_axes"),
+        ({"stylus_axes": ("+x", "+x", "+z")}, "stylus_axes"),
+        ({"pose_message": POSE_MESSAGES[-1]}, "handle"),
+        ({"handle": "scara"}, "handle"),
+    ],
+)
+def test_what_no_device_can_be_is_refused_by_its_name(values, name):
+    with pytest.raises(ParameterError) as caught:
+        MasterBridgeParameters(**values)
+    assert caught.value.name == f"master_bridge.{name}"
+
+
+# -- axes from motions -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("axes", FRAMES, ids="".join)
+def test_axes_and_unit_come_out_of_three_motions_that_are_not_quite_straight(axes):
+    rng = np.random.default_rng(len(axes))
+    for unit in UNITS:
+        ways = rows(axes) * 0.1 / unit  # of the device, for a way along x, y and z of the master
+        ways = ways * rng.uniform(0.6, 1.5, (3, 1)) + rng.uniform(-0.02, 0.02, (3, 3)) / unit
+        found = device_axes(ways)
+        assert (found.axes, found.unit) == (axes, unit)
+
+
+@pytest.mark.parametrize("way", [(0.0, 0.0, 0.0), (0.1, 0.1, 0.0), (0.1, 0.07, 0.0)])
+def test_a_motion_that_is_no_straight_one_is_refused(way):
+    with pytest.raises(ParameterError, match="straighter"):
+        axis_of(way)
+
+
+def test_two_motions_along_one_axis_and_left_handed_frames_are_refused():
+    with pytest.raises(ParameterError, match="three motions along three axes"):
+        device_axes([(0.1, 0.0, 0.0), (-0.1, 0.0, 0.0), (0.0, 0.0, 0.1)])
+    with pytest.raises(ParameterError, match="right-handed"):
+        device_axes([(0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, -0.1)])
+
+
+@pytest.mark.parametrize("file", MASTERS, ids=lambda path: path.stem)
+def test_the_configuration_of_each_device_has_parameters_that_exist(file):
+    groups = {k: v["ros__parameters"] for k, v in yaml.safe_load(file.read_text()).items()}
+    made = build(MasterBridgeParameters, groups["master_bridge"])
+    assert made.pose_topic
