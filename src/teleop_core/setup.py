@@ -95,6 +95,7 @@ setup(
         files("config", "*.rviz"),
         files("config/robots", "*.yaml"),
         files("config/arms", "*.yaml"),
+        files("config/masters", "*.yaml"),
         files("launch", "*.launch.py"),
     ],
     entry_points={
