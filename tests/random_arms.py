@@ -113,3 +113,41 @@ IIWA14 = axes_of_dh(
      (0, 0, 0.126)]
 )  # fmt: skip
 IIWA14_LIMITS = [(-math.radians(a), math.radians(a)) for a in (170, 120, 170, 120, 170, 120, 175)]
+
+
+KINDS = ("revolute", "continuous", "prismatic", "fixed")
+
+
+def random_urdf(seed, n):
+    """Chain of n moving joints and some fixed ones, every link with a branch that weighs."""
+    rng, lines, link, moving = np.random.default_rng(seed), ['<link name="l0"/>'], 0, 0
+    while moving < n:
+        kind = rng.choice(KINDS)
+        moving += kind != "fixed"
+        link += 1
+        for name, parent in ((f"l{link}", f"l{link - 1}"), (f"b{link}", f"l{link}")):
+            side = rng.uniform(0.02, 0.3, 3) ** 2
+            tensor = np.diag(side.sum() - side)
+            turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            I = turn @ tensor @ turn.T  # noqa: E741
+            keys = (
+                ("xx", 0, 0),
+                ("xy", 0, 1),
+                ("xz", 0, 2),
+                ("yy", 1, 1),
+                ("yz", 1, 2),
+                ("zz", 2, 2),
+            )
+            numbers = " ".join(f'i{key}="{I[i, j]:.17g}"' for key, i, j in keys)
+            of = kind if name[0] == "l" else "revolute"
+            lines.append(
+                f'<link name="{name}"><inertial><origin xyz="{row(rng.normal(size=3))}" '
+                f'rpy="{row(rng.uniform(-3, 3, 3))}"/><mass value="{rng.uniform(0.1, 5):.17g}"/>'
+                f"<inertia {numbers}/></inertial></link>"
+                f'<joint name="to_{name}" type="{of}"><parent link="{parent}"/>'
+                f'<child link="{name}"/><origin xyz="{row(rng.normal(size=3))}" '
+                f'rpy="{row(rng.uniform(-3, 3, 3))}"/><axis xyz="{row(rng.normal(size=3))}"/>'
+                f'<limit lower="{rng.uniform(-2, 0.5):.17g}" upper="{rng.uniform(0.6, 2):.17g}" '
+                f'effort="20" velocity="2"/></joint>'
+            )
+    return f'<robot name="random">{"".join(lines)}</robot>', f"l{link}"

@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio
 import pytest
 
+from random_arms import random_urdf
 from teleop_core.base.errors import ParameterError, RecordingError, TeleopError, UnknownNameError
 from teleop_core.robots import load_robot
 from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics
@@ -16,47 +17,7 @@ from teleop_core.session.notes import notes_of
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "any_arm.urdf"
 TEXT = EXAMPLE.read_text()
-KINDS = ("revolute", "continuous", "prismatic", "fixed")
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
-
-
-def row(values):
-    return " ".join(f"{value:.17g}" for value in values)
-
-
-def random_urdf(seed, n):
-    """Chain of n moving joints and some fixed ones, every link with a branch that weighs."""
-    rng, lines, link, moving = np.random.default_rng(seed), ['<link name="l0"/>'], 0, 0
-    while moving < n:
-        kind = rng.choice(KINDS)
-        moving += kind != "fixed"
-        link += 1
-        for name, parent in ((f"l{link}", f"l{link - 1}"), (f"b{link}", f"l{link}")):
-            side = rng.uniform(0.02, 0.3, 3) ** 2
-            tensor = np.diag(side.sum() - side)
-            turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-            I = turn @ tensor @ turn.T  # noqa: E741
-            keys = (
-                ("xx", 0, 0),
-                ("xy", 0, 1),
-                ("xz", 0, 2),
-                ("yy", 1, 1),
-                ("yz", 1, 2),
-                ("zz", 2, 2),
-            )
-            numbers = " ".join(f'i{key}="{I[i, j]:.17g}"' for key, i, j in keys)
-            of = kind if name[0] == "l" else "revolute"
-            lines.append(
-                f'<link name="{name}"><inertial><origin xyz="{row(rng.normal(size=3))}" '
-                f'rpy="{row(rng.uniform(-3, 3, 3))}"/><mass value="{rng.uniform(0.1, 5):.17g}"/>'
-                f"<inertia {numbers}/></inertial></link>"
-                f'<joint name="to_{name}" type="{of}"><parent link="{parent}"/>'
-                f'<child link="{name}"/><origin xyz="{row(rng.normal(size=3))}" '
-                f'rpy="{row(rng.uniform(-3, 3, 3))}"/><axis xyz="{row(rng.normal(size=3))}"/>'
-                f'<limit lower="{rng.uniform(-2, 0.5):.17g}" upper="{rng.uniform(0.6, 2):.17g}" '
-                f'effort="20" velocity="2"/></joint>'
-            )
-    return f'<robot name="random">{"".join(lines)}</robot>', f"l{link}"
 
 
 def model_and_q(text, robot, q, model=None):
@@ -292,7 +253,6 @@ MISTAKES = {
     "negative effort": (changed('effort="80"', 'effort="-80"'), "effort of joint elbow"),
     "negative mass": (changed('mass value="3.0"', 'mass value="-3.0"'), "link forearm"),
     "an inertia of no body": (changed('izz="0.008"', 'izz="0.9"'), "link forearm"),
-    "a mimic between": (changed(f"<limit {LOW}", f'<mimic joint="waist"/><limit {LOW}'), "elbow"),
 }
 
 

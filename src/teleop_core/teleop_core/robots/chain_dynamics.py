@@ -203,6 +203,29 @@ def inertia_matrix(q: Array, row: Array, M: Array) -> None:
     _inertias(axes, bodies, row, M)
 
 
+def pseudo_inertias(q: Array, row: Array) -> Array:
+    """Pseudo-inertias (n, 4, 4) in the base of what each joint moves up to the next.
+
+    Args:
+        q: Joint positions (n,) [rad or m].
+        row: See :func:`chain_row`.
+    """
+    n = q.shape[0]
+    bodies, out = np.empty((n, _BODY)), np.empty((n, 4, 4))
+    _place_bodies(q, row, bodies)
+    tensors = bodies[:, 4:].reshape(n, 3, 3)
+    spread = 0.5 * np.trace(tensors, axis1=1, axis2=2)
+    out[:, :3, :3] = spread[:, None, None] * np.eye(3) - tensors
+    out[:, :3, 3] = out[:, 3, :3] = bodies[:, 1:4]
+    out[:, 3, 3] = bodies[:, 0]
+    return out
+
+
+@kernel
+def _place_bodies(q: Array, row: Array, bodies: Array) -> None:
+    _place(q, row, np.empty((q.shape[0], 6)), bodies)
+
+
 @kernel
 def chain_gravity(q: Array, row: Array, effort: Array) -> None:
     """Write the efforts (n,) [N·m or N] that hold the chain at rest."""

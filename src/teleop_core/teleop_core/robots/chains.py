@@ -16,7 +16,9 @@ from teleop_core.robots.robot import Robot
 
 
 def chain_of(robot: Robot) -> Chain | None:
-    """The robot as a chain; None for one that is none, such as a parallel robot."""
+    """The robot as a chain; None for one that is none: a parallel robot, or one with followers."""
+    if "motions" in robot.geometry:
+        return None
     if robot.kernels.fk is dh_kernels.fk:
         row = robot.geometry_row
     else:

@@ -11,6 +11,7 @@ from teleop_core.kernels.portable import product
 from teleop_core.robots.decomposition import SEARCH, Solution
 from teleop_core.robots.dh_drives import drives_of
 from teleop_core.robots.drives import Drives
+from teleop_core.robots.followers import Followers
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
 
@@ -138,19 +139,34 @@ def chain_robot(
     task: Sequence[str],
     drives: Drives,
     solution: Solution = SEARCH,
+    followers: Followers | None = None,
 ) -> Robot:
     """Robot whose joints move about or along z, with constant transforms between them.
 
     Args:
         name: Name of the robot.
         joints: From the base to the tip; names, limits, home and start count.
-        kinds: For each 1 for a turn, 2 for a slide; negative against its axis.
-        fixed: Transforms (4, 4) before, between and after the joints, one more than joints.
+        kinds: For each motion 1 for a turn, 2 for a slide; negative against its axis.
+        fixed: Transforms (4, 4) before, between and after the motions, one more than motions.
         reach: Length [m] by which distances count against angles; 1 m where it is 0.
         task: Directions that the arm is to control, of :data:`DIRECTIONS`.
         drives: Drive table.
         solution: How its inverse kinematics are solved.
+        followers: What the motions do; None where they are the joints.
     """
+    weights = {
+        "reach": reach if reach > 0.0 else 1.0,
+        **{f"controls_{direction}": float(direction in task) for direction in DIRECTIONS},
+    }
+    chain = {**{f"kind{i + 1}": kind for i, kind in enumerate(kinds)}, **weights}
+    if followers is not None:
+        chain = {
+            **{f"joint{i + 1}": kind for i, kind in enumerate(followers.kinds)},
+            **{f"joints_{key}": value for key, value in weights.items()},
+            "motions": len(kinds) + 1.0,
+            **{f"follower{i}": value for i, value in enumerate(followers.row)},
+            **chain,
+        }
     numbers = {
         f"fixed{i}_{r}{c}": float(matrix[r, c])
         for i, matrix in enumerate(fixed)
@@ -166,9 +182,7 @@ def chain_robot(
         home=np.array([joint.home for joint in joints]),
         start=None if all(joint.start is None for joint in joints) else np.array(starts),
         geometry={
-            **{f"kind{i + 1}": kind for i, kind in enumerate(kinds)},
-            "reach": reach if reach > 0.0 else 1.0,
-            **{f"controls_{direction}": float(direction in task) for direction in DIRECTIONS},
+            **chain,
             **numbers,
             **{f"solution{i}": value for i, value in enumerate(solution.constants)},
         },

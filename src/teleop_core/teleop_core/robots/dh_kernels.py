@@ -4,6 +4,10 @@ Every convention comes down to T = F0 J1(q1) F1 J2(q2) F2 ... with Ji a turn abo
 the local z axis and Fi constant. The geometry row holds, for n joints: n kinds (+1 or -1 a turn,
 +2 or -2 a slide, negative against its axis), the reach [m], six weights of the controlled
 directions (1 or 0), and n + 1 transforms of twelve numbers, row by row.
+
+In a chain of m motions of which some follow others (:mod:`teleop_core.robots.followers`) there
+stand, in place of the transforms: m + 1, which is no entry of a rotation, as the first one is; for
+all motions their joints, then their factors, then their offsets; and the row of the m motions.
 """
 
 import math
@@ -53,9 +57,29 @@ def move_joint(kind: float, q: float, T: Array) -> None:
         T[i, 0], T[i, 1] = c * x + s * y, c * y - s * x
 
 
+@inner
+def spread(q: Array, followers: Array, motions: Array) -> None:
+    """Write the motions (m,) of joints (n,); ``followers`` begin with joints, factors, offsets."""
+    m = motions.shape[0]
+    for i in range(m):
+        motions[i] = followers[m + i] * q[int(followers[i])] + followers[2 * m + i]
+
+
 @kernel
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip``, (4, 4), of joints (n,)."""
+    at = q.shape[0] + 7
+    m = int(geometry[at]) - 1
+    if m > 0:
+        motions = np.empty(m)
+        spread(q, geometry[at + 1 :], motions)
+        _chain_fk(motions, geometry[at + 1 + 3 * m :], T)
+    else:
+        _chain_fk(q, geometry, T)
+
+
+@inner
+def _chain_fk(q: Array, geometry: Array, T: Array) -> None:
     n = q.shape[0]
     for i in range(4):
         for j in range(4):
@@ -69,6 +93,23 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 @kernel
 def jacobian(q: Array, geometry: Array, J: Array) -> None:
     """Write the geometric Jacobian (6, n): rows linear, then angular, in base axes."""
+    at = q.shape[0] + 7
+    m = int(geometry[at]) - 1
+    if m > 0:
+        motions, whole = np.empty(m), np.empty((6, m))
+        spread(q, geometry[at + 1 :], motions)
+        _chain_jacobian(motions, geometry[at + 1 + 3 * m :], whole)
+        for r in range(6):
+            for j in range(q.shape[0]):
+                J[r, j] = 0.0
+            for i in range(m):
+                J[r, int(geometry[at + 1 + i])] += geometry[at + 1 + m + i] * whole[r, i]
+    else:
+        _chain_jacobian(q, geometry, J)
+
+
+@inner
+def _chain_jacobian(q: Array, geometry: Array, J: Array) -> None:
     n, T = q.shape[0], np.empty((4, 4))
     for i in range(4):
         for j in range(4):

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numba import types
@@ -104,11 +104,13 @@ class Dynamics:
         parameters: Numbers that both read, in the model's own order.
         compensated: Axes (n,) whose gravity the published controller feeds forward.
         links: Inertias of the links behind those numbers, for models that have such; () for none.
+        frames: Where the frames of these links stand in the base with all joints at home,
+            (k, 4, 4), the k-th moved by joint k; () where nobody says, as without links.
         unknown: Names of numbers that the source does not state, to their places in the row; the
             real arm may differ in them (:mod:`teleop_lab.fitting`).
 
     Raises:
-        ShapeError: ``parameters`` are not a vector.
+        ShapeError: ``parameters`` are not a vector, or there is not one frame for each link.
         ParameterError: ``parameters`` that are not finite, or a link whose inertia no body can
             have.
     """
@@ -118,14 +120,22 @@ class Dynamics:
     parameters: Array
     compensated: NDArray[np.bool_]
     links: tuple[LinkInertia, ...] = ()
+    frames: tuple[Array, ...] = ()
     unknown: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_possible(self.links)
+        if self.frames and np.shape(self.frames) != (len(self.links), 4, 4):
+            raise ShapeError("frames", (len(self.links), 4, 4), np.shape(self.frames))
+        object.__setattr__(self, "frames", tuple(_frozen(frame) for frame in self.frames))
         object.__setattr__(self, "parameters", read_only("parameters", self.parameters))
-        compensated = np.array(self.compensated, dtype=np.bool_)
-        compensated.setflags(write=False)
-        object.__setattr__(self, "compensated", compensated)
+        object.__setattr__(self, "compensated", _frozen(self.compensated, np.bool_))
+
+
+def _frozen(values: object, dtype: type = np.float64) -> NDArray[Any]:
+    array: NDArray[Any] = np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array
 
 
 @kernel

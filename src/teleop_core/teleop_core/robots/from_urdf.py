@@ -1,12 +1,13 @@
 """Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
 
-What moves the tip are the joints between root and tip; all others stay at zero, and weigh. The
-kinematics are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.dh_kernels`), the
-dynamics those of rigid bodies (:mod:`teleop_core.robots.chain_dynamics`). Effort and velocity
-limits, damping and friction are the drives' where they stand in the file and are above zero. The
-inertia of a drive is that of the links at home; that of its motor is in no URDF. Whatever is left
-out is assumed as for tables (:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed``
-names it. Meshes are not read.
+What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint
+between them that mimics another moves with it (:mod:`teleop_core.robots.followers`). The kinematics
+are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.dh_kernels`), the dynamics those of
+rigid bodies (:mod:`teleop_core.robots.chain_dynamics`). Effort and velocity limits, damping and
+friction are the drives' where they stand in the file and are above zero. The inertia of a drive is
+that of the links at home; that of its motor is in no URDF. Whatever is left out is assumed as for
+tables (:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are not
+read.
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -25,17 +26,18 @@ from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import dot, length, product
-from teleop_core.robots.chain_dynamics import (
-    body_row,
-    chain_dynamics,
-    chain_gravity,
-    chain_row,
-    inertia_matrix,
-)
-from teleop_core.robots.decomposition import solution_of
+from teleop_core.robots.chain_dynamics import body_row, chain_dynamics, chain_row
+from teleop_core.robots.decomposition import SEARCH, solution_of
 from teleop_core.robots.dh_chain import DhJoint, chain_robot
 from teleop_core.robots.dh_drives import drives_of, least_inertia, parse_drives
-from teleop_core.robots.drives import ENTRIES, Drives
+from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
+from teleop_core.robots.followers import (
+    Follower,
+    Followers,
+    dynamics_row,
+    follower_dynamics,
+    follower_inertia,
+)
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
 
@@ -46,6 +48,7 @@ _ROUNDS = 2.0 * math.pi
 """Limit [rad] of a continuous joint to either side, assumed."""
 _ROUNDING = 1e-6  # of an inertia, over its trace: files are written with few digits
 _NO_INERTIA = 1e-9  # [kg·m² or kg]; below it is rounding of bodies on the axis, and unknown
+_POWERS = {"viscous": 2, "coulomb": 1}  # of a factor, by which friction of a follower counts
 _Links = Mapping[str, Xml.Element]
 
 
@@ -91,7 +94,8 @@ def load_urdf(
 
     Raises:
         RecordingError: The file cannot be read, or is not XML.
-        ParameterError: An element that is missing or not possible; the message names it.
+        ParameterError: An element that is missing or not possible; the message names it. With
+            dynamics of links also a joint beside the way to the tip that moves with one on it.
         UnknownNameError: A tip, direction, dynamics, link or type of joint that does not exist.
     """
     if dynamics not in MODELS:
@@ -112,15 +116,18 @@ def load_urdf(
         raise ParameterError(
             "tip", tip or chain, "a link that some joint between it and the root moves"
         )
-    limits = [_limits(joint) for joint in moving]
+    trains, followers = _trains(moving, {joint.name: joint for joint in joints})
+    leaders = [train[0].joint for train in trains]
+    limits = [_narrowed(train) for train in trains]
     fixed, kinds = _frames(chain)
-    slides = zip(moving, limits, strict=True)
     reach = sum(float(length(joint.origin[:3, 3])) for joint in chain)
-    reach += sum(max(abs(dh.lower), abs(dh.upper)) for j, dh in slides if j.kind == "prismatic")
-    home = np.array([limit.home for limit in limits])
-    bodies, inertia = _bodies(moving, base, links, joints), np.zeros((len(moving), len(moving)))
-    inertia_matrix(home, chain_row(kinds, fixed, bodies, np.zeros(len(moving))), inertia)
-    drives = _drives(moving, np.diag(inertia).tolist())
+    reach += sum(max(map(abs, _limits(j))) for j in moving if j.kind == "prismatic")
+    home, n = np.array([limit.home for limit in limits]), len(limits)
+    bodies, inertia = _bodies(moving, base, links, joints), np.zeros((n, n))
+    chain_numbers = chain_row(kinds, fixed, bodies, np.zeros(len(moving)))
+    follower_inertia(home, dynamics_row(followers, chain_numbers, np.zeros(n)), inertia)
+    drives = _drives(trains, np.diag(inertia).tolist())
+    solution = solution_of(kinds, fixed, reach, _task(task)) if followers.is_plain else SEARCH
     robot = chain_robot(
         name=root.get("name") or Path(path).stem,
         joints=limits,
@@ -129,21 +136,82 @@ def load_urdf(
         reach=reach,
         task=_task(task),
         drives=drives,
-        solution=solution_of(kinds, fixed, reach, _task(task)),
+        solution=solution,
+        followers=None if followers.is_plain else followers,
     )
     if dynamics == "independent":
         return robot
-    row = chain_row(kinds, fixed, bodies, np.maximum(drives.inertia - np.diag(inertia), 0.0))
-    _refuse_weak(moving, drives, home, row)
+    motors = np.maximum(drives.inertia - np.diag(inertia), 0.0)
+    if followers.is_plain:
+        model = chain_dynamics(chain_row(kinds, fixed, bodies, motors))
+    else:
+        _refuse_beside(leaders, moving, joints)
+        model = follower_dynamics(dynamics_row(followers, chain_numbers, motors), n)
+    _refuse_weak(leaders, drives, home, model)
     # Without its start, for which a second's search would begin here: who needs it asks for it.
-    return replace(robot, dynamics=chain_dynamics(row), start=None)
+    return replace(robot, dynamics=model, start=None)
 
 
-def _refuse_weak(moving: list[_Joint], drives: Drives, home: Array, row: Array) -> None:
+@dataclass(frozen=True, kw_only=True)
+class _Geared:
+    """A joint that turns or slides by ``factor`` times what its leader does, plus ``offset``."""
+
+    joint: _Joint
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+def _trains(
+    moving: list[_Joint], named: Mapping[str, _Joint]
+) -> tuple[list[list[_Geared]], Followers]:
+    """For each joint of the robot itself and all that follow it to the tip; and the motions."""
+    trains: dict[str, list[_Geared]] = {}
+    motions = []
+    for joint in moving:
+        leader, factor, offset = _leader(joint, named)
+        train = trains.setdefault(leader.name, [_Geared(joint=leader)])
+        if joint is not leader:
+            train.append(_Geared(joint=joint, factor=factor, offset=offset))
+        place = list(trains).index(leader.name)
+        motions.append(Follower(leader=place, factor=factor, offset=offset))
+    kinds = tuple(1.0 if _KINDS[t[0].joint.kind] == "turn" else 2.0 for t in trains.values())
+    return list(trains.values()), Followers(motions=tuple(motions), kinds=kinds)
+
+
+def _leader(joint: _Joint, named: Mapping[str, _Joint]) -> tuple[_Joint, float, float]:
+    """Joint that a joint follows in the end, itself if none, with factor and offset."""
+    factor, offset, passed = 1.0, 0.0, [joint.name]
+    while (mimic := joint.element.find("mimic")) is not None:
+        where = f"mimic of joint {joint.name}"
+        own = float(_numbers(where, mimic, "multiplier", (1.0,))[0])
+        if own == 0.0:
+            raise ParameterError(f"multiplier of {where}", own, "not 0: what never moves is fixed")
+        offset += factor * float(_numbers(where, mimic, "offset", (0.0,))[0])
+        factor, name = factor * own, mimic.get("joint", "")
+        movable = [other for other in named if named[other].axis is not None]
+        if name not in movable:
+            raise UnknownNameError(where, name, movable)
+        if name in passed:
+            raise ParameterError(where, name, "a joint that does not follow it in turn")
+        joint = named[name]
+        passed.append(name)
+    return joint, factor, offset
+
+
+def _refuse_beside(leaders: list[_Joint], moving: list[_Joint], joints: list[_Joint]) -> None:
+    """Refuse what moves with a joint of the robot, but not between root and tip: it would weigh."""
+    named = {joint.name: joint for joint in joints}
+    for joint in joints:
+        if joint.axis is not None and joint not in moving and _leader(joint, named)[0] in leaders:
+            needed = f"independent: joint {joint.name} is not on the way to the tip, and moves too"
+            raise ParameterError("dynamics", "links", needed)
+
+
+def _refuse_weak(leaders: list[_Joint], drives: Drives, home: Array, model: Dynamics) -> None:
     """Refuse drives that cannot hold the arm at home."""
-    weight = np.zeros(len(moving))
-    chain_gravity(home, row, weight)
-    for joint, most, needed in zip(moving, drives.effort_limit, abs(weight), strict=True):
+    weight = np.zeros(len(leaders))
+    model.gravity(home, model.parameters.copy(), weight)
+    for joint, most, needed in zip(leaders, drives.effort_limit, abs(weight), strict=True):
         if most <= needed:
             name = f"effort of joint {joint.name}"
             raise ParameterError(name, float(most), f"above {needed:.3g}, its load at home")
@@ -243,10 +311,8 @@ def _task(task: str) -> tuple[str, ...]:
     return names or DIRECTIONS
 
 
-def _limits(joint: _Joint) -> DhJoint:
+def _limits(joint: _Joint) -> tuple[float, float]:
     where, limit = f"joint {joint.name}", joint.element.find("limit")
-    if joint.element.find("mimic") is not None:
-        raise ParameterError(where, "mimic", "a joint of its own: it lies between root and tip")
     if joint.kind == "continuous":
         lower, upper = -_ROUNDS, _ROUNDS
     else:
@@ -254,8 +320,23 @@ def _limits(joint: _Joint) -> DhJoint:
         upper = float(_numbers(where, limit, "upper", (0.0,))[0])
     if not lower < upper:
         raise ParameterError(f"limits of {where}", (lower, upper), "lower < upper")
+    return lower, upper
+
+
+def _narrowed(train: list[_Geared]) -> DhJoint:
+    """Joint with the limits in which it and all that follow it are within theirs."""
+    leader = train[0].joint
+    lower, upper = _limits(leader)
+    for geared in train[1:]:
+        if geared.joint.kind != "continuous":
+            ends = sorted((x - geared.offset) / geared.factor for x in _limits(geared.joint))
+            lower, upper = max(lower, ends[0]), min(upper, ends[1])
+    if not lower < upper:
+        names = ", ".join(geared.joint.name for geared in train[1:])
+        needed = f"lower < upper within the limits of {names}, by which it is followed"
+        raise ParameterError(f"limits of joint {leader.name}", (lower, upper), needed)
     home = 0.0 if lower <= 0.0 <= upper else 0.5 * (lower + upper)
-    return DhJoint(name=joint.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
+    return DhJoint(name=leader.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
 
 
 def _frames(chain: list[_Joint]) -> tuple[list[Array], list[float]]:
@@ -284,26 +365,41 @@ def _turned_z(axis: Array) -> Array:
     )
 
 
-def _drives(moving: list[_Joint], inertias: list[float]) -> Drives:
-    kinds, stated = [_KINDS[joint.kind] for joint in moving], {}
-    for joint, kind, inertia in zip(moving, kinds, inertias, strict=True):
-        where, own = f"joint {joint.name}", {}
-        for tag, key, entry in (
-            ("limit", "effort", "effort_limit"), ("limit", "velocity", "speed_limit"),
-            ("dynamics", "damping", "viscous"), ("dynamics", "friction", "coulomb"),
-        ):  # fmt: skip
-            value = float(_numbers(where, joint.element.find(tag), key, (0.0,))[0])
-            if value < 0.0:
-                raise ParameterError(f"{key} of {where}", value, ">= 0")
-            if value > 0.0:  # a limit of 0 is what files say that do not know it
-                own[entry] = value
+def _drives(trains: list[list[_Geared]], inertias: list[float]) -> Drives:
+    """Drives of the leaders, which bear friction and keep speed limits of what follows them."""
+    kinds, stated = [_KINDS[train[0].joint.kind] for train in trains], {}
+    for train, kind, inertia in zip(trains, kinds, inertias, strict=True):
+        own: dict[str, float] = {}
+        for geared in train:
+            factor = abs(geared.factor)
+            for entry, value in _drive_entries(geared.joint).items():
+                if entry == "speed_limit":
+                    own[entry] = min(own.get(entry, math.inf), value / factor)
+                elif entry != "effort_limit":
+                    own[entry] = own.get(entry, 0.0) + value * math.pow(factor, _POWERS[entry])
+                elif geared is train[0]:
+                    own[entry] = value
         least = least_inertia(kind, own.get("viscous", 0.0), own.get("coulomb", 0.0))
         if max(inertia, least) > _NO_INERTIA:
             own["inertia"] = max(inertia, least)
-        stated[joint.name] = own
+        stated[train[0].joint.name] = own
     drives = drives_of(kinds, parse_drives(stated, list(stated), kinds, 1.0))
     assumed = tuple(name for name in ENTRIES if name in ("inertia", *drives.assumed))
     return replace(drives, assumed=assumed)
+
+
+def _drive_entries(joint: _Joint) -> dict[str, float]:
+    where, found = f"joint {joint.name}", {}
+    for tag, key, entry in (
+        ("limit", "effort", "effort_limit"), ("limit", "velocity", "speed_limit"),
+        ("dynamics", "damping", "viscous"), ("dynamics", "friction", "coulomb"),
+    ):  # fmt: skip
+        value = float(_numbers(where, joint.element.find(tag), key, (0.0,))[0])
+        if value < 0.0:
+            raise ParameterError(f"{key} of {where}", value, ">= 0")
+        if value > 0.0:  # a limit of 0 is what files say that do not know it
+            found[entry] = value
+    return found
 
 
 def _bodies(moving: list[_Joint], base: str, links: _Links, joints: list[_Joint]) -> Array:

@@ -9,6 +9,7 @@ Source:
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -299,6 +300,8 @@ def make(**geometry: float) -> Robot:
         geometry=row,
         kernels=Kernels(fk=fk, jacobian=jacobian, ik=ik, ik_all=ik_all),
         drives=rcrt1_dynamics.DRIVES,
-        dynamics=rcrt1_dynamics.DYNAMICS,
+        dynamics=replace(
+            rcrt1_dynamics.DYNAMICS, frames=rcrt1_dynamics.link_frames(HOME, row["d2"])
+        ),
         hardware=rcrt1_hardware.HARDWARE,
     )

@@ -21,7 +21,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kernels.portable import product
 from teleop_core.robots.drives import Drives, Dynamics
 from teleop_core.robots.inertias import LinkInertia
 
@@ -77,6 +78,20 @@ def link_inertias(symbols: Mapping[str, float] = LINKS) -> tuple[LinkInertia, ..
             (p["I3xx"], p["I3yy"], p["I3zz"]), (0.0, p["I3xz"], 0.0),
         ),
     )  # fmt: skip
+
+
+def link_frames(q: Array, d2: float) -> tuple[Array, ...]:
+    """Frames 1 to 3 of the source's table in the base, (4, 4) each, at joints (6,) [rad, m].
+
+    Source:
+        Vongbunyong 2008, section 4.4: alpha = -90, 90, 0 degrees, d = 0, d2, d3.
+    """
+    quarter, still = 0.5 * math.pi, np.zeros(3)
+    first = transform(product(rotation("z", q[0]), rotation("x", -quarter)), still)
+    turn = product(rotation("z", q[1]), rotation("x", quarter))
+    second = product(first, transform(turn, np.array([0.0, 0.0, d2])))
+    third = product(second, transform(np.eye(3), np.array([0.0, 0.0, q[2]])))
+    return first, second, third
 
 
 @kernel

@@ -21,6 +21,7 @@ from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
 from teleop_core.robots.bodies.frames import pose_of, tips
 from teleop_core.robots.bodies.solids import ball, cylinder
+from teleop_core.robots.followers import followers_of
 from teleop_core.robots.robot import Robot
 
 # Robots whose joints are no chain, by the module of their kernels, with what describes them.
@@ -69,19 +70,29 @@ def serial_bodies(robot: Robot) -> Bodies | None:
     """Bodies of a robot whose joints are a chain; None if they are not."""
     if robot.kernels.assemble is not None:
         return None
-    home = robot.fk(robot.home)
-    axes = axes_of(robot.jacobian(robot.home), home[:3, 3])
+    tip = pose_of(robot.fk(robot.home))
+    followers = followers_of(robot)
+    ranges, jacobian = np.stack((robot.lower, robot.home, robot.upper)), robot.jacobian(robot.home)
+    if followers is not None:
+        ranges = np.sort(followers.of(ranges), axis=0)
+        jacobian = followers.chain_jacobian(robot.geometry_row, ranges[1])
+    axes = axes_of(jacobian, tip[:3])
     if axes is None:
         return None
-    tip, strokes = pose_of(home), robot.upper - robot.lower
-    chained = places(axes, robot.home - robot.lower, tip[:3])
-    joints = range(robot.n)
-    bodies, reach = chain(
-        chained, [f"link{i + 1}" for i in joints], joints, robot.home, strokes, tip
-    )
-    frames = Bodies(tuple(bodies), robot.n, None, (), reach).poses(robot.home)
+    chained = places(axes, ranges[1] - ranges[0], tip[:3])
+    moves = range(robot.n) if followers is None else followers.coordinates
+    names = [f"link{i + 1}" for i in range(len(axes))]
+    bodies, reach = chain(chained, names, moves, ranges[1], ranges[2] - ranges[0], tip)
+
+    def coordinates(q: Array) -> tuple[Array, Array]:
+        more = np.empty((len(q), 0)) if followers is None else followers.of(q)
+        return np.concatenate((q, more), axis=1), np.empty((1, 0, 7))
+
+    joined = None if followers is None else coordinates
+    frames = Bodies(tuple(bodies), robot.n, joined, (), reach).poses(robot.home)
     bodies.append(tip_of(bodies, frames[-1], tip, reach))
-    found = Bodies(tuple(bodies), robot.n, None, tuple(i + 1 for i in joints), reach)
+    first = range(robot.n) if followers is None else followers.first
+    found = Bodies(tuple(bodies), robot.n, joined, tuple(i + 1 for i in first), reach)
     return found if has_tip_of(found, robot) else None
 
 

@@ -1,18 +1,23 @@
 """URDF: bodies of a robot as the XML that RViz, Foxglove and physics engines read.
 
-Joints that move one body stand there with axis and limits. What the format has no joint for, legs
-and platforms of robots with loops and links that several joints move, hangs on floating joints: it
-is placed by ``/tf``. A capsule, which the format lacks, is a cylinder with two spheres.
+Joints that move one body stand there with axis and limits; a body that follows one joint by a
+factor and an offset has a joint with ``mimic``. What the format has no joint for, legs and
+platforms of robots with loops and links that several joints move, hangs on floating joints: it is
+placed by ``/tf``. A capsule, which the format lacks, is a cylinder with two spheres. Each shape is
+there to see and to collide with.
 """
 
+import math
 from collections.abc import Iterator
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
-from teleop_core.robots.bodies.body import Bodies, Body, Joint
+from teleop_core.kernels.geometry import Array, rotation, rotations_from_quaternions
+from teleop_core.kernels.portable import product
+from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.describe import bodies_of
+from teleop_core.robots.bodies.inertials import DENSITY, has_own_links, inertials_of
 from teleop_core.robots.bodies.solids import Role, Solid
 from teleop_core.robots.robot import Robot
 
@@ -25,6 +30,7 @@ COLOURS: dict[Role, tuple[float, float, float]] = {
     "tool": (0.80, 0.25, 0.22),
 }
 """Red, green, blue, 0 to 1, of solids by their role."""
+_EXACT = 1e-9  # [rad, m] by which a body that follows a joint may be off
 _TYPES = {Joint.FIXED: "fixed", Joint.REVOLUTE: "revolute", Joint.PRISMATIC: "prismatic"}
 
 
@@ -39,17 +45,26 @@ def urdf_of(robot: Robot, name: str = "", prefix: str = "") -> str:
 
     Returns:
         The XML. Limits are those of the robot, speeds and efforts those of its drives; 0 where
-        it has none. It holds no inertias: what is known of them is of the joints, not of bodies.
+        it has none. Inertias are those of the robot's own links where its model has them, else
+        assumed (:mod:`~teleop_core.robots.bodies.inertials`); a comment at the head says which,
+        and what has none. The base has none, since readers warn of a root that has. The format
+        has no place for the inertia of a motor.
     """
     bodies = bodies_of(robot)
+    inertials = inertials_of(robot, bodies)
     root = Xml.Element("robot", name=name or robot.name)
+    without = [body.name for i, body in enumerate(bodies.bodies) if i and i not in inertials]
+    root.append(Xml.Comment(_remark(robot, without)))
     for role, colour in COLOURS.items():
         material = Xml.SubElement(root, "material", name=role)
         Xml.SubElement(material, "color", rgba=_row((*colour, 1.0)))
-    for body in bodies.bodies:
+    for index, body in enumerate(bodies.bodies):
         link = Xml.SubElement(root, "link", name=prefix + body.name)
-        for solid in body.solids:
-            _visual(link, solid)
+        if index in inertials:
+            _inertial(link, inertials[index])
+        for what in ("visual", "collision"):
+            for solid in body.solids:
+                _geometry(link, what, solid)
     joints = joints_of(bodies)
     for index, body in enumerate(bodies.bodies[1:], start=1):
         _joint(root, robot, bodies, body, joints.get(index), prefix)
@@ -71,33 +86,90 @@ def _joint(
     root: Xml.Element, robot: Robot, bodies: Bodies, body: Body, joint: int | None, prefix: str
 ) -> None:
     is_fixed = body.joint is Joint.FIXED
+    follows = None if is_fixed or joint is not None else _follows(robot, bodies, body)
     name = f"{body.name}_joint" if joint is None else robot.joint_names[joint]
-    kind = "floating" if joint is None and not is_fixed else _TYPES[body.joint]
+    if follows is not None:  # after its leader in the order of names, which pinocchio reads in
+        name = f"{robot.joint_names[follows[0]]}_{body.name}"
+    is_floating = joint is None and follows is None and not is_fixed
+    kind = "floating" if is_floating else _TYPES[body.joint]
     element = Xml.SubElement(root, "joint", name=prefix + name, type=kind)
     Xml.SubElement(element, "parent", link=prefix + bodies.names[max(body.parent, 0)])
     Xml.SubElement(element, "child", link=prefix + body.name)
     if kind != "floating":
         _origin(element, body.origin)
-    if joint is None:
+    if is_fixed or is_floating:
         return
     Xml.SubElement(element, "axis", xyz="0 0 1")
-    drives = robot.drives
-    speed, effort = (
-        (0.0, 0.0)
-        if drives is None
-        else (float(drives.speed_limit[joint]), float(drives.effort_limit[joint]))
-    )
-    limits = {"lower": robot.lower[joint], "upper": robot.upper[joint]}
-    texts = {key: repr(float(value)) for key, value in limits.items()}
-    Xml.SubElement(element, "limit", texts, velocity=repr(speed), effort=repr(effort))
+    if joint is not None:
+        _limit(element, robot, joint, 1.0, 0.0)
+    elif follows is not None:
+        leader, factor, offset = follows
+        texts = {"multiplier": repr(factor), "offset": repr(offset)}
+        Xml.SubElement(element, "mimic", texts, joint=prefix + robot.joint_names[leader])
+        _limit(element, robot, leader, factor, offset)
 
 
-def _visual(link: Xml.Element, solid: Solid) -> None:
+def _limit(element: Xml.Element, robot: Robot, joint: int, factor: float, offset: float) -> None:
+    """Write the limits of a joint that moves by ``factor`` and ``offset`` of one of the robot."""
+    ends = sorted(factor * end + offset for end in (robot.lower[joint], robot.upper[joint]))
+    speed = effort = 0.0
+    if robot.drives is not None:
+        speed = abs(factor) * robot.drives.speed_limit[joint]
+        effort = robot.drives.effort_limit[joint] / abs(factor)
+    limits = {"lower": ends[0], "upper": ends[1], "velocity": speed, "effort": effort}
+    Xml.SubElement(element, "limit", {key: repr(float(value)) for key, value in limits.items()})
+
+
+def _follows(robot: Robot, bodies: Bodies, body: Body) -> tuple[int, float, float] | None:
+    """Joint of the file that a body follows alone, with factor and offset; None without."""
+    if body.joint not in _TYPES:
+        return None
+    draws = np.random.default_rng(0).uniform(robot.lower, robot.upper, (5, robot.n))
+    rows = np.concatenate((np.zeros((1, robot.n)), np.eye(robot.n), draws))
+    values = bodies.coordinates(rows)[0][:, body.coordinate]
+    slopes = values[1 : robot.n + 1] - values[0]
+    leaders = np.flatnonzero(slopes)
+    if len(leaders) != 1:
+        return None
+    leader = int(leaders[0])
+    if leader not in joints_of(bodies).values():
+        return None
+    factor, offset = float(slopes[leader]), float(values[0])
+    off = np.abs(factor * draws[:, leader] + offset - values[robot.n + 1 :]).max()
+    return (leader, factor, offset) if off < _EXACT else None
+
+
+def _remark(robot: Robot, without: list[str]) -> str:
+    """What a reader of the file must know of its inertias."""
+    if not has_own_links(robot):
+        return (
+            f" Inertias are assumed: bodies as drawn, of {DENSITY:g} kg/m3 throughout, for no"
+            " masses of links are known of this robot. "
+        )
+    lumped = f" None of {', '.join(without)}: others hold their masses." if without else ""
+    return f" Inertias are those of the robot's model, without its motors.{lumped} "
+
+
+def _inertial(link: Xml.Element, pseudo: Array) -> None:
+    """Write mass, centre, and inertia about the centre in the axes of the link."""
+    element, mass = Xml.SubElement(link, "inertial"), float(pseudo[3, 3])
+    center = pseudo[:3, 3] / mass
+    squares = pseudo[:3, :3] - mass * np.outer(center, center)
+    tensor = np.trace(squares) * np.eye(3) - squares
+    _origin(element, np.concatenate((center, HERE[3:])))
+    Xml.SubElement(element, "mass", value=repr(mass))
+    entries = [(i, j) for i in range(3) for j in range(i, 3)]
+    texts = {f"i{'xyz'[i]}{'xyz'[j]}": repr(float(tensor[i, j])) for i, j in entries}
+    Xml.SubElement(element, "inertia", texts)
+
+
+def _geometry(link: Xml.Element, what: str, solid: Solid) -> None:
     for pose, shape, sizes in _shapes(solid):
-        visual = Xml.SubElement(link, "visual")
-        _origin(visual, pose)
-        Xml.SubElement(Xml.SubElement(visual, "geometry"), shape, sizes)
-        Xml.SubElement(visual, "material", name=solid.role)
+        element = Xml.SubElement(link, what)
+        _origin(element, pose)
+        Xml.SubElement(Xml.SubElement(element, "geometry"), shape, sizes)
+        if what == "visual":
+            Xml.SubElement(element, "material", name=solid.role)
 
 
 def _shapes(solid: Solid) -> Iterator[tuple[Array, str, dict[str, str]]]:
@@ -109,7 +181,8 @@ def _shapes(solid: Solid) -> Iterator[tuple[Array, str, dict[str, str]]]:
     if solid.kind == "sphere":
         yield solid.pose, "sphere", radius
         return
-    yield solid.pose, "cylinder", radius | {"length": repr(float(solid.size[1]))}
+    if solid.size[1] > 0.0:
+        yield solid.pose, "cylinder", radius | {"length": repr(float(solid.size[1]))}
     if solid.kind == "capsule":
         axis = rotations_from_quaternions(solid.pose[3:])[:, 2]
         for side in (-0.5, 0.5):
@@ -118,7 +191,11 @@ def _shapes(solid: Solid) -> Iterator[tuple[Array, str, dict[str, str]]]:
 
 
 def _origin(element: Xml.Element, pose: Array) -> None:
-    angles = roll_pitch_yaw(rotations_from_quaternions(pose[3:]))[::-1]
+    """Write a pose; beside the pole roll is that of what yaw leaves, so that no digit is lost."""
+    R = rotations_from_quaternions(pose[3:])
+    yaw = math.atan2(R[1, 0], R[0, 0])
+    R = product(rotation("z", -yaw), R)
+    angles = (math.atan2(-R[1, 2], R[1, 1]), math.atan2(-R[2, 0], R[0, 0]), yaw)
     Xml.SubElement(element, "origin", xyz=_row(pose[:3]), rpy=_row(angles))
 
 

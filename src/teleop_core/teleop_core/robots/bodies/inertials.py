@@ -1,0 +1,90 @@
+"""Inertias of bodies: those of the robot's own links where its model has them, else assumed ones.
+
+All are pseudo-inertias (4, 4), which add up where bodies are joined, and go from frame to frame as
+T P Tᵀ (:mod:`teleop_core.robots.inertias`).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from teleop_core.kernels.geometry import Array, rotations_from_quaternions, transform
+from teleop_core.kernels.portable import inverse_motion, product
+from teleop_core.robots.bodies.body import Bodies
+from teleop_core.robots.bodies.solids import Solid
+from teleop_core.robots.chain_dynamics import chain_acceleration, pseudo_inertias
+from teleop_core.robots.followers import chain_part, follower_acceleration, followers_of
+from teleop_core.robots.robot import Robot
+
+DENSITY = 1000.0
+"""Density [kg/m³] of bodies whose robot has no masses of links, assumed: that of water, which
+physics engines assume too; motors and hollow links together are of this order."""
+
+
+def has_own_links(robot: Robot) -> bool:
+    """Whether the robot's dynamics say where which link has which inertia."""
+    model = robot.dynamics
+    of_chains = (chain_acceleration, follower_acceleration)
+    return model is not None and (model.acceleration in of_chains or bool(model.frames))
+
+
+def inertials_of(robot: Robot, bodies: Bodies) -> dict[int, Array]:
+    """Pseudo-inertias (4, 4) of bodies in their own frames, by their index; never of the base.
+
+    Args:
+        robot: The robot.
+        bodies: Its bodies.
+
+    Returns:
+        Of a robot with links of its own (:func:`has_own_links`) those that weigh: a link that its
+        source lumps into another has none. Of every other robot all that have solids, uniform and
+        of :data:`DENSITY`; where solids overlap, both count.
+    """
+    if not has_own_links(robot):
+        assumed = {i: sum(map(_uniform, body.solids)) for i, body in enumerate(bodies.bodies)}
+        return {i: np.asarray(P) for i, P in assumed.items() if i > 0 and np.any(P)}
+    poses = bodies.poses(robot.home)
+    found = {}
+    for index, P in zip(*_own(robot, bodies), strict=False):
+        if P[3, 3] > 0.0:
+            found[index] = moved(inverse_motion(_frame(poses[index])), P)
+    return found
+
+
+def moved(T: Array, P: Array) -> Array:
+    """Pseudo-inertia (4, 4) in frame A of a body given in frame B, by ``T_A_B`` (4, 4)."""
+    return product(product(T, P), np.ascontiguousarray(T.T))
+
+
+def _own(robot: Robot, bodies: Bodies) -> tuple[Sequence[int], Sequence[Array]]:
+    """Bodies by index, and pseudo-inertias in the base at home of the first of these."""
+    model, followers = robot.dynamics, followers_of(robot)
+    assert model is not None
+    if model.frames:
+        links = zip(model.frames, model.links, strict=True)
+        return bodies.joint_body, [moved(T, link.pseudo) for T, link in links]
+    if followers is None:
+        return bodies.joint_body, list(pseudo_inertias(robot.home.copy(), model.parameters.copy()))
+    row = chain_part(model.parameters, followers)
+    return range(1, len(bodies.bodies)), list(pseudo_inertias(followers.of(robot.home), row))
+
+
+def _uniform(solid: Solid) -> Array:
+    """Pseudo-inertia in the body's frame of a solid of :data:`DENSITY`."""
+    sizes, P = solid.size, np.zeros((4, 4))
+    if solid.kind == "box":
+        parts = [(sizes[0] * sizes[1] * sizes[2], [side**2 / 12.0 for side in sizes])]
+    else:
+        r, span = sizes[0], sizes[1] if len(sizes) > 1 else 0.0
+        rod = (np.pi * r**2 * span, [r**2 / 4.0, r**2 / 4.0, span**2 / 12.0])
+        # Both halves of a ball, each at an end: their centres are 3/8 of the radius beyond it.
+        along = r**2 / 5.0 + 0.375 * r * span + 0.25 * span**2
+        ball = (4.0 / 3.0 * np.pi * r * r * r, [r**2 / 5.0, r**2 / 5.0, along])
+        parts = {"cylinder": [rod], "sphere": [ball], "capsule": [rod, ball]}[solid.kind]
+    for volume, squares in parts:
+        P += DENSITY * volume * np.diag([*squares, 1.0])
+    return moved(_frame(solid.pose), P)
+
+
+def _frame(pose: Array) -> Array:
+    return transform(rotations_from_quaternions(pose[3:]), pose[:3])
