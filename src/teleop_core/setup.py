@@ -61,6 +61,7 @@ setup(
         "scipy",
     ],
     extras_require={
+        "mesh": ["trimesh"],
         "console": ["viser>=1.1,<1.2", "msgspec", "pygame-ce", "hidapi"],
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces", "setproctitle"],
         "test": [
@@ -74,6 +75,7 @@ setup(
             "proselint",
             "pin",
             "mujoco",
+            "trimesh",
             "roboticstoolbox-python",
             "mcap-ros2-support",
             "ruff",

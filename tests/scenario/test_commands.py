@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
-from teleop_core.commands.progress import Progress, say_compiling
+from teleop_core.commands.progress import Progress, say_work
 from teleop_core.graph import topics
 from teleop_core.graph.topics import STREAMS
 from teleop_core.robots import load_robot
@@ -266,11 +266,11 @@ def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop, tmp_path):
 
 
 def test_compiling_is_told_while_something_compiles_and_at_no_other_time(capsys):
-    assert not say_compiling()
+    assert not say_work()
     assert capsys.readouterr().err == ""
     with event.trigger_event("numba:compile"):  # what numba itself does around its compiler
-        assert say_compiling()
-    assert capsys.readouterr().err == f"{COMPILING}, once for this graph …\n"
+        assert say_work()
+    assert capsys.readouterr().err == f"{COMPILING}, once …\n"
 
 
 def test_sessions_of_an_experiment_are_counted():

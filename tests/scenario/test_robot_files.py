@@ -8,7 +8,7 @@ import pytest
 
 import teleop_core as tc
 from teleop_core.bags.arms import of_arm
-from teleop_core.bags.robot_files import recorded_robots
+from teleop_core.bags.kept_files import recorded_files
 from teleop_core.cli import main
 from teleop_core.session.runner import recorded_configuration
 
@@ -89,17 +89,17 @@ def test_each_of_two_arms_keeps_its_own_file(tmp_path):
 def test_an_arm_of_a_name_has_no_file_of_the_arm_beside_it(tmp_path):
     right = {"right/robot": "puma560", "right/geometry": []}
     recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
-    assert recorded_robots(of_arm(recording.bag, "left").metadata) == {str(path): str(path)}
-    assert recorded_robots(of_arm(recording.bag, "right").metadata) == {}
+    assert recorded_files(of_arm(recording.bag, "left").metadata) == {str(path): str(path)}
+    assert recorded_files(of_arm(recording.bag, "right").metadata) == {}
 
 
 def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path):
     recording, path = recorded(tmp_path, "arm.urdf")
-    assert recorded_robots(recording.metadata) == {str(path): str(path)}
+    assert recorded_files(recording.metadata) == {str(path): str(path)}
     assert recording.metadata["robot_file"] == URDF
     assert recorded_configuration(recording.bag)[0]["slave"]["robot"] == str(path)
     longer(path)
-    copy = recorded_robots(recording.metadata)[str(path)]
+    copy = recorded_files(recording.metadata)[str(path)]
     assert Path(copy).name == path.name
     assert Path(copy).read_text() == URDF
     assert recorded_configuration(recording.bag)[0]["slave"]["robot"] == copy

@@ -22,7 +22,7 @@ from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_CP, Topic
 
 ARMS_KEY = "arms"
 NAMESPACE_KEY = "namespace"
-_OF_ONE_ARM = {"robot", "robot_file", "seed"}
+_OF_ONE_ARM = {"robot", "robot_file", "seed", "mesh", "mesh_file"}
 
 
 def arm_names(bag: Bag) -> tuple[str, ...]:

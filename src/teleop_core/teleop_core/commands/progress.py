@@ -47,25 +47,25 @@ def _watch(progress: Progress, ended: threading.Event) -> None:
     """Wait for what takes long, and say it: in the bar, or once where there is none."""
     wait = PATIENCE
     while not ended.wait(wait) and not progress.ticks:
-        if say_compiling(progress.say) and progress.say is None:
+        if say_work(progress.say) and progress.say is None:
             return
         wait = 0.2
 
 
-def say_compiling(say: Callable[[str], None] | None = None) -> bool:
-    """Say that kernels are compiled, if any are now; whether that was said.
+def say_work(say: Callable[[str], None] | None = None) -> bool:
+    """Say what is made once, such as kernels, if anything is now; whether that was said.
 
     Args:
         say: Shows a text in place of the last one; None prints a line.
     """
-    from teleop_core.kernels.progress import compiled_count, is_compiling
+    from teleop_core.kernels.progress import in_work
 
-    if not is_compiling():
+    if not (work := in_work()):
         return False
     if say is None:
-        print("compiling kernels, once for this graph …", file=sys.stderr)
+        print(f"{work.partition(' (')[0]}, once …", file=sys.stderr)
     else:
-        say(f"compiling kernels, {compiled_count()} so far")
+        say(work)
     return True
 
 

@@ -39,9 +39,14 @@ def folder() -> Path | None:
         return None
     if named:
         return Path(named)
-    with suppress(RuntimeError):  # nobody's home is known
+    return user_cache("kernels")
+
+
+def user_cache(name: str) -> Path | None:
+    """Folder of this user for what can be made again; None where nobody's home is known."""
+    with suppress(RuntimeError):
         caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        return Path(caches) / "teleop_core" / "kernels"
+        return Path(caches) / "teleop_core" / name
     return None
 
 
@@ -71,10 +76,12 @@ def locked(kept: Path) -> Iterator[None]:
 
 
 def prune(days: float = KEPT_DAYS) -> int:
-    """Remove what was not used for some days; returns how many files that were."""
+    """Remove kernels and grids not used for some days; returns how many files that were."""
     kept, removed = folder(), 0
     oldest = time.time() - 86400.0 * days
-    for index in kept.glob("*/*.nbi") if kept is not None else ():
+    grids = user_cache("grids")
+    found = [*(kept.glob("*/*.nbi") if kept else ()), *(grids.glob("*.npz") if grids else ())]
+    for index in found:
         with suppress(OSError):
             if index.stat().st_mtime < oldest:
                 for file in index.parent.glob(f"{index.stem}.*"):

@@ -338,14 +338,13 @@ def _load(configuration: str) -> None:
 
 def _loaded(configuration: str, line: socket.socket) -> None:
     """Load, and tell meanwhile that it does; no other thread is left afterwards."""
-    from teleop_core.kernels.progress import compiled_count, is_compiling
+    from teleop_core.kernels.progress import in_work
 
     is_done = threading.Event()
 
     def tell() -> None:
         while not is_done.wait(_TELLS):
-            count = f"compiling kernels ({compiled_count()} so far)"
-            _tell(line, count if is_compiling() else "loading")
+            _tell(line, in_work() or "loading")
 
     thread = threading.Thread(target=tell)
     thread.start()

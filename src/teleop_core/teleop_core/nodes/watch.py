@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass
 from typing import Protocol
 
-from teleop_core.kernels.progress import compiled_count, is_compiling
+from teleop_core.kernels.progress import in_work
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.loop import Loop
@@ -115,7 +115,7 @@ class Watch:
             self._parent.tell(self._doing())
         if self._asked is None and self._first.ended.done():  # a loop of its own failed
             self._asked = time.monotonic()
-        if is_compiling():
+        if in_work():
             self._still.clear()
         elif self._asked is None:
             self._find_hung()
@@ -133,8 +133,7 @@ class Watch:
             os._exit(0)
 
     def _doing(self) -> str:
-        count = compiled_count()
-        return f"compiling kernels ({count} so far)" if is_compiling() else self.word
+        return in_work() or self.word
 
     def _find_hung(self) -> None:
         """Find loops of which nothing came for longer than they could have worked."""

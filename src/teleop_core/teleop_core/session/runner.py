@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.arms import ARMS_KEY
+from teleop_core.bags.kept_files import mesh_texts, recorded_files, robot_texts
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
-from teleop_core.bags.robot_files import recorded_robots, robot_texts
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError
 from teleop_core.graph.graph import DEVICE, RECORDER_NAME, Member
@@ -140,7 +140,7 @@ def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
 def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     """Configuration and scenario that a recording was made with; empty ones for foreign bags.
 
-    The file of a robot is as it was then, see :mod:`teleop_core.bags.robot_files`.
+    Files of a robot and a mesh are as they were then, see :mod:`teleop_core.bags.kept_files`.
 
     Raises:
         TeleopError: The stored configuration is not one.
@@ -149,10 +149,11 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     layer = parse_text(text, f"{bag.path}: configuration") if text else {}
     if arms and not text:  # an import of several hands
         layer = {SESSION: {"arms": tuple(arms)}}
-    files = recorded_robots(bag.metadata)
+    files = recorded_files(bag.metadata)
     for values in layer.values():
-        if (robot := values.get("robot")) in files:
-            values["robot"] = files[str(robot)]
+        for key in ("robot", "world.mesh.file"):
+            if (name := values.get(key)) in files:
+                values[key] = files[str(name)]
     _begin_at_home(layer)
     return layer, bag.metadata.get("scenario", "")
 
@@ -231,6 +232,9 @@ def describe(configuration: Configuration) -> dict[str, str]:
         prefix = f"{arm}/" if arm else ""
         about |= {f"{prefix}{n}": str(configuration.value(n, arm)) for n in ("robot", "seed")}
         about |= robot_texts(about[f"{prefix}robot"], prefix)
+        world = configuration.value("world", arm)
+        if world is not None and world.kind.kind == "mesh":
+            about |= mesh_texts(world.kind.parameters.file, prefix)
     return about | {"configuration": configuration.text()}
 
 

@@ -129,7 +129,7 @@ class SlaveSim(RunningStage):
             q=np.zeros(n), dq=np.zeros(n), effort=np.zeros(n), setpoint=np.zeros(n),
             measured=np.zeros(n), feedforward=np.zeros(self._law.feedforward(n)), limit=np.zeros(n),
             joints=np.zeros(n), tip=np.zeros(n), T=np.zeros((4, 4)),
-            shape=parameters.world.shape, offset=np.zeros(3), normal=np.zeros(3),
+            shape=parameters.world.shape.copy(), offset=np.zeros(3), normal=np.zeros(3),
             J=np.zeros((6, n)), noises=self._noise.rows,
         )  # fmt: skip
         self.kernel, self.arguments = simulation_step, (self.parameters, self.state, self.arm)

@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from teleop_core.bags.robot_files import recorded_robots
+from teleop_core.bags.kept_files import recorded_files
 from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import Figure
@@ -86,7 +86,7 @@ class ReplayMetric(Metric):
         if self._context.robot is None:
             return None
         with suppress(TeleopError, OSError):
-            files = recorded_robots(self._context.bag.metadata)
+            files = recorded_files(self._context.bag.metadata)
             robot = files.get(self._context.robot, self._context.robot)
             return load_robot_set(robot, self._context.origin.geometry)
         return None

@@ -41,12 +41,14 @@ class WorldObject:
             inside.
         outline: ``outline(parameters)`` gives points (N, 3) [m] of one line along its edges around
             its middle; a row of NaN lifts the pen.
+        numbers: ``numbers(parameters)`` gives ``shape``, if that is something else.
     """
 
     name: str
     parameters: type
     distance: Callable[[Array, Array, Array], float]
     outline: Callable[[Any], Array]
+    numbers: Callable[[Any], Array] = numbers_of
 
     @cached_property
     def distance_pointer(self) -> Any:
@@ -70,7 +72,7 @@ def _try(part: WorldObject) -> None:
         parameters = part.parameters()
         np.asarray(part.outline(parameters), np.float64).reshape(-1, 3)
         for offset in _TRIED:
-            _try_at(part, numbers_of(parameters), offset)
+            _try_at(part, part.numbers(parameters), offset)
 
 
 def _try_at(part: WorldObject, numbers: Array, offset: Array) -> None:
@@ -108,6 +110,7 @@ WORLD_OBJECTS: Registry[WorldObject] = Registry(
         "box": "teleop_core.slave.world.box:BOX",
         "cylinder": "teleop_core.slave.world.cylinder:CYLINDER",
         "capsule": "teleop_core.slave.world.capsule:CAPSULE",
+        "mesh": "teleop_core.slave.world.mesh:MESH",
     },
     part_check("world object", WorldObject, "distance", "outline"),
     _try,

@@ -23,7 +23,7 @@ from teleop_core.slave.world.puncture import (
     push_in_channel,
 )
 
-_NEAR = 5e-3
+NEAR = 5e-3
 """A tip that is farther outside [m] does not get there within a tick."""
 
 
@@ -127,12 +127,12 @@ def _slide(s: ContactState, q: Array) -> None:
 
 @inner
 def _lay_flat(s: ContactState) -> None:
-    """Keep of the bristle what lies in the surface; nothing where the tip is off it."""
-    out, kept = 0.0, 1.0 if s.gap < 0.0 else 0.0
+    """Keep of the bristle what lies in the surface."""
+    out = 0.0
     for k in range(3):
         out += s.normal[k] * s.stuck[k]
     for k in range(3):
-        s.stuck[k] = kept * (s.stuck[k] - out * s.normal[k])
+        s.stuck[k] -= out * s.normal[k]
 
 
 @inner
@@ -150,7 +150,10 @@ def _begin_at(s: ContactState, arm: Arm, q: Array, dq: Array, speed: Array) -> N
 
 @inner
 def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
-    """Leave the bristle the bend that friction carries of the push (3,) [N]; the rest slipped."""
+    """Leave the bristle the bend that friction carries of the push (3,) [N]; the rest slipped.
+
+    Off the object there is no push, and no bend is left.
+    """
     push = 0.0
     for k in range(3):
         push += s.normal[k] * force[k]
@@ -179,7 +182,7 @@ def touch(p: WorldNumbers, s: ContactState, arm: Arm, q: Array, dq: Array, felt:
     before, s.gap = s.gap, arm.distance(arm.offset, arm.shape, arm.normal)
     if s.punctures > 0:
         follow_channel(p, s, p.world_stiffness, before, arm.offset, arm.normal)
-    s.is_near = int(s.gap < _NEAR)
+    s.is_near = int(s.gap < NEAR)
     if s.is_near:
         _begin_at(s, arm, q, dq, speed)
         _lay_flat(s)

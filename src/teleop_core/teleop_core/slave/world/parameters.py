@@ -1,6 +1,7 @@
 """Parameters of the world: the object, where it is, and what it is made of."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,6 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import Choice, choice, parameter
 from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.parts import numbers_of
 from teleop_core.slave.world import WORLD_OBJECTS
 
 
@@ -96,10 +96,10 @@ class WorldParameters:
             return Material(self.stiffness, self.damping, self.friction_coefficient)
         return MATERIALS[self.material]
 
-    @property
+    @cached_property
     def shape(self) -> Array:
-        """Numbers of the object, as its distance takes them."""
-        return numbers_of(self.kind.parameters)
+        """Numbers of the object, as its distance takes them; a mesh is read, and may be refused."""
+        return WORLD_OBJECTS.find(self.kind.kind).numbers(self.kind.parameters)
 
     def distance(self, tip: Array, center: Array) -> float:
         """How far a tip (3,) is outside the object with its middle at ``center`` (3,) [m]."""

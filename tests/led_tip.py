@@ -1,0 +1,109 @@
+"""Led tip: a tip that is led along any way through an object, what it feels and what it loses."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.kernels import kernel, pointer
+from teleop_core.kernels.fields import record
+from teleop_core.robots.kinematics import FK
+from teleop_core.slave.simulation import SimulationNumbers, SimulationState
+from teleop_core.slave.world import WORLD_OBJECTS
+from teleop_core.slave.world.contact import add_push, touch
+
+DT = 1e-3
+PIECES = 16  # pieces of way in a tick, along each of which the push does its work
+
+
+@kernel
+def straight(q, geometry, jacobian):
+    """Jacobian of a tip whose three joints are its place."""
+    jacobian[:] = 0.0
+    for k in range(3):
+        jacobian[k, k] = 1.0
+
+
+class Needle(NamedTuple):
+    """What a contact takes of an arm, of three joints that are the tip's place [m]."""
+
+    jacobian: object
+    distance: object
+    tip: np.ndarray
+    tip_geometry: np.ndarray
+    T: np.ndarray
+    shape: np.ndarray
+    offset: np.ndarray
+    normal: np.ndarray
+    J: np.ndarray
+
+
+def needle(name, parameters=None):
+    """A needle before an object, with the defaults of its parameters if there are no others."""
+    part = WORLD_OBJECTS.find(name)
+    return Needle(
+        pointer(straight, FK), part.distance_pointer, np.zeros(3), np.zeros(3), np.zeros((4, 4)),
+        part.numbers(parameters or part.parameters()), np.zeros(3), np.zeros(3), np.zeros((6, 3)),
+    )  # fmt: skip
+
+
+@kernel
+def _stored(p, s):
+    """Energy that the object can give back [J]: by its surface, or by springs of the channel."""
+    stiffness, depth, square = p.world_stiffness, max(-s.gap, 0.0), 0.0
+    for k in range(3):
+        square += s.stuck[k] * s.stuck[k] if s.gap < 0.0 else 0.0
+    if s.is_open:
+        ahead = min(max(depth - s.cut, 0.0), p.cutting_force / stiffness)
+        return 0.5 * stiffness * (square + s.drawn * s.drawn + ahead * ahead)
+    most = p.puncture_force / stiffness if p.puncture_force > 0.0 else depth
+    spring = min(depth, most)
+    return 0.5 * stiffness * (square + spring * spring) + p.puncture_force * (depth - spring)
+
+
+@kernel
+def _lead(p, s, arm, way, felt, lost):
+    """Lead the tip along ``way`` (N, 3), a tick each ``PIECES`` rows.
+
+    Writes the force at the begin of each tick (ticks, 6), and the energy lost so far (ticks,): what
+    the tip gave less what is stored.
+    """
+    speed, push, middle, energy = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
+    for tick in range(len(felt)):
+        first = tick * PIECES
+        for k in range(3):
+            arm.T[k, 3] = way[first, k]
+            speed[k] = (way[first + 1, k] - way[first, k]) * PIECES / 1e-3
+        touch(p, s, arm, way[first], speed, felt[tick])
+        lost[tick] = energy - _stored(p, s)
+        if not s.is_near:
+            continue
+        for i in range(first, first + PIECES):
+            for k in range(3):
+                middle[k] = 0.5 * (way[i, k] + way[i + 1, k])
+                speed[k] = (way[i + 1, k] - way[i, k]) * PIECES / 1e-3
+                push[k] = 0.0
+            add_push(p, s, middle, speed, push)
+            for k in range(3):
+                energy -= push[k] * (way[i + 1, k] - way[i, k])
+
+
+def lead(way, name="plane", parameters=None, **numbers):
+    """Forces (ticks, 3) [N], energy lost (ticks,) [J] and state of a tip led through places.
+
+    Args:
+        way: Places (ticks, 3) [m] from the middle of the object.
+        name: Of the object.
+        parameters: Of its shape; None for their defaults.
+        numbers: Of it, beside those of soft tissue.
+    """
+    # Whole records: numba takes a record for another one that begins with the same fields.
+    p, s = record(SimulationNumbers, 3), record(SimulationState, 3)
+    known = {"world_stiffness": 200.0, "puncture_force": 0.5, "cutting_force": 0.1,
+             "shaft_friction": 20.0, "hole_radius": 2e-3}  # fmt: skip
+    for key, value in (known | numbers).items():
+        p[key] = value
+    times = np.arange(PIECES * (len(way) - 1) + 1) / PIECES
+    fine = np.column_stack([np.interp(times, np.arange(len(way)), column) for column in way.T])
+    felt, lost = np.zeros((len(way) - 1, 6)), np.zeros(len(way) - 1)
+    _lead(p, s, needle(name, parameters), fine, felt, lost)
+    return felt[:, :3], lost, s

@@ -1,0 +1,405 @@
+"""Mesh: a triangle mesh from a file as an object to touch, beside its analytic shape."""
+
+import subprocess
+import sys
+from itertools import repeat
+from pathlib import Path
+from typing import NamedTuple
+
+import coal
+import numpy as np
+import pytest
+import trimesh
+
+import teleop_core as tc
+from led_tip import lead
+from teleop_core.bags import kept_files
+from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.console.world_nodes import object_outline
+from teleop_core.kernels.progress import in_work, told
+from teleop_core.kernels.store import prune, user_cache
+from teleop_core.robots import load_robot
+from teleop_core.session.configuration import configure
+from teleop_core.session.virtual import VirtualTime
+from teleop_core.slave.world import WORLD_OBJECTS, distance_grid
+from teleop_core.slave.world.mesh import MeshParameters
+from teleop_core.slave.world.triangles import read_triangles, tree_of, write_distances
+
+BOX = (60.0, 60.0, 30.0)  # as the box of the world, in mm as files are
+
+
+class Bounds(NamedTuple):
+    """What a mesh may differ by from its shape, to 3 mm from its surface, as docs/world.md says."""
+
+    distance: float  # [m]
+    normal: float  # [degrees]
+
+
+BOUNDS = {
+    "sphere": Bounds(25e-6, 0.3),
+    "box": Bounds(3e-6, 0.1),
+    "capsule": Bounds(30e-6, 1.0),
+}
+AWAY = 6e-3  # from the edges of the box, and from its ridges within [m]
+
+
+def solid(name):
+    """Mesh of the shape of that name in the world, about its middle, in mm."""
+    if name == "box":
+        return trimesh.creation.box(BOX)
+    if name == "sphere":
+        return trimesh.creation.icosphere(subdivisions=5, radius=15.0)
+    return trimesh.creation.capsule(height=60.0, radius=10.0, count=[192, 192])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Meshes of the shapes in the world, and a cache of its own."""
+    made = tmp_path_factory.mktemp("meshes")
+    for name in BOUNDS:
+        solid(name).export(made / f"{name}.stl")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TELEOP_KERNELS", str(Path.home() / ".cache" / "teleop_core" / "kernels"))
+        patch.setenv("XDG_CACHE_HOME", str(made / "cache"))
+        yield made
+
+
+def parameters(folder, name, **more):
+    """Parameters of a mesh; that of a capsule is turned from z to y, as the world's lies."""
+    angles = (0.5 * np.pi, 0.0, 0.0) if name == "capsule" else (0.0, 0.0, 0.0)
+    return MeshParameters(**{"file": str(folder / f"{name}.stl"), "angles": angles} | more)
+
+
+def found(name, group, places):
+    """Distances (N,) and normals (N, 3) of an object at places (N, 3)."""
+    part, normals = WORLD_OBJECTS.find(name), np.zeros((len(places), 3))
+    shape = part.numbers(group)
+    distances = [part.distance(*row) for row in zip(places, repeat(shape), normals, strict=False)]
+    return np.array(distances), normals
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_a_fine_mesh_has_distance_and_normal_of_its_shape_within_the_bounds(name, folder):
+    places = np.random.default_rng(1).uniform(-0.045, 0.045, (40_000, 3))
+    wanted, outward = found(name, WORLD_OBJECTS.find(name).parameters(), places)
+    is_compared = np.abs(wanted) < 3e-3
+    if name == "box":
+        over = np.sort(np.abs(places) - 0.5e-3 * np.array(BOX), axis=1)
+        is_compared &= over[:, 2] - over[:, 1] > AWAY
+    places, wanted, outward = places[is_compared], wanted[is_compared], outward[is_compared]
+    distance, normal = found("mesh", parameters(folder, name), places)
+    assert len(places) > 300
+    assert np.abs(distance - wanted).max() < BOUNDS[name].distance
+    angle = 2.0 * np.arcsin(0.5 * np.linalg.norm(normal - outward, axis=1))
+    assert np.degrees(angle.max()) < BOUNDS[name].normal
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_inside_is_negative_and_outside_positive_everywhere(name, folder):
+    """Also far beyond the grid."""
+    places = np.random.default_rng(2).uniform(-1.0, 1.0, (4000, 3)) * 0.05
+    places[:400] *= 20.0
+    wanted, outward = found(name, WORLD_OBJECTS.find(name).parameters(), places)
+    is_clear = np.abs(wanted) > 1e-3
+    distance, normal = found("mesh", parameters(folder, name), places)
+    assert (np.sign(distance) == np.sign(wanted))[is_clear].all()
+    is_far = wanted > 0.02
+    np.testing.assert_allclose(distance[is_far], wanted[is_far], rtol=0.05)
+    assert ((normal * outward).sum(axis=1) > 0.9)[is_far].all()
+
+
+def test_distances_at_the_nodes_are_those_of_a_library_of_others_with_the_right_sign():
+    """A ring, whose hole is outside, and a star of thin spikes, at whose tips many sides meet."""
+    star = trimesh.creation.box((4.0, 4.0, 4.0)).subdivide().subdivide()
+    star.vertices *= np.random.default_rng(3).uniform(2.0, 6.0, (len(star.vertices), 1))
+    ring = trimesh.creation.torus(20.0, 5.0)
+    rng, dot, here = np.random.default_rng(4), coal.Sphere(1e-12), coal.Transform3s()
+    for mesh in (ring, star):
+        data = mesh.export(file_type="stl")
+        triangles = read_triangles(Path("some.stl"), data, 1e-3 * np.eye(3))
+        tree, model = tree_of(triangles), coal.BVHModelOBBRSS()
+        model.beginModel(len(triangles.faces), len(triangles.points))
+        for corners in triangles.points[triangles.faces]:
+            model.addTriangle(*corners)
+        model.endModel()
+        solid_angles = []
+        for place in rng.uniform(-0.03, 0.03, (400, 3)):
+            distance, result = np.empty((1, 1)), coal.DistanceResult()
+            write_distances(tree, place, 1.0, distance)
+            there = coal.Transform3s(np.eye(3), place)
+            coal.distance(model, here, dot, there, coal.DistanceRequest(True, True), result)
+            assert abs(distance[0, 0]) == pytest.approx(result.min_distance + 1e-12, abs=1e-8)
+            # The solid angle of all triangles, of van Oosterom and Strackee 1983.
+            a, b, c = (triangles.points[triangles.faces] - place).transpose(1, 0, 2)
+            la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+            ab, bc, ca = ((x * y).sum(axis=1) for x, y in ((a, b), (b, c), (c, a)))
+            below = la * lb * lc + ab * lc + bc * la + ca * lb
+            angle = 2.0 * np.arctan2((a * np.cross(b, c)).sum(axis=1), below).sum()
+            assert (distance[0, 0] < 0.0) == (angle > 2.0 * np.pi)
+            solid_angles.append(angle)
+        assert min(solid_angles) < 1.0 < max(solid_angles)
+
+
+def loop(rng, middle):
+    """A closed way (N, 3) [m] of a second to four, slow and fast, through an object's top."""
+    share = np.linspace(0.0, 1.0, int(rng.integers(1000, 4000)))
+    way = np.zeros((len(share), 3))
+    for k in range(1, 5):
+        way += np.sin(2.0 * np.pi * k * share)[:, None] * rng.normal(size=3)
+        way += (1.0 - np.cos(2.0 * np.pi * k * share))[:, None] * rng.normal(size=3)
+    return way / np.abs(way).max() * (0.05, 0.05, 0.03) + middle
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.6])
+@pytest.mark.parametrize("name", ["box", "sphere"])
+def test_no_motion_gains_energy_from_a_mesh_whatever_edge_it_crosses(name, friction, folder):
+    """Tips that are led around closed ways, so fast and deep that they cross all its ridges."""
+    rng, group = np.random.default_rng(5), parameters(folder, name)
+    shares = []
+    for _ in range(60):
+        way = loop(rng, (0.0, 0.0, 0.028 if name == "box" else 0.018))
+        force, lost, _ = lead(
+            way, "mesh", group, puncture_force=0.0, world_stiffness=1000.0,
+            world_friction=friction, world_damping=2.0 * friction,
+        )  # fmt: skip
+        turned = np.abs((force[:-1] * np.diff(way[:-1], axis=0)).sum(axis=1)).sum()
+        if turned > 1e-3 and np.linalg.norm(force[-1]) == 0.0:
+            shares.append(lost[-1] / turned)
+    assert len(shares) > 10
+    assert min(shares) > (0.0 if friction else -1e-3)
+
+
+def test_a_sliding_tip_feels_the_friction_of_the_analytic_shape(folder):
+    times = np.arange(4000) * 1e-3
+    tilt, turn = 0.4 * np.sin(3.0 * times) + 1.0, 1.9 * times
+    depth = 0.5e-3
+    way = (0.015 - depth) * np.column_stack(
+        (np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt))
+    )
+    made_of = {"world_stiffness": 1000.0, "world_friction": 0.6, "puncture_force": 0.0}
+    wanted, _, _ = lead(way, "sphere", **made_of)
+    force, _, _ = lead(way, "mesh", parameters(folder, "sphere"), **made_of)
+    pushed = 1000.0 * depth
+    assert np.linalg.norm(wanted[50:], axis=1).min() > 1.1 * pushed  # it slips
+    assert np.linalg.norm(force - wanted, axis=1).max() < 0.015 * pushed
+
+
+def test_a_session_presses_a_mesh_of_a_block_as_it_does_the_block(folder):
+    settings = ["world=mesh", f"world.mesh.file={folder / 'box.stl'}"]
+    box, mesh = (VirtualTime(configure("palpation", settings=s)) for s in ([], settings))
+    field = "slave_true_cf"
+    wanted, force = box.run(16_000)[field], mesh.run(16_000)[field]
+    assert wanted[:, 2].max() > 0.9
+    assert np.abs(force - wanted).max() < 0.005
+
+
+def without(mesh, face):
+    mesh.update_faces(np.arange(len(mesh.faces)) != face)
+    return mesh
+
+
+def flat():
+    return trimesh.creation.box((20.0, 20.0, 1e-6))
+
+
+def turned():
+    mesh = solid("box")
+    mesh.faces[0] = mesh.faces[0][::-1]
+    return mesh
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "requirement"),
+    [
+        (
+            lambda: without(solid("box"), 0),
+            "world.mesh.file",
+            "it has a hole at the edge",
+        ),
+        (turned, "world.mesh.file", "two triangles look to opposite sides"),
+        (flat, "world.mesh.file", "encloses a volume"),
+    ],
+)
+def test_a_mesh_that_encloses_nothing_is_refused_in_one_line(make, name, requirement, tmp_path):
+    make().export(tmp_path / "bad.obj")
+    with pytest.raises(ParameterError, match=requirement) as caught:
+        pressed(tmp_path / "bad.obj")
+    assert caught.value.name == name
+    assert "\n" not in str(caught.value)
+
+
+def pressed(file, *settings):
+    """Session that presses a mesh."""
+    texts = ["world=mesh", f"world.mesh.file={file}", *settings]
+    return VirtualTime(configure("palpation", settings=texts))
+
+
+def test_a_hole_is_told_by_the_middle_of_an_edge_along_it(tmp_path):
+    mesh = solid("box")
+    corners = mesh.vertices[mesh.faces[3]]
+    without(mesh, 3).export(tmp_path / "hole.stl")
+    with pytest.raises(ParameterError) as caught:
+        pressed(tmp_path / "hole.stl")
+    told_at = str(caught.value).partition("[")[2].partition("]")[0]
+    place = np.array([float(x) for x in told_at.split(",")])
+    middles = 0.5 * (corners + np.roll(corners, 1, axis=0))
+    assert np.linalg.norm(middles - place, axis=1).min() < 1e-3
+
+
+def test_a_mesh_that_is_inside_out_is_turned(folder, tmp_path):
+    mesh = solid("box")
+    mesh.invert()
+    mesh.export(tmp_path / "inverted.stl")
+    for name in ("inverted", "box"):
+        place = tmp_path if name == "inverted" else folder
+        distance, _ = found("mesh", parameters(place, name), np.array([(0.0, 0.0, 0.012)]))
+        assert distance[0] == pytest.approx(-3e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize("text", ["", "solid", "v 0 0 nothing\nf 1 1 1\n", "\x00" * 90])
+@pytest.mark.parametrize("ending", ["stl", "obj", "txt", "zip"])
+def test_what_is_no_mesh_is_refused_in_one_line(text, ending, tmp_path):
+    file = tmp_path / f"none.{ending}"
+    file.write_text(text)
+    with pytest.raises(ParameterError, match=r"world\.mesh\.file is .*must be a mesh"):
+        pressed(file)
+
+
+def test_a_mesh_that_does_not_fit_is_refused_with_what_would(folder):
+    file = folder / "box.stl"
+    for settings, name, requirement in (
+        (["world.mesh.scale=1.0"], "world.mesh.scale", "now 60 m long"),
+        (["world.mesh.scale=0.000001"], "world.mesh.scale", "between 0.001 and 2 m long"),
+        (["world.mesh.step=0.00005"], "world.mesh.step", r"at least 0\.00039 m"),
+        (["world.mesh.step=0.02"], "world.mesh.step", r"at most 0\.0075 m"),
+    ):
+        with pytest.raises(ParameterError, match=requirement) as caught:
+            pressed(file, *settings)
+        assert caught.value.name == name
+    with pytest.raises(ParameterError, match="No such file") as caught:
+        pressed(folder / "none.stl")
+    assert caught.value.name == "world.mesh.file"
+    home = load_robot("rcrt1")
+    place = home.fk(home.home)[:3, 3] - (0.0, 0.0, 0.01)
+    with pytest.raises(ParameterError, match=r"which is 5\.0 mm inside"):
+        pressed(file, f"world.place={place.tolist()}")
+
+
+def test_a_grid_is_made_once_and_kept_by_what_the_file_says(folder, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    made, heard = [], []
+    make = distance_grid._make
+
+    def counted(request):
+        made.append(request.step)
+        return make(request)
+
+    monkeypatch.setattr(distance_grid, "_make", counted)
+    file = tmp_path / "block.stl"
+    for size in (BOX, (40.0, 40.0, 40.0)):
+        trimesh.creation.box(size).export(file)
+        for _ in range(3):
+            distance_grid._found.cache_clear()
+            grid = distance_grid.distance_grid(
+                distance_grid.GridRequest(str(file), 1e-3, (0.0, 0.0, 0.0), 2e-3)
+            )
+            heard.append(grid.numbers)
+    assert len(made) == 2
+    np.testing.assert_array_equal(heard[0], heard[2])
+    assert len(heard[0]) != len(heard[3])
+    kept = list(user_cache("grids").iterdir())
+    assert sorted(path.suffix for path in kept) == [".npz", ".npz"]
+    kept[0].write_bytes(kept[0].read_bytes()[:1000])  # damaged: made again
+    distance_grid._found.cache_clear()
+    distance_grid.distance_grid(distance_grid.GridRequest(str(file), 1e-3, (0.0, 0.0, 0.0), 2e-3))
+    assert prune(days=-1.0) >= 2
+    assert not list(user_cache("grids").iterdir())
+    distance_grid._found.cache_clear()
+
+
+def test_who_waits_is_told_that_a_grid_is_made_and_how_far_it_is(folder, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    seen = []
+
+    def watched(*arguments):
+        seen.append(in_work())
+        write_distances(*arguments)
+
+    monkeypatch.setattr(distance_grid, "write_distances", watched)
+    request = distance_grid.GridRequest(str(folder / "box.stl"), 1e-3, (0.0, 0.0, 0.0), 3e-3)
+    distance_grid.distance_grid(request)
+    assert seen[0] == "making the distance grid of box.stl (0 %)"
+    percent = 100 * (len(seen) - 1) // len(seen)
+    assert seen[-1] == f"making the distance grid of box.stl ({percent} %)"
+    assert in_work() == ""
+    with pytest.raises(TeleopError, match="something"), told("something"):
+        raise TeleopError(in_work())
+    assert in_work() == ""
+
+
+def test_a_session_without_a_mesh_loads_no_reader_and_compiles_no_grid():
+    code = (
+        "import sys\n"
+        "from teleop_core.session.configuration import configure\n"
+        "from teleop_core.slave.world import mesh, triangles\n"
+        "configure('palpation').group('slave_sim').world.shape\n"
+        "assert not {'trimesh', 'coal'} & set(sys.modules)\n"
+        "kernels = mesh.mesh_distance, triangles.write_distances\n"
+        "assert not any(getattr(k, 'signatures', ()) for k in kernels)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+def gone(path):
+    path.unlink()
+
+
+def another(path):
+    trimesh.creation.box((50.0, 50.0, 31.0)).export(path)
+
+
+@pytest.mark.parametrize("becomes", [gone, another])
+def test_a_recording_replays_to_the_bit_whatever_became_of_its_mesh(becomes, folder, tmp_path):
+    recording, path = recorded(folder, tmp_path)
+    before = recording["slave/true_cf"].values
+    assert np.abs(before).max() > 0.1
+    becomes(path)
+    again = tc.replay(recording.path)
+    np.testing.assert_array_equal(again["slave/true_cf"].values, before)
+
+
+def recorded(folder, where):
+    """Recording of a session that presses a mesh, and that mesh."""
+    path = where / "block.stl"
+    path.write_bytes((folder / "box.stl").read_bytes())
+    settings = {"world": "mesh", "world.mesh.file": str(path)}
+    return tc.run("palpation", duration=8.0, out=where / "bag", settings=settings), path
+
+
+@pytest.mark.parametrize(("becomes", "said"), [(gone, "is gone"), (another, "is another by now")])
+def test_a_mesh_too_large_to_keep_is_told_when_it_is_not_that_of_the_recording(
+    becomes, said, folder, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(kept_files, "_MOST", 10)
+    recording, path = recorded(folder, tmp_path)
+    assert kept_files.recorded_files(recording.metadata) == {str(path): str(path)}
+    becomes(path)
+    with pytest.warns(UserWarning, match=said):
+        assert kept_files.recorded_files(recording.metadata) == {}
+
+
+def test_the_page_draws_the_edges_and_sections_of_a_mesh_where_it_lies(folder):
+    robot, place = load_robot("rcrt1"), np.array((0.2, -0.2, -0.1))
+    drawn = object_outline(
+        {"kind": "mesh", "mesh.file": str(folder / "box.stl"), "place": tuple(place.tolist())},
+        robot,
+    )
+    assert drawn.shape[1:] == (2, 3)
+    offsets, half = drawn.reshape(-1, 3) - place, 0.5e-3 * np.array(BOX)
+    np.testing.assert_allclose(np.ptp(offsets, axis=0), 2.0 * half, atol=1e-9)
+    is_on = np.isclose(np.abs(offsets), half, atol=1e-9)
+    assert is_on.any(axis=1).all()
+    lengths = np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=1)
+    assert lengths.sum() == pytest.approx((8.0 + 8.0) * half.sum())
+    assert not len(object_outline({"kind": "mesh", "mesh.file": "none.stl"}, robot))
