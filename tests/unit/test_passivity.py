@@ -122,7 +122,7 @@ def hand_port(rng, count=4000):
         port[HEARD] += gained
         flow, last = np.array([gained, max(came, 0.0), max(-came, 0.0)]), push.copy()
         push[:] = 2.0, 0.0, 0.0
-        tdpa_hand(numbers, memory, last, moved, flow, port, port, push, 1.0, 1e-3)
+        tdpa_hand(numbers, memory, last, moved, moved, flow, port, port, push, 1.0, 1e-3)
         yield port, way, push
 
 
@@ -176,7 +176,7 @@ def test_a_touch_that_is_over_leaves_nothing_in_the_tank():
     def sample(wanted, last, moved):
         push[:] = wanted, 0.0, 0.0
         pushed, way = np.array([last, 0.0, 0.0]), np.array([moved, 0.0, 0.0])
-        tank_hand(still, memory, pushed, way, still, port, port, push, 1.0, 1e-3)
+        tank_hand(still, memory, pushed, way, way, still, port, port, push, 1.0, 1e-3)
         return push[0]
 
     assert sample(1.0, -2.0, 1e-2) == 1.0  # the hand pushed 20 mJ in
@@ -194,7 +194,7 @@ def test_what_the_arm_lent_is_paid_back_before_the_hand_gets_any():
 
 
 def test_no_part_pushes_harder_than_allowed():
-    def rude(numbers, memory, last, moved, flow, heard, port, push, scale, period):
+    def rude(numbers, memory, last, moved, led, flow, heard, port, push, scale, period):
         push *= 100.0
 
     register_passivity(Passivity("rude", NoParameters, rude))

@@ -327,11 +327,13 @@ NETWORK_STATE = Topic(
 ENERGY = (
     "law", "round", "energy_in", "energy_out", "told", "heard", "margin", "withheld",
     "turn_in", "turn_out", "drift_x", "drift_y", "drift_z",
+    "impedance", "wave_x", "wave_y", "wave_z",
 )  # fmt: skip
 """Numbers of a port's energies since a round began, in the slave's scale [J]: the kind of
 passivity, by its place among them; when the round began [s]; what went in and out; how much the
 other side was told that it may give, and how much it told; what is left to be given; what was kept
-from going out; what torques took in and gave out; by how much a command is held back [m]."""
+from going out; what torques took in and gave out; by how much a command is held
+back [m]; of waves, their impedance [N s/m], and the integral of what was told [√W s]."""
 MASTER_ENERGY = Topic(
     "master/energy", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=ENERGY,
     is_seldom=True,

@@ -9,6 +9,8 @@ import yaml
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.base.parameters import Value, build, specs, values_of
+from teleop_core.chain.passivity import PASSIVITIES
+from teleop_core.chain.passivity.slave_side import PASSIVITY
 from teleop_core.graph.graph import DEVICE, HAND, RECORDER_NAME, Graph, Member, build_graph
 from teleop_core.graph.layers import (
     SESSION,
@@ -65,6 +67,7 @@ class Configuration:
         )
         for arm in graph.namespaces:
             _check_robots(graph, groups, arm)
+            _check_passivity(graph, groups, arm)
         return Configuration(groups, scenario, graph)
 
     def group(self, stage: str, arm: str = "") -> Any:
@@ -150,6 +153,22 @@ def _check_robots(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
         values = [getattr(groups[member], name) for member in named]
         if any(value != values[0] for value in values):
             raise ParameterError(name, tuple(values), "the same in " + " and ".join(named))
+
+
+def _check_passivity(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
+    """Make sure that a kind of passivity that works from both sides has both.
+
+    Raises:
+        ParameterError: The slave's side is not there.
+    """
+    if PASSIVITY.name in (stage.name for stage in graph.stages):
+        return
+    for stage in graph.stages:
+        group = groups[Member(stage, arm).name]
+        kind = group.reflection.passivity.kind if hasattr(group, "reflection") else ""
+        if kind and PASSIVITIES.find(kind).needs_slave:
+            needed = f"a session with the stage {PASSIVITY.name}: teleop.stages=[{PASSIVITY.name}]"
+            raise ParameterError("reflection.passivity", kind, needed)
 
 
 def _plain(value: Value) -> object:

@@ -76,8 +76,8 @@ class ReflectionParameters:
         PASSIVITIES, "none",
         doc="tank: the push gives the hand no more energy than it took from it in this touch, "
         "however late it comes; tdpa: no more than the slave got back, and with a stage passivity "
-        "the slave gives no more than the hand did; none: what the slave feels, which may throw "
-        "the hand",
+        "the slave gives no more than the hand did; wave: waves of force and speed, if there is "
+        "that stage; none: what the slave feels, which may throw the hand",
     )  # fmt: skip
 
 

@@ -10,9 +10,11 @@ from teleop_core.chain.mapping.following import FollowingNumbers, FollowingState
 from teleop_core.chain.passivity import MEMORY as PASSIVE_MEMORY
 from teleop_core.chain.passivity import Passivity
 from teleop_core.chain.passivity.port import (
+    IMPEDANCE,
     IN,
     LAW,
     ROUND,
+    WAVE,
     WITHHELD,
     begin_round,
     count,
@@ -20,6 +22,7 @@ from teleop_core.chain.passivity.port import (
     port_work,
 )
 from teleop_core.graph.row import Row
+from teleop_core.graph.signals import copy
 from teleop_core.graph.topics import ENERGY
 from teleop_core.kernels import inner
 from teleop_core.kernels.fields import Integers, PoseRow, Vector3
@@ -47,6 +50,7 @@ class ReflectionState(FollowingState):
     pushed_at: Vector3  # where it began [m]
     scale: float  # the hand's energy over the slave's
     command: PoseRow  # where the hand leads the slave
+    led_from: PoseRow  # the same before
     is_fine: int
 
 
@@ -69,15 +73,17 @@ class Law(NamedTuple):
     left: Array  # its memory
     last: Array
     moved: Array
+    led: Array
     asked: Array
     flow: Array
+    heard: Array  # energies of the slave, its wave along the master's base
     port: Array
 
     def clear(self) -> None:
         """Forget what happened."""
         for array in (
             self.memory, self.felt, self.away, self.out, self.left, self.last, self.moved,
-            self.asked, self.flow, self.port,
+            self.led, self.asked, self.flow, self.heard, self.port,
         ):  # fmt: skip
             array[:] = 0.0
 
@@ -87,7 +93,7 @@ def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Arr
     return Law(
         part.push_pointer, numbers, np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3),
         passivity.hand_pointer, kept, np.zeros(PASSIVE_MEMORY), np.zeros(3), np.zeros(3),
-        np.zeros(3), np.zeros(3), np.zeros(len(ENERGY)),
+        np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(len(ENERGY)), np.zeros(len(ENERGY)),
     )  # fmt: skip
 
 
@@ -163,12 +169,19 @@ def _count(
     if is_other or not is_following:
         s.scale = scale
         begin_round(law.port, p.law, 1e-9 * row.master_measured_cp_ns)
+        copy(s.command, s.led_from)
     for i in range(3):
         law.moved[i] = stylus[i] - s.pushed_at[i]
         s.pushed_at[i] = stylus[i]
+        law.led[p.axis[i]] = p.sign[i] * (s.command[i] - s.led_from[i]) / p.gain[s.is_fine]
+        s.led_from[i] = s.command[i]
     came = -port_work(s.push, law.moved) / scale
     count(law.port, IN, came)
-    law.flow[0] = hear_energy(law.port, row.slave_energy)
+    for i in range(law.heard.shape[0]):
+        law.heard[i] = row.slave_energy[i]
+    for i in range(3):
+        law.heard[WAVE + p.axis[i]] = p.sign[i] * row.slave_energy[WAVE + i]
+    law.flow[0] = hear_energy(law.port, law.heard)
     law.flow[1], law.flow[2] = max(came, 0.0), max(-came, 0.0)
 
 
@@ -180,7 +193,7 @@ def _make_passive(
     for i in range(3):
         law.last[i], s.push[i] = s.push[i], law.asked[i]
     law.hand(
-        law.kept, law.left, law.last, law.moved, law.flow, row.slave_energy, law.port, s.push,
+        law.kept, law.left, law.last, law.moved, law.led, law.flow, law.heard, law.port, s.push,
         s.scale, period,
     )  # fmt: skip
     _bound(s.push, p.reflected_most, _ROUNDING)
@@ -190,3 +203,6 @@ def _make_passive(
             law.port[WITHHELD] += lost
     for i in range(law.port.shape[0]):
         row.master_energy[i] = law.port[i]
+    row.master_energy[IMPEDANCE] /= p.force_scale * p.gain[s.is_fine]
+    for i in range(3):
+        row.master_energy[WAVE + i] = p.sign[i] * law.port[WAVE + p.axis[i]]

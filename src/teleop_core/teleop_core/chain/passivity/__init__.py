@@ -24,7 +24,9 @@ from teleop_core.kernels.parts import fenced, is_whole, numbers_of
 __all__ = ["MEMORY", "PASSIVITIES", "Passivity", "leave_command", "register_passivity"]
 
 _ROW = types.float64[::1]
-HAND = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64, types.float64)
+HAND = types.void(
+    _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64, types.float64
+)
 SLAVE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64)
 """Signatures of both kernels, so that one compiled stage serves every kind."""
 MEMORY = 12
@@ -52,9 +54,10 @@ class Passivity:
     Attributes:
         name: What ``--set reflection.passivity=`` calls it.
         parameters: Its parameter group.
-        hand: ``hand(numbers, memory, last, moved, flow, heard, port, push, scale, period)``, called
-            for every sample of the master. ``last`` (3,) is the push since the sample before [N],
-            ``moved`` (3,) how far the hand went under it [m], both along the master's base;
+        hand: ``hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period)``,
+            called for every sample of the master. ``last`` (3,) is the push since the sample before
+            [N], ``moved`` (3,) how far the hand went under it, and ``led`` (3,) how far it led the
+            slave, over the gain of motion [m], all along the master's base;
             ``push`` (3,) the one that is asked for, to be made the one that is given; ``scale`` the
             hand's energy over that of the slave; ``period`` the time since the sample before [s].
         slave: ``slave(numbers, memory, flow, force, last, heard, port, command, period)``, called
@@ -64,6 +67,7 @@ class Passivity:
             given.
         numbers: ``numbers(parameters)`` gives what ``hand`` takes; None for the numbers of the
             parameters in their order.
+        needs_slave: Whether it works with a stage ``passivity`` alone.
     """
 
     name: str
@@ -71,6 +75,7 @@ class Passivity:
     hand: Callable[..., None]
     slave: Callable[..., None] = leave_command
     numbers: Callable[[Any], Array] | None = None
+    needs_slave: bool = False
 
     @cached_property
     def hand_pointer(self) -> Any:
@@ -90,8 +95,8 @@ class Passivity:
 def _try(part: Passivity) -> None:
     """Call both sides for some samples, so that what cannot work is told before anything runs."""
     needs = (
-        "one with hand(numbers, memory, last, moved, flow, heard, port, push, scale, period) and "
-        "parameters that all have defaults"
+        "one with hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period) "
+        "and parameters that all have defaults"
     )
     with tried("passivity", part.name, needs):
         numbers, width = part.numbers_of(part.parameters()), len(ENERGY)
@@ -102,7 +107,9 @@ def _try(part: Passivity) -> None:
         heard, port, flow = np.zeros(width), np.zeros(width), np.full(3, 1e-6)
         for size in (0.0, 1.0, -1.0):
             push[:], moved = size, np.full(3, 1e-4 * size)
-            part.hand(numbers, memory, push.copy(), moved, flow, heard, port, push, 1.0, 1e-3)
+            part.hand(
+                numbers, memory, push.copy(), moved, moved, flow, heard, port, push, 1.0, 1e-3
+            )  # fmt: skip
             part.slave(np.ones(5), memory, flow, np.full(6, size), last, heard, port, command, 1e-3)
             is_sound = np.isfinite(push).all() and np.isfinite(command).all()
             if not (is_sound and is_whole(fence) and is_whole(behind) and is_whole(after)):
@@ -117,6 +124,7 @@ PASSIVITIES: Registry[Passivity] = Registry(
         "none": "teleop_core.chain.passivity.none:NONE",
         "tank": "teleop_core.chain.passivity.tank:TANK",
         "tdpa": "teleop_core.chain.passivity.tdpa:TDPA",
+        "wave": "teleop_core.chain.passivity.wave:WAVES",
     },
     part_check("passivity", Passivity, "hand", "slave"),
     _try,

@@ -8,8 +8,8 @@ from teleop_core.kernels.geometry import Array
 
 @kernel
 def leave_push(
-    numbers: Array, memory: Array, last: Array, moved: Array, flow: Array, heard: Array,
-    port: Array, push: Array, scale: float, period: float,
+    numbers: Array, memory: Array, last: Array, moved: Array, led: Array, flow: Array,
+    heard: Array, port: Array, push: Array, scale: float, period: float,
 ) -> None:  # fmt: skip
     """Let the hand have the push that is asked for."""
 

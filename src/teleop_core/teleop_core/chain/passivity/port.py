@@ -13,10 +13,10 @@ from teleop_core.graph.topics import ENERGY
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 
-LAW, ROUND, IN, OUT, TOLD, HEARD, MARGIN, WITHHELD, TURN_IN, TURN_OUT, DRIFT = (
+LAW, ROUND, IN, OUT, TOLD, HEARD, MARGIN, WITHHELD, TURN_IN, TURN_OUT, DRIFT, IMPEDANCE, WAVE = (
     ENERGY.index(name) for name in (
         "law", "round", "energy_in", "energy_out", "told", "heard", "margin", "withheld",
-        "turn_in", "turn_out", "drift_x",
+        "turn_in", "turn_out", "drift_x", "impedance", "wave_x",
     )
 )  # fmt: skip
 """Columns of a port's energies."""

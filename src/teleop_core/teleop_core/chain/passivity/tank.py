@@ -15,8 +15,8 @@ SPARE = 0.005
 
 @kernel
 def tank_hand(
-    numbers: Array, memory: Array, last: Array, moved: Array, flow: Array, heard: Array,
-    port: Array, push: Array, scale: float, period: float,
+    numbers: Array, memory: Array, last: Array, moved: Array, led: Array, flow: Array,
+    heard: Array, port: Array, push: Array, scale: float, period: float,
 ) -> None:  # fmt: skip
     """Make the push (3,) [N] no larger than the tank can pay for until the next sample.
 

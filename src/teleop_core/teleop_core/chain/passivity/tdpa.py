@@ -40,8 +40,8 @@ def tell(port: Array, kept: float) -> None:
 
 @kernel
 def tdpa_hand(
-    numbers: Array, memory: Array, last: Array, moved: Array, flow: Array, heard: Array,
-    port: Array, push: Array, scale: float, period: float,
+    numbers: Array, memory: Array, last: Array, moved: Array, led: Array, flow: Array,
+    heard: Array, port: Array, push: Array, scale: float, period: float,
 ) -> None:  # fmt: skip
     """Make the push (3,) [N] no larger than what is left can pay for until the next sample.
 
@@ -61,6 +61,15 @@ def tdpa_hand(
     tell(port, numbers[0] * size / scale)
     if square == 0.0:
         port[MARGIN] = 0.0
+    pay_push(port, push, size, way, scale)
+
+
+@inner
+def pay_push(port: Array, push: Array, size: float, way: float, scale: float) -> None:
+    """Make a push (3,) of some size [N] no larger than the margin pays for until the next sample.
+
+    The hand went ``way`` [m], the sum over its axes, since the sample before.
+    """
     most = SPARE + scale * max(port[MARGIN], 0.0) / (READING + 2.0 * way)
     if size > most:
         for i in range(3):
@@ -98,33 +107,50 @@ def tdpa_slave(
     drift = port[DRIFT : DRIFT + 3]
     port[MARGIN] += flow[0] + flow[1] - flow[2]
     memory[0] += flow[0] + flow[1]
-    size = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-    is_free = size <= numbers[2]
-    if is_free:
+    if norm(force) <= numbers[2]:
         port[MARGIN] = memory[0] = 0.0
     told = port[TOLD]
     tell(port, 0.0)
     memory[0] -= port[TOLD] - told
-    _make_up(numbers, drift, period)
-    inwards = 0.0
+    make_up(numbers, drift, period)
     for i in range(3):
         command[i] -= drift[i]
+    pay_command(numbers, memory, force, last, port, command, period)
+
+
+@inner
+def pay_command(
+    numbers: Array, memory: Array, force: Array, last: Array, port: Array, command: Array,
+    period: float,
+) -> None:  # fmt: skip
+    """Let the command (7,) go against the force as far as what is left pays for; the rest is drift.
+
+    Arguments are those of :func:`tdpa_slave`.
+    """
+    size, inwards = norm(force), 0.0
+    for i in range(3):
         inwards -= force[i] * (command[i] - last[i])
     lent = numbers[3] * min(max(2.0 - size / numbers[4], 0.0), 1.0)
     # What is overdrawn is given back by going back, no faster than drift goes away.
     left = max(min(port[MARGIN], memory[0]) + lent, -size * numbers[1] * period)
-    if inwards > left and not is_free:
+    if inwards > left and size > numbers[2]:
         for i in range(3):
             back = force[i] * (inwards - left) / (size * size)
             command[i] += back
-            drift[i] -= back
+            port[DRIFT + i] -= back
         port[WITHHELD] += max(inwards, 0.0) - max(left, 0.0)
         inwards = left
     memory[0] -= max(inwards, 0.0)
 
 
 @inner
-def _make_up(numbers: Array, drift: Array, period: float) -> None:
+def norm(force: Array) -> float:
+    """Size of a force, of its first three numbers."""
+    return math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+
+
+@inner
+def make_up(numbers: Array, drift: Array, period: float) -> None:
     """Let drift (3,) [m] fade, no faster than it may."""
     square = 0.0
     for i in range(3):

@@ -1,0 +1,189 @@
+"""Wave: hand and slave exchange waves, each a mix of force and speed.
+
+A wave carries energy: what the two-port holds is what is on its way. Its integral and its energy
+travel, which are both sums, so a packet that is lost, late or doubled takes nothing away from the
+next one and adds no energy.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base.parameters import parameter
+from teleop_core.chain.passivity import Passivity
+from teleop_core.chain.passivity.port import (
+    DRIFT,
+    HEARD,
+    IMPEDANCE,
+    MARGIN,
+    ROUND,
+    TOLD,
+    WAVE,
+)
+from teleop_core.chain.passivity.tdpa import make_up, norm, pay_command, pay_push
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaveParameters:
+    """What waves travel through."""
+
+    impedance: float = parameter(
+        10.0, unit="N·s/m", lower=0.1, upper=100.0,
+        doc="force over speed of a wave, at the hand; the hand feels 1.5 times as much as a drag",
+        source="assumed: tissue of 200 N/m times the arm's lag of 50 ms, below which an arm that "
+        "yields to a force that it reads late swings",
+    )  # fmt: skip
+
+
+DRAG = 1.5
+"""Drag that the hand feels over what its wave takes: what is more pays for what the wave lacks."""
+SPEED_TIME = 0.01
+"""Time constant of the speed that the drag answers, above the steps of the reading [s]."""
+HASTE = 0.01
+"""Time in which energy is spent on a wave that lags behind what it is to say [s]."""
+KEPT_WAY = 3e-4
+"""Way over which the hand's side keeps what the push needs, as that of TDPA [m]."""
+RESERVE, TAKEN, OWED, SPEED = 1, 2, 5, 8
+"""Places in the memory of either side: energy that was heard and not yet given [J], integral of the
+wave that was given, integral of the own wave that is not yet told [√W s]; the hand's speed [m/s].
+The first place is the round at the hand, and what is left by the command at the slave."""
+
+
+@kernel
+def draw(owed: Array, energy: float, period: float, haste: float, wave: Array) -> float:
+    """Take from the integral of a wave as much as goes at once; returns the energy of that [J].
+
+    What a wave of constant size brought in some time is given in the same time. Whatever the wave
+    was, its energy suffices for all of it: no wave gets as far with less than one of constant size.
+
+    Args:
+        owed: Integral of the wave that is still to be given (3,) [√W s]; written.
+        energy: What there is for it [J].
+        period: Time for which the wave holds [s].
+        haste: Time in which all of the energy may be spent [s]; infinite to be frugal.
+        wave: Its size over that time (3,) [√W]; written.
+
+    Source:
+        Niemeyer and Slotine 1998, integral and energy of a wave as what travels.
+    """
+    square = 0.0
+    for i in range(3):
+        square += owed[i] * owed[i]
+        wave[i] = 0.0
+    if square == 0.0 or energy <= 0.0:
+        return 0.0
+    rate = max(2.0 * energy / square, math.sqrt(2.0 * energy / (square * haste)))
+    share = min(rate * period, math.sqrt(2.0 * energy * period / square), 1.0)
+    for i in range(3):
+        wave[i] = owed[i] * share / period
+        owed[i] -= owed[i] * share
+    return 0.5 * square * share * share / period
+
+
+@inner
+def _take(memory: Array, gained: float, heard: Array, port: Array, period: float) -> Array:
+    """The wave (3,) [√W] that comes out for the next ``period``; the margin gets its energy."""
+    owed, wave = np.zeros(3), np.zeros(3)
+    memory[RESERVE] += gained
+    if heard[ROUND] == port[ROUND] and heard[TOLD] == port[HEARD]:  # the newest of this round
+        for i in range(3):
+            owed[i] = heard[WAVE + i] - memory[TAKEN + i]
+    spent = draw(owed, memory[RESERVE], period, math.inf, wave)
+    memory[RESERVE] -= spent
+    port[MARGIN] += spent
+    for i in range(3):
+        memory[TAKEN + i] += wave[i] * period
+    return wave
+
+
+@inner
+def _tell(memory: Array, port: Array, kept: float, period: float) -> None:
+    """Send of the own wave what the margin but for ``kept`` [J] pays for."""
+    wave = np.zeros(3)
+    spent = draw(memory[OWED : OWED + 3], port[MARGIN] - kept, period, HASTE, wave)
+    port[TOLD] += spent
+    port[MARGIN] -= spent
+    for i in range(3):
+        port[WAVE + i] += wave[i] * period
+
+
+@kernel
+def wave_hand(
+    numbers: Array, memory: Array, last: Array, moved: Array, led: Array, flow: Array,
+    heard: Array, port: Array, push: Array, scale: float, period: float,
+) -> None:  # fmt: skip
+    """Write the push (3,) [N] that the wave from the slave and the hand's speed ask for.
+
+    With impedance b, speed v and wave w that came, the push is ``sqrt(2 b) w - b v``, and the wave
+    that goes is ``sqrt(2 b) v - w``; both are of the slave's scale of energy. The first part of the
+    push is no larger than the margin pays for until the next sample, as that of TDPA.
+
+    Source:
+        Niemeyer and Slotine 1991.
+    """
+    if memory[0] != port[ROUND]:
+        for i in range(memory.shape[0]):
+            memory[i] = 0.0
+        memory[0] = port[ROUND]
+    b, way = numbers[0], 0.0
+    at_hand, at_slave = math.sqrt(2.0 * b * scale), math.sqrt(2.0 * b / scale)
+    port[IMPEDANCE] = b
+    port[MARGIN] += flow[1] - flow[2]
+    wave = _take(memory, flow[0], heard, port, period)
+    for i in range(3):
+        memory[SPEED + i] += (led[i] - memory[SPEED + i] * period) / (SPEED_TIME + period)
+        memory[OWED + i] += at_slave * led[i] - wave[i] * period
+        push[i] = at_hand * wave[i]
+        way += abs(moved[i])
+    size = norm(push)
+    _tell(memory, port, KEPT_WAY * size / scale, period)
+    pay_push(port, push, size, way, scale)
+    for i in range(3):
+        push[i] -= DRAG * b * memory[SPEED + i]
+
+
+@kernel
+def wave_slave(
+    numbers: Array, memory: Array, flow: Array, force: Array, last: Array, heard: Array,
+    port: Array, command: Array, period: float,
+) -> None:  # fmt: skip
+    """Write the command (7,) that the wave from the hand and the force on the tip ask for.
+
+    The port is matched by a damper of the impedance b: with force f and wave u that came, the
+    command goes at ``u / sqrt(2 b) + f / (2 b)``, and the wave that goes is ``f / sqrt(2 b)``. So
+    no wave from the hand comes back by itself, and a command in the air is the hand's. Against the
+    force it goes as far as is paid for, as that of TDPA; in the air drift goes away.
+
+    Source:
+        Niemeyer and Slotine 1991, with their matching of impedance at the slave.
+    """
+    b = heard[IMPEDANCE]
+    if b <= 0.0:
+        return
+    port[IMPEDANCE] = b
+    is_free, root, before = norm(force) <= numbers[2], math.sqrt(2.0 * b), port[MARGIN]
+    wave = _take(memory, flow[0], heard, port, period)
+    memory[0] += port[MARGIN] - before + flow[1]
+    port[MARGIN] += flow[1] - flow[2]
+    if is_free:  # of what the damper took, what may be owed for the arm's lag is kept
+        port[MARGIN] *= numbers[0] / (numbers[0] + period)
+        memory[0] = port[MARGIN]
+    for i in range(3):
+        felt = 0.0 if is_free else force[i]
+        memory[OWED + i] += felt / root * period
+        way = (wave[i] / root + 0.5 * felt / b) * period
+        port[DRIFT + i] = command[i] - last[i] - way
+    told = port[TOLD]
+    _tell(memory, port, 0.0, period)
+    memory[0] -= port[TOLD] - told
+    if is_free:
+        make_up(numbers, port[DRIFT : DRIFT + 3], period)
+    for i in range(3):
+        command[i] -= port[DRIFT + i]
+    pay_command(numbers, memory, force, last, port, command, period)
+
+
+WAVES = Passivity("wave", WaveParameters, wave_hand, wave_slave, needs_slave=True)
