@@ -92,7 +92,7 @@ def test_every_session_of_a_documented_command_can_be_begun():
         words = [word for word in shlex.split(line, comments=True) if word != "..."]
         arguments = _parser().parse_args(words)
         settings = getattr(arguments, "settings", [])
-        needs_more = re.search(r"\.(py|yaml|csv)\b|=(gamepad|spacemouse|elsewhere|bags/)", line)
+        needs_more = re.search(r"\.(py|yaml|csv|stl)\b|=(gamepad|spacemouse|elsewhere|bags/)", line)
         if settings and hasattr(arguments, "scenario") and not needs_more:
             VirtualTime(configuration(arguments.scenario, texts=settings))
             begun.add(line)

@@ -53,6 +53,15 @@ def test_own_architecture_feels_force_as_position_force_does_and_less_drag(tmp_p
     assert felt[3] >= felt[1] > 2.0 * felt[2]
 
 
+def test_delay_takes_least_of_what_waves_let_feel_and_they_alone_press_no_harder(tmp_path):
+    text = run("far_touch", tmp_path)
+    felt, most = numbers(r"feels ([\d.]+) N", text), numbers(r"tip ([\d.]+) N at most", text)
+    none, tank, tdpa, wave = (felt[i : i + 3] for i in range(0, 12, 3))
+    assert none[2] > 1.3 * none[0]
+    assert wave[2] > max(tank[2], tdpa[2])
+    assert max(most[9:]) == most[9] < max(most[:9])
+
+
 def test_own_network_loses_more_the_deeper_it_fades(tmp_path):
     text = run("own_network", tmp_path)
     lost, ages = numbers(r"(\d+) % lost", text), numbers(r"than (\d+) ms", text)

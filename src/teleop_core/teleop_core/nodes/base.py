@@ -158,7 +158,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         """Time without progress after which the loop counts as hung [s]; 0: never."""
         self.has_own_loop = True
         """Whether the node works in a thread of its own, or in that of a whole session."""
-        self.is_at_work = False
+        self.is_at_work = self.has_worked = False
         self._loop: Loop | None = None
         self.ports = NO_PORTS
         self._own_publishers: list[Any] = []
@@ -350,7 +350,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
             entry.forget()
         self._reported = b"", None
         self.start()
-        self.is_at_work = True
+        self.is_at_work = self.has_worked = True
         if self.has_own_loop:
             self.schedule.start()
             self._loop = Loop(

@@ -46,7 +46,6 @@ class TeleopSession:
         last = self._stages[-1]
         self._schedule = Schedule(time.monotonic_ns, time.sleep, last.options.max_catch_up)
         self._at_work: tuple[bool, ...] = ()
-        self._seen: set[CoreNode] = set()
         self._pending: list[tuple[Output, int, int]] = []
         self._ticks = 0
         self._loop = Loop("session", self._turn, last.fail, patience=last.patience)
@@ -90,9 +89,8 @@ class TeleopSession:
 
     def _are_all_there(self) -> bool:
         """Whether every node has been at work that was to begin by itself: no sample is missed."""
-        self._seen |= {node for node in self.nodes if node.is_at_work}
-        waited_for = {n for n in self.nodes if n.options.autostart and not n.has_ended}
-        return bool(self._seen) and waited_for <= self._seen
+        waited_for = [n for n in self.nodes if n.options.autostart and not n.has_ended]
+        return any(n.has_worked for n in self.nodes) and all(n.has_worked for n in waited_for)
 
     def _tick(self, tick_ns: int) -> None:
         """One tick [ns, monotonic]; the gate keeps all nodes open until all is published."""
