@@ -192,7 +192,7 @@ def test_a_fall_of_the_force_on_the_tip_counts_from_sample_to_sample_but_not_ove
     assert score.value("touch.drop_n") == pytest.approx(1.5)
 
 
-def test_a_tool_misses_its_remote_centre_by_the_distance_of_its_shaft(recipe, path):
+def test_a_tool_that_follows_misses_its_remote_centre_by_the_distance_of_its_shaft(recipe, path):
     poses = recipe.values(SLAVE_MEASURED_CP)
     poses[:, 3:7] = [1.0, 0.0, 0.0, 0.0]
     beside = np.where(np.arange(len(poses)) % 2, 3e-3, 4e-3)
@@ -200,6 +200,12 @@ def test_a_tool_misses_its_remote_centre_by_the_distance_of_its_shaft(recipe, pa
     poses[:, :3] = centre[:3]
     poses[:, 0] += beside
     poses[:, 2] -= np.linspace(0.15, 0.10, len(poses))
+    begin = recipe.stamps[200]
+    poses[:200, 0] += 0.05  # not led yet
+    recipe.singles = [
+        (TELEOP_STATE, recipe.stamps[0], state(recipe.stamps[0], is_following=0.0)),
+        (TELEOP_STATE, begin, state(begin)),
+    ]
     rows = np.tile(centre, (len(poses), 1))
     recipe.topics.append(REMOTE_CENTRE)
     recipe.rows[REMOTE_CENTRE] = (recipe.stamps, rows, recipe.stamps)

@@ -54,6 +54,15 @@ def test_friction_of_the_shaft_grows_with_depth_and_turns_with_the_motion():
     assert s.punctures == 1
 
 
+def test_cutting_costs_the_cutting_force_times_the_way_however_stiff_the_tissue_is():
+    way = along_z(2e-3, -15e-3)
+    first, last = (int(np.argmax(way[:, 2] < z)) for z in (-10e-3, -14e-3))
+    for stiffness in (200.0, 50_000.0):
+        lost = lead(way, world_stiffness=stiffness, shaft_friction=0.0)[1]
+        expected = 0.1 * (way[first, 2] - way[last, 2])
+        assert lost[last] - lost[first] == pytest.approx(expected, rel=1e-6)
+
+
 def test_a_needle_that_rests_is_held_by_its_friction_for_ever():
     at_rest = np.full(3000, -12e-3)
     z = np.concatenate((along_z(2e-3, -12e-3)[:, 2], at_rest, at_rest + 1e-4, at_rest))

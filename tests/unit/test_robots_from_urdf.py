@@ -189,13 +189,31 @@ def test_a_session_says_which_limits_are_assumed_and_nothing_of_a_file_that_give
     assert "effort" not in note
 
 
-def test_friction_that_would_stop_the_links_in_no_time_has_a_motor_behind_it(tmp_path):
+@pytest.mark.parametrize("friction", ['damping="2" friction="1"', 'damping="2"', 'friction="1"'])
+def test_friction_that_would_stop_the_links_in_no_time_has_a_motor_behind_it(friction, tmp_path):
     path = tmp_path / "arm.urdf"
-    path.write_text(TEXT.replace("<axis", '<dynamics damping="2" friction="1"/><axis'))
+    path.write_text(TEXT.replace("<axis", f"<dynamics {friction}/><axis"))
     drives = load_robot(str(path), tip="tool0").drives
     rate = (drives.viscous + drives.coulomb / drives.friction_speed) / drives.inertia
-    np.testing.assert_array_equal(drives.viscous, np.full(6, 2.0))
+    if "damping" in friction:
+        np.testing.assert_array_equal(drives.viscous, np.full(6, 2.0))
     assert (rate <= 2000.0).all()
+    assert (rate >= 1500.0).any()
+
+
+def test_an_inertia_of_no_body_is_no_matter_where_nothing_moves_it_or_axes_are_independent(
+    tmp_path,
+):
+    path = tmp_path / "arm.urdf"
+    none = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="1" ixz="1" iyz="1"/>'
+    path.write_text(TEXT.replace('"base"/>', f'"base">{none}</inertial></link>', 1))
+    for dynamics in ("independent", "links"):
+        found, plain = (
+            load_robot(str(file), dynamics=dynamics, **TOOL) for file in (path, EXAMPLE)
+        )
+        np.testing.assert_array_equal(found.drives.inertia, plain.drives.inertia)
+    path.write_text(TEXT.replace('izz="0.008"', 'izz="0.9"', 1))
+    assert load_robot(str(path), **TOOL).drives.inertia[0] > plain.drives.inertia[0]
 
 
 def test_an_arm_of_fewer_joints_controls_the_directions_that_are_asked(tmp_path):
@@ -252,7 +270,10 @@ MISTAKES = {
     "two numbers of three": (changed('xyz="0 0 0.42"', 'xyz="0 0.42"'), "joint elbow"),
     "negative effort": (changed('effort="80"', 'effort="-80"'), "effort of joint elbow"),
     "negative mass": (changed('mass value="3.0"', 'mass value="-3.0"'), "link forearm"),
-    "an inertia of no body": (changed('izz="0.008"', 'izz="0.9"'), "link forearm"),
+    "an inertia of no body": (
+        changed('izz="0.008"', 'izz="0.9"', dynamics="links", **TOOL),
+        "of link forearm",
+    ),
 }
 
 

@@ -54,11 +54,13 @@ def least_inertia(kind: str, viscous: float, coulomb: float) -> float:
 
     Args:
         kind: "turn" or "slide".
-        viscous: Viscous friction [N·m·s/rad or N·s/m].
-        coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``.
+        viscous: Viscous friction [N·m·s/rad or N·s/m]; 0 where it will be assumed.
+        coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``; 0 likewise.
     """
+    slow, assumed = _SPEEDS[kind]["friction_speed"], _PER_INERTIA[kind]
+    rate = (0.0 if viscous else assumed["viscous"]) + (0.0 if coulomb else assumed["coulomb"]) / slow
     # A little more, for the check of the rate divides by it again.
-    return 1.001 * (viscous + coulomb / _SPEEDS[kind]["friction_speed"]) / _STIFFEST
+    return 1.001 * (viscous + coulomb / slow) / (_STIFFEST - rate)
 
 
 def parse_drives(

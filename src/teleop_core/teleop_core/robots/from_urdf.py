@@ -123,7 +123,8 @@ def load_urdf(
     reach = sum(float(length(joint.origin[:3, 3])) for joint in chain)
     reach += sum(max(map(abs, _limits(j))) for j in moving if j.kind == "prismatic")
     home, n = np.array([limit.home for limit in limits]), len(limits)
-    bodies, inertia = _bodies(moving, base, links, joints), np.zeros((n, n))
+    may_be_any = dynamics == "independent"  # whose inertia counts as assumed
+    bodies, inertia = _bodies(moving, base, links, joints, may_be_any), np.zeros((n, n))
     chain_numbers = chain_row(kinds, fixed, bodies, np.zeros(len(moving)))
     follower_inertia(home, dynamics_row(followers, chain_numbers, np.zeros(n)), inertia)
     drives = _drives(trains, np.diag(inertia).tolist())
@@ -402,8 +403,14 @@ def _drive_entries(joint: _Joint) -> dict[str, float]:
     return found
 
 
-def _bodies(moving: list[_Joint], base: str, links: _Links, joints: list[_Joint]) -> Array:
-    """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero."""
+def _bodies(
+    moving: list[_Joint], base: str, links: _Links, joints: list[_Joint], may_be_any: bool
+) -> Array:
+    """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero.
+
+    Files give many an inertia that no body has. It does no harm where nothing moves it, and where
+    ``may_be_any``.
+    """
     carried: dict[str, list[_Joint]] = {}
     for joint in joints:
         carried.setdefault(joint.parent, []).append(joint)
@@ -412,8 +419,8 @@ def _bodies(moving: list[_Joint], base: str, links: _Links, joints: list[_Joint]
     stack: list[tuple[str, Array, int]] = [(base, np.eye(4), -1)]
     while stack:
         link, T, mover = stack.pop()
-        mass, inertia, place = _mass(link, links[link])
         if mover >= 0:
+            mass, inertia, place = _mass(link, links[link], may_be_any)
             centre = product(T, place)
             turned = product(product(centre[:3, :3], inertia), centre[:3, :3].T)
             sums[mover] += body_row(mass, centre[:3, 3], turned)
@@ -431,7 +438,7 @@ def _aligned(axis: Array) -> tuple[float, Array]:
     return sign, transform(_turned_z(sign * axis), np.zeros(3))
 
 
-def _mass(name: str, link: Xml.Element) -> tuple[float, Array, Array]:
+def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array, Array]:
     """Mass [kg], inertia (3, 3) [kg·m²] at its centre, and where that is in the link (4, 4)."""
     element, where = link.find("inertial"), f"link {name}"
     if element is None:
@@ -443,8 +450,9 @@ def _mass(name: str, link: Xml.Element) -> tuple[float, Array, Array]:
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if mass < 0.0 or not _is_possible(inertia):
-        raise ParameterError(f"inertial of {where}", (mass, inertia.tolist()), "that of a body")
+    if mass < 0.0 or not (may_be_any or _is_possible(inertia)):
+        needed = "that of a body; dynamics=independent takes any"
+        raise ParameterError(f"inertial of {where}", (mass, inertia.tolist()), needed)
     return mass, inertia, _origin(where, element)
 
 
