@@ -168,6 +168,8 @@ CODE_MUTANTS = (
             "self._driver, self._holds = page, False", "self._driver = page", "console_drivers"),
     _mutant("two_hosts", "a request under two names is answered", "console/guard.py",
             "if len(hosts) != 1 or not", "if not", "console_guard"),
+    _mutant("mesh_outside", "a URDF leads to files anywhere", "robots/visuals.py",
+            "if not real.is_relative_to(root.resolve()):", "if False:", "looks"),
     _mutant("gap_long", "a pause of a minute is drawn as a line", "console/tails.py",
             "time > before + _GAP", "time > before + 60.0", "console_scene", "console_history"),
     _mutant("page_stands", "a page is woken from any thread", "console/hooks.py",

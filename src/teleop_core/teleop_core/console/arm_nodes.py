@@ -29,6 +29,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.bodies import bodies_of
+from teleop_core.robots.bodies.looks import looks_of
 from teleop_core.robots.bodies.meshes import mesh_of
 from teleop_core.robots.robot import Robot
 
@@ -65,7 +66,8 @@ class ArmNodes:
         self._root = server.scene.add_frame(self.path, show_axes=False)
         if arm.name:
             server.scene.add_label(f"{self.path}/name", arm.name, anchor="top-center")
-        self.drawn = BodyNodes(server, f"{self.path}/robot", self.bodies)
+        self._looks = looks_of(robot)
+        self.drawn = BodyNodes(server, f"{self.path}/robot", self.bodies, self._looks)
         self._ghost: BodyNodes | None = None
         self._is_ghost_shown = False
         self.measured = Tail(server, f"{self.path}/measured", MEASURED)
@@ -218,7 +220,8 @@ class ArmNodes:
         self._is_ghost_shown = is_shown
         if self._ghost is None and is_shown:
             self._ghost_root = self._server.scene.add_frame(f"{self.path}/ghost", show_axes=False)
-            self._ghost = BodyNodes(self._server, f"{self.path}/ghost", self.bodies, is_ghost=True)
+            place = f"{self.path}/ghost"
+            self._ghost = BodyNodes(self._server, place, self.bodies, self._looks, is_ghost=True)
             self._ghost.move(posture(self._robot))
         if self._ghost is not None:
             self._ghost_root.visible = is_shown

@@ -10,7 +10,7 @@ from teleop_core.console.look import WANTED, WRONG, Color
 from teleop_core.console.poses import moved, set_pose
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots.bodies import Bodies, Role, Solid
-from teleop_core.robots.bodies.meshes import merged, mesh_of
+from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
 
 ROLES: Mapping[Role, Color] = MappingProxyType({
     "base": (96, 108, 122), "link": (196, 204, 212), "joint": (52, 112, 176),
@@ -26,11 +26,18 @@ class BodyNodes:
         server: The page.
         path: Path of the node that they are below.
         bodies: The robot's bodies.
+        looks: Meshes in place of the solids of some bodies, by their index.
         is_ghost: Whether they are drawn through and through in one colour, without axes.
     """
 
     def __init__(
-        self, server: viser.ViserServer, path: str, bodies: Bodies, *, is_ghost: bool = False
+        self,
+        server: viser.ViserServer,
+        path: str,
+        bodies: Bodies,
+        looks: Mapping[int, Mesh],
+        *,
+        is_ghost: bool = False,
     ) -> None:
         axis = 0.08 * bodies.size
         self._bodies = bodies
@@ -42,9 +49,14 @@ class BodyNodes:
         }  # fmt: skip
         self._list = list(self.frames.values())
         self._meshes: list[dict[Role, viser.MeshHandle]] = []
-        for body in bodies.bodies:
+        for i, body in enumerate(bodies.bodies):
             place = f"{path}/{body.name}"
-            self._meshes.append(add_solids(server, place, body.solids, is_ghost=is_ghost))
+            if i in looks:
+                role: Role = "link" if i else "base"
+                node = _add_mesh(server, place, role, looks[i], is_ghost=is_ghost, is_flat=True)
+                self._meshes.append({role: node})
+            else:
+                self._meshes.append(add_solids(server, place, body.solids, is_ghost=is_ghost))
         self._drawn = np.tile(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), (len(self._list), 1))
         self._marked: frozenset[int] = frozenset()
 
@@ -84,14 +96,27 @@ def add_solids(
     """Add solids below a node: one mesh for each role among them; an opacity of None is opaque."""
     meshes = {}
     for role in dict.fromkeys(solid.role for solid in solids):
-        parts = [mesh_of(solid) for solid in solids if solid.role == role]
-        vertices, faces = merged(parts)
-        meshes[role] = server.scene.add_mesh_simple(
-            f"{path}/{role}", vertices.astype(np.float32), faces.astype(np.uint32),
-            color=WANTED if is_ghost else ROLES[role], opacity=0.3 if is_ghost else opacity,
-            cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
+        mesh = merged([mesh_of(solid) for solid in solids if solid.role == role])
+        meshes[role] = _add_mesh(server, path, role, mesh, is_ghost=is_ghost, opacity=opacity)
     return meshes
+
+
+def _add_mesh(
+    server: viser.ViserServer,
+    path: str,
+    role: Role,
+    mesh: Mesh,
+    *,
+    is_ghost: bool,
+    is_flat: bool = False,
+    opacity: float | None = None,
+) -> viser.MeshHandle:
+    vertices, faces = mesh
+    return server.scene.add_mesh_simple(
+        f"{path}/{role}", vertices.astype(np.float32), faces.astype(np.uint32),
+        color=WANTED if is_ghost else ROLES[role], opacity=0.3 if is_ghost else opacity,
+        flat_shading=is_flat, cast_shadow=False, receive_shadow=False,
+    )  # fmt: skip
 
 
 def extent(bodies: Bodies, joints: Array) -> tuple[Array, Array]:

@@ -58,7 +58,9 @@ def least_inertia(kind: str, viscous: float, coulomb: float) -> float:
         coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``; 0 likewise.
     """
     slow, assumed = _SPEEDS[kind]["friction_speed"], _PER_INERTIA[kind]
-    rate = (0.0 if viscous else assumed["viscous"]) + (0.0 if coulomb else assumed["coulomb"]) / slow
+    rate = (0.0 if viscous else assumed["viscous"]) + (
+        0.0 if coulomb else assumed["coulomb"]
+    ) / slow
     # A little more, for the check of the rate divides by it again.
     return 1.001 * (viscous + coulomb / slow) / (_STIFFEST - rate)
 

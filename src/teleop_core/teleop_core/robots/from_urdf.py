@@ -6,15 +6,15 @@ are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.dh_kernels`), t
 rigid bodies (:mod:`teleop_core.robots.chain_dynamics`). Effort and velocity limits, damping and
 friction are the drives' where they stand in the file and are above zero. The inertia of a drive is
 that of the links at home; that of its motor is in no URDF. Whatever is left out is assumed as for
-tables (:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are not
-read.
+tables (:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are read
+where they are drawn (:mod:`teleop_core.robots.bodies.looks`).
 
 Source:
     The XML specification of URDF, pages joint and link.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -22,9 +22,8 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import dot, length, product
 from teleop_core.robots.chain_dynamics import body_row, chain_dynamics, chain_row
 from teleop_core.robots.decomposition import SEARCH, solution_of
@@ -40,37 +39,29 @@ from teleop_core.robots.followers import (
 )
 from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.urdf_tree import (
+    KINDS,
+    Links,
+    UrdfJoint,
+    chain_to,
+    elements_of,
+    joint_of,
+    joints_by_child,
+    limits_of,
+    numbers_of,
+    origin_of,
+    root_link,
+    root_of,
+    tip_of,
+    turn_of_z,
+)
+from teleop_core.robots.visuals import visuals_of
 
 MODELS = ("independent", "links")
 """How the arm of a file may move: see :func:`load_urdf`."""
-_KINDS = {"revolute": "turn", "continuous": "turn", "prismatic": "slide"}
-_ROUNDS = 2.0 * math.pi
-"""Limit [rad] of a continuous joint to either side, assumed."""
 _ROUNDING = 1e-6  # of an inertia, over its trace: files are written with few digits
 _NO_INERTIA = 1e-9  # [kg·m² or kg]; below it is rounding of bodies on the axis, and unknown
 _POWERS = {"viscous": 2, "coulomb": 1}  # of a factor, by which friction of a follower counts
-_Links = Mapping[str, Xml.Element]
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Joint:
-    """A joint of the file; ``axis`` a unit vector (3,) in its own frame, None if it is fixed."""
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    origin: Array
-    axis: Array | None
-    element: Xml.Element
-
-
-class _NoDoctype(Xml.TreeBuilder):
-    """Tree of an XML file without a document type, so that nothing in it can grow."""
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        """Refuse the declaration before anything it declares is used."""
-        raise ParameterError("<!DOCTYPE>", name, "left out: a URDF declares no entities")
 
 
 def load_urdf(
@@ -100,17 +91,14 @@ def load_urdf(
     """
     if dynamics not in MODELS:
         raise UnknownNameError("dynamics", dynamics, MODELS)
-    with damage_told(Path(path)):
-        builder = Xml.XMLParser(target=_NoDoctype())
-        builder.feed(Path(path).read_bytes())
-        root: Xml.Element = builder.close()
-    if root.tag != "robot":
-        raise ParameterError(str(path), f"<{root.tag}>", "a <robot>")
-    links = _named(root, "link")
-    joints = [_joint(name, element, links) for name, element in _named(root, "joint").items()]
-    by_child = _by_child(joints)
-    base = _root_link(links, by_child)
-    chain = _chain(_tip(tip, links, joints), by_child)
+    root = root_of(Path(path))
+    links = elements_of(root, "link")
+    joints = [
+        joint_of(name, element, links) for name, element in elements_of(root, "joint").items()
+    ]
+    by_child = joints_by_child(joints)
+    base = root_link(links, by_child)
+    chain = chain_to(tip_of(tip, links, joints), by_child)
     moving = [joint for joint in chain if joint.axis is not None]
     if not moving:
         raise ParameterError(
@@ -121,7 +109,7 @@ def load_urdf(
     limits = [_narrowed(train) for train in trains]
     fixed, kinds = _frames(chain)
     reach = sum(float(length(joint.origin[:3, 3])) for joint in chain)
-    reach += sum(max(map(abs, _limits(j))) for j in moving if j.kind == "prismatic")
+    reach += sum(max(map(abs, limits_of(j))) for j in moving if j.kind == "prismatic")
     home, n = np.array([limit.home for limit in limits]), len(limits)
     may_be_any = dynamics == "independent"  # whose inertia counts as assumed
     bodies, inertia = _bodies(moving, base, links, joints, may_be_any), np.zeros((n, n))
@@ -140,6 +128,10 @@ def load_urdf(
         solution=solution,
         followers=None if followers.is_plain else followers,
     )
+    coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
+    visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
+    # Without its start, for which a second's search would begin here: who needs it asks for it.
+    robot = replace(robot, visuals=visuals, start=None)
     if dynamics == "independent":
         return robot
     motors = np.maximum(drives.inertia - np.diag(inertia), 0.0)
@@ -149,7 +141,6 @@ def load_urdf(
         _refuse_beside(leaders, moving, joints)
         model = follower_dynamics(dynamics_row(followers, chain_numbers, motors), n)
     _refuse_weak(leaders, drives, home, model)
-    # Without its start, for which a second's search would begin here: who needs it asks for it.
     return replace(robot, dynamics=model, start=None)
 
 
@@ -157,13 +148,13 @@ def load_urdf(
 class _Geared:
     """A joint that turns or slides by ``factor`` times what its leader does, plus ``offset``."""
 
-    joint: _Joint
+    joint: UrdfJoint
     factor: float = 1.0
     offset: float = 0.0
 
 
 def _trains(
-    moving: list[_Joint], named: Mapping[str, _Joint]
+    moving: list[UrdfJoint], named: Mapping[str, UrdfJoint]
 ) -> tuple[list[list[_Geared]], Followers]:
     """For each joint of the robot itself and all that follow it to the tip; and the motions."""
     trains: dict[str, list[_Geared]] = {}
@@ -175,19 +166,19 @@ def _trains(
             train.append(_Geared(joint=joint, factor=factor, offset=offset))
         place = list(trains).index(leader.name)
         motions.append(Follower(leader=place, factor=factor, offset=offset))
-    kinds = tuple(1.0 if _KINDS[t[0].joint.kind] == "turn" else 2.0 for t in trains.values())
+    kinds = tuple(1.0 if KINDS[t[0].joint.kind] == "turn" else 2.0 for t in trains.values())
     return list(trains.values()), Followers(motions=tuple(motions), kinds=kinds)
 
 
-def _leader(joint: _Joint, named: Mapping[str, _Joint]) -> tuple[_Joint, float, float]:
+def _leader(joint: UrdfJoint, named: Mapping[str, UrdfJoint]) -> tuple[UrdfJoint, float, float]:
     """Joint that a joint follows in the end, itself if none, with factor and offset."""
     factor, offset, passed = 1.0, 0.0, [joint.name]
     while (mimic := joint.element.find("mimic")) is not None:
         where = f"mimic of joint {joint.name}"
-        own = float(_numbers(where, mimic, "multiplier", (1.0,))[0])
+        own = float(numbers_of(where, mimic, "multiplier", (1.0,))[0])
         if own == 0.0:
             raise ParameterError(f"multiplier of {where}", own, "not 0: what never moves is fixed")
-        offset += factor * float(_numbers(where, mimic, "offset", (0.0,))[0])
+        offset += factor * float(numbers_of(where, mimic, "offset", (0.0,))[0])
         factor, name = factor * own, mimic.get("joint", "")
         movable = [other for other in named if named[other].axis is not None]
         if name not in movable:
@@ -199,7 +190,9 @@ def _leader(joint: _Joint, named: Mapping[str, _Joint]) -> tuple[_Joint, float, 
     return joint, factor, offset
 
 
-def _refuse_beside(leaders: list[_Joint], moving: list[_Joint], joints: list[_Joint]) -> None:
+def _refuse_beside(
+    leaders: list[UrdfJoint], moving: list[UrdfJoint], joints: list[UrdfJoint]
+) -> None:
     """Refuse what moves with a joint of the robot, but not between root and tip: it would weigh."""
     named = {joint.name: joint for joint in joints}
     for joint in joints:
@@ -208,7 +201,7 @@ def _refuse_beside(leaders: list[_Joint], moving: list[_Joint], joints: list[_Jo
             raise ParameterError("dynamics", "links", needed)
 
 
-def _refuse_weak(leaders: list[_Joint], drives: Drives, home: Array, model: Dynamics) -> None:
+def _refuse_weak(leaders: list[UrdfJoint], drives: Drives, home: Array, model: Dynamics) -> None:
     """Refuse drives that cannot hold the arm at home."""
     weight = np.zeros(len(leaders))
     model.gravity(home, model.parameters.copy(), weight)
@@ -216,92 +209,6 @@ def _refuse_weak(leaders: list[_Joint], drives: Drives, home: Array, model: Dyna
         if most <= needed:
             name = f"effort of joint {joint.name}"
             raise ParameterError(name, float(most), f"above {needed:.3g}, its load at home")
-
-
-def _named(root: Xml.Element, tag: str) -> dict[str, Xml.Element]:
-    """Elements of a kind by their names."""
-    found: dict[str, Xml.Element] = {}
-    for element in root.findall(tag):
-        name = element.get("name", "")
-        if not name or name in found:
-            raise ParameterError(f"{tag} name", name, f"a name that no other {tag} has")
-        found[name] = element
-    if not found:
-        raise ParameterError(tag, 0, f"at least one <{tag}>")
-    return found
-
-
-def _joint(name: str, element: Xml.Element, links: _Links) -> _Joint:
-    kind, axis = element.get("type", ""), None
-    if kind not in (*_KINDS, "fixed"):
-        raise UnknownNameError(f"type of joint {name}", kind, (*_KINDS, "fixed"))
-    ends = []
-    for end in ("parent", "child"):
-        found = element.find(end)
-        link = "" if found is None else found.get("link", "")
-        if link not in links:
-            raise UnknownNameError(f"{end} of joint {name}", link, links)
-        ends.append(link)
-    if kind != "fixed":
-        given = _numbers(f"joint {name}", element.find("axis"), "xyz", (1.0, 0.0, 0.0))
-        norm = float(length(given))
-        if norm < 1e-9:
-            raise ParameterError(f"axis of joint {name}", given.tolist(), "longer than 0")
-        axis = given / norm
-    origin = _origin(f"joint {name}", element)
-    return _Joint(
-        name=name,
-        kind=kind,
-        parent=ends[0],
-        child=ends[1],
-        origin=origin,
-        axis=axis,
-        element=element,
-    )
-
-
-def _by_child(joints: list[_Joint]) -> dict[str, _Joint]:
-    """The one joint that carries each link but the root."""
-    found: dict[str, _Joint] = {}
-    for joint in joints:
-        if joint.child in found:
-            both = [found[joint.child].name, joint.name]
-            raise ParameterError(f"link {joint.child}", both, "the child of one joint")
-        found[joint.child] = joint
-    return found
-
-
-def _root_link(links: _Links, by_child: Mapping[str, _Joint]) -> str:
-    roots = [name for name in links if name not in by_child]
-    if len(roots) != 1:
-        raise ParameterError("links that are no child", roots, "one, the base")
-    for link in links:
-        _chain(link, by_child)
-    return roots[0]
-
-
-def _tip(tip: str, links: _Links, joints: list[_Joint]) -> str:
-    if tip:
-        if tip not in links:
-            raise UnknownNameError("tip", tip, links)
-        return tip
-    parents = {joint.parent for joint in joints}
-    ends = [name for name in links if name not in parents]
-    if len(ends) != 1:
-        raise ParameterError("tip", "", f"one of {', '.join(ends)}, or another link")
-    return ends[0]
-
-
-def _chain(tip: str, by_child: Mapping[str, _Joint]) -> list[_Joint]:
-    """Joints from the root to a link."""
-    found: list[_Joint] = []
-    link = tip
-    while link in by_child:
-        found.append(by_child[link])
-        link = found[-1].parent
-        if len(found) > len(by_child):
-            raise ParameterError(f"joint {found[-1].name}", link, "a parent that it does not carry")
-    return found[::-1]
 
 
 def _task(task: str) -> tuple[str, ...]:
@@ -312,25 +219,13 @@ def _task(task: str) -> tuple[str, ...]:
     return names or DIRECTIONS
 
 
-def _limits(joint: _Joint) -> tuple[float, float]:
-    where, limit = f"joint {joint.name}", joint.element.find("limit")
-    if joint.kind == "continuous":
-        lower, upper = -_ROUNDS, _ROUNDS
-    else:
-        lower = float(_numbers(where, limit, "lower", (0.0,))[0])
-        upper = float(_numbers(where, limit, "upper", (0.0,))[0])
-    if not lower < upper:
-        raise ParameterError(f"limits of {where}", (lower, upper), "lower < upper")
-    return lower, upper
-
-
 def _narrowed(train: list[_Geared]) -> DhJoint:
     """Joint with the limits in which it and all that follow it are within theirs."""
     leader = train[0].joint
-    lower, upper = _limits(leader)
+    lower, upper = limits_of(leader)
     for geared in train[1:]:
         if geared.joint.kind != "continuous":
-            ends = sorted((x - geared.offset) / geared.factor for x in _limits(geared.joint))
+            ends = sorted((x - geared.offset) / geared.factor for x in limits_of(geared.joint))
             lower, upper = max(lower, ends[0]), min(upper, ends[1])
     if not lower < upper:
         names = ", ".join(geared.joint.name for geared in train[1:])
@@ -340,35 +235,22 @@ def _narrowed(train: list[_Geared]) -> DhJoint:
     return DhJoint(name=leader.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
 
 
-def _frames(chain: list[_Joint]) -> tuple[list[Array], list[float]]:
+def _frames(chain: list[UrdfJoint]) -> tuple[list[Array], list[float]]:
     """Constant transforms between the joints, whose axes become z, and the kind of each joint."""
     fixed, kinds, last = [], [], np.eye(4)
     for joint in chain:
         last = product(last, joint.origin)
         if joint.axis is not None:
-            sign, align = _aligned(joint.axis)
+            sign, align = turn_of_z(joint.axis)
             fixed.append(product(last, align))
-            kinds.append(sign * (1.0 if _KINDS[joint.kind] == "turn" else 2.0))
+            kinds.append(sign * (1.0 if KINDS[joint.kind] == "turn" else 2.0))
             last = np.ascontiguousarray(align.T)
     return [*fixed, last], kinds
 
 
-def _turned_z(axis: Array) -> Array:
-    """Shortest rotation (3, 3) that turns z into a unit vector (3,) with z >= 0."""
-    x, y, z = axis.tolist()
-    share = 1.0 / (1.0 + z)
-    return np.array(
-        [
-            [1.0 - x * x * share, -x * y * share, x],
-            [-x * y * share, 1.0 - y * y * share, y],
-            [-x, -y, z],
-        ]
-    )
-
-
 def _drives(trains: list[list[_Geared]], inertias: list[float]) -> Drives:
     """Drives of the leaders, which bear friction and keep speed limits of what follows them."""
-    kinds, stated = [_KINDS[train[0].joint.kind] for train in trains], {}
+    kinds, stated = [KINDS[train[0].joint.kind] for train in trains], {}
     for train, kind, inertia in zip(trains, kinds, inertias, strict=True):
         own: dict[str, float] = {}
         for geared in train:
@@ -389,13 +271,13 @@ def _drives(trains: list[list[_Geared]], inertias: list[float]) -> Drives:
     return replace(drives, assumed=assumed)
 
 
-def _drive_entries(joint: _Joint) -> dict[str, float]:
+def _drive_entries(joint: UrdfJoint) -> dict[str, float]:
     where, found = f"joint {joint.name}", {}
     for tag, key, entry in (
         ("limit", "effort", "effort_limit"), ("limit", "velocity", "speed_limit"),
         ("dynamics", "damping", "viscous"), ("dynamics", "friction", "coulomb"),
     ):  # fmt: skip
-        value = float(_numbers(where, joint.element.find(tag), key, (0.0,))[0])
+        value = float(numbers_of(where, joint.element.find(tag), key, (0.0,))[0])
         if value < 0.0:
             raise ParameterError(f"{key} of {where}", value, ">= 0")
         if value > 0.0:  # a limit of 0 is what files say that do not know it
@@ -404,14 +286,14 @@ def _drive_entries(joint: _Joint) -> dict[str, float]:
 
 
 def _bodies(
-    moving: list[_Joint], base: str, links: _Links, joints: list[_Joint], may_be_any: bool
+    moving: list[UrdfJoint], base: str, links: Links, joints: list[UrdfJoint], may_be_any: bool
 ) -> Array:
     """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero.
 
     Files give many an inertia that no body has. It does no harm where nothing moves it, and where
     ``may_be_any``.
     """
-    carried: dict[str, list[_Joint]] = {}
+    carried: dict[str, list[UrdfJoint]] = {}
     for joint in joints:
         carried.setdefault(joint.parent, []).append(joint)
     places = {joint.name: i for i, joint in enumerate(moving)}
@@ -426,16 +308,10 @@ def _bodies(
             sums[mover] += body_row(mass, centre[:3, 3], turned)
         for joint in carried.get(link, ()):
             if joint.name in places and joint.axis is not None:
-                stack.append((joint.child, _aligned(joint.axis)[1].T, places[joint.name]))
+                stack.append((joint.child, turn_of_z(joint.axis)[1].T, places[joint.name]))
             else:
                 stack.append((joint.child, product(T, joint.origin), mover))
     return sums
-
-
-def _aligned(axis: Array) -> tuple[float, Array]:
-    """Sign of an axis along z, and the turn (4, 4) of z into the axis of that sign."""
-    sign = -1.0 if axis[2] < 0.0 else 1.0
-    return sign, transform(_turned_z(sign * axis), np.zeros(3))
 
 
 def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array, Array]:
@@ -443,17 +319,17 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
     element, where = link.find("inertial"), f"link {name}"
     if element is None:
         return 0.0, np.zeros((3, 3)), np.eye(4)
-    mass = float(_numbers(where, element.find("mass"), "value", (0.0,))[0])
+    mass = float(numbers_of(where, element.find("mass"), "value", (0.0,))[0])
     tensor = element.find("inertia")
     xx, xy, xz, yy, yz, zz = (
-        float(_numbers(where, tensor, key, (0.0,))[0])
+        float(numbers_of(where, tensor, key, (0.0,))[0])
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if mass < 0.0 or not (may_be_any or _is_possible(inertia)):
         needed = "that of a body; dynamics=independent takes any"
         raise ParameterError(f"inertial of {where}", (mass, inertia.tolist()), needed)
-    return mass, inertia, _origin(where, element)
+    return mass, inertia, origin_of(where, element)
 
 
 def _is_possible(inertia: Array) -> bool:
@@ -470,34 +346,3 @@ def _is_possible(inertia: Array) -> bool:
     minors += [M[i, i] * M[j, j] - M[i, j] ** 2 for i, j in combinations(range(3), 2)]
     minors.append(float(dot(M[0], np.cross(M[1], M[2]))))
     return spread > 0.0 and min(minors) >= -_ROUNDING
-
-
-def _origin(where: str, element: Xml.Element) -> Array:
-    found = element.find("origin")
-    roll, pitch, yaw = _numbers(where, found, "rpy", (0.0, 0.0, 0.0)).tolist()
-    turn = product(product(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll))
-    return transform(turn, _numbers(where, found, "xyz", (0.0, 0.0, 0.0)))
-
-
-def _numbers(
-    where: str, element: Xml.Element | None, key: str, default: tuple[float, ...]
-) -> Array:
-    """Numbers of an attribute, or the default where element or attribute is missing."""
-    text = None if element is None else element.get(key)
-    if text is None:
-        return np.array(default)
-    found = list(_finite(text))
-    if len(found) != len(default):
-        wanted = f"{len(default)} finite numbers" if len(default) > 1 else "a finite number"
-        raise ParameterError(f"{key} of {where}", text, wanted)
-    return np.array(found)
-
-
-def _finite(text: str) -> Iterator[float]:
-    for word in text.split():
-        try:
-            value = float(word)
-        except ValueError:
-            continue
-        if math.isfinite(value):
-            yield value

@@ -32,6 +32,7 @@ from teleop_core.robots.kinematics import (
     WriteKernel,
     is_ready,
 )
+from teleop_core.robots.visuals import Visual
 
 
 class _Start:
@@ -77,6 +78,7 @@ class Robot:
         hardware: What the real arm does beside its model; None where nobody knows.
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
         solution: How inverse kinematics are solved, in words; empty for robots that do not say.
+        visuals: What its links look like, if a file says so; nothing is read before it is drawn.
 
     Raises:
         ShapeError: Limits, home, start or drives are not vectors (n,).
@@ -95,6 +97,7 @@ class Robot:
     hardware: Hardware | None = None
     task_mask: tuple[bool, ...] = (True,) * 6
     solution: str = ""
+    visuals: tuple[Visual, ...] = ()
     start: _Start = _Start()
     # Writable copies for the kernels, which are compiled for such arrays alone.
     _row: Array = field(init=False)

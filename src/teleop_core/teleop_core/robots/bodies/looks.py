@@ -1,0 +1,72 @@
+"""Looks: the meshes that a URDF gives its links, in the frames of the robot's bodies."""
+
+import warnings
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.bodies.describe import bodies_of
+from teleop_core.robots.bodies.frames import seen_from
+from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
+from teleop_core.robots.bodies.solids import Solid
+from teleop_core.robots.robot import Robot
+from teleop_core.robots.visuals import Visual, mesh_file
+
+_HERE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
+def looks_of(robot: Robot) -> dict[int, Mesh]:
+    """What bodies of a robot look like, by their index in :func:`bodies_of`.
+
+    A mesh that cannot be read is told by a warning that names its link; a body of which none can be
+    read is not among the keys. Files are read anew at each call.
+    """
+    bodies = bodies_of(robot)
+    frames = bodies.poses(robot.home)
+    parts: dict[int, list[Mesh]] = {}
+    for visual in robot.visuals:
+        try:
+            vertices, faces = _triangles(visual)
+        except TeleopError as error:
+            warnings.warn(f"link {visual.link} is drawn without: {error}", stacklevel=2)
+            continue
+        placed = vertices @ visual.place[:3, :3].T + visual.place[:3, 3]
+        frame = frames[visual.joints]
+        parts.setdefault(visual.joints, []).append((_seen(frame, placed), faces))
+    return {body: merged(meshes) for body, meshes in parts.items()}
+
+
+def _seen(frame: Array, points: Array) -> Array:
+    """Points (V, 3) of the base in a frame (7,)."""
+    origin = seen_from(frame, np.zeros(3))
+    axes = np.stack([seen_from(frame, axis) - origin for axis in np.eye(3)])
+    return np.asarray(points @ axes + origin)
+
+
+def _triangles(visual: Visual) -> Mesh:
+    """Triangles of a shape in its own frame.
+
+    Raises:
+        ParameterError: Its file is not there, or cannot be read.
+        TeleopError: The library that reads meshes is not installed.
+    """
+    if visual.kind != "mesh":
+        return mesh_of(Solid(visual.kind, visual.size, _HERE, "link"))
+    try:
+        import trimesh
+    except ImportError as error:
+        raise TeleopError("a mesh needs trimesh: pip install 'teleop_core[mesh]'") from error
+    path = mesh_file(visual.file, visual.urdf)
+    try:
+        scene = trimesh.load_scene(path, process=False)
+        if scene.units:
+            scene = scene.convert_units("meters")
+        mesh = scene.to_mesh()
+        vertices, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
+    except Exception as error:  # of a foreign reader, of a file that anybody wrote
+        needed = f"a mesh that can be read ({type(error).__name__}: {error})"
+        raise ParameterError("mesh", str(path), needed) from error
+    if not (len(faces) and np.isfinite(vertices).all()):
+        raise ParameterError("mesh", str(path), "triangles with finite corners")
+    return vertices * visual.size, faces

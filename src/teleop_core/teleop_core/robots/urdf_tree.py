@@ -1,0 +1,219 @@
+"""URDF trees: links and joints as a file has them, and what is wrong with it, by element.
+
+Source:
+    The XML specification of URDF, pages joint and link.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from teleop_core.base.damage import damage_told
+from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kernels.portable import length, product
+
+KINDS = {"revolute": "turn", "continuous": "turn", "prismatic": "slide"}
+"""What each type of joint that moves does."""
+Links = Mapping[str, Xml.Element]
+_ROUNDS = 2.0 * math.pi
+"""Limit [rad] of a continuous joint to either side, assumed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UrdfJoint:
+    """A joint of a file; ``axis`` a unit vector (3,) in its own frame, None if it is fixed."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Array
+    axis: Array | None
+    element: Xml.Element
+
+
+class _NoDoctype(Xml.TreeBuilder):
+    """Tree of an XML file without a document type, so that nothing in it can grow."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Refuse the declaration before anything it declares is used."""
+        raise ParameterError("<!DOCTYPE>", name, "left out: a URDF declares no entities")
+
+
+def root_of(path: Path) -> Xml.Element:
+    """Root of a URDF.
+
+    Raises:
+        RecordingError: It cannot be read, or is not XML.
+        ParameterError: It is another file, or declares a type of document.
+    """
+    with damage_told(path):
+        builder = Xml.XMLParser(target=_NoDoctype())
+        builder.feed(path.read_bytes())
+        root: Xml.Element = builder.close()
+    if root.tag != "robot":
+        raise ParameterError(str(path), f"<{root.tag}>", "a <robot>")
+    return root
+
+
+def elements_of(root: Xml.Element, tag: str) -> dict[str, Xml.Element]:
+    """Elements of a kind by their names."""
+    found: dict[str, Xml.Element] = {}
+    for element in root.findall(tag):
+        name = element.get("name", "")
+        if not name or name in found:
+            raise ParameterError(f"{tag} name", name, f"a name that no other {tag} has")
+        found[name] = element
+    if not found:
+        raise ParameterError(tag, 0, f"at least one <{tag}>")
+    return found
+
+
+def joint_of(name: str, element: Xml.Element, links: Links) -> UrdfJoint:
+    """Joint of an element.
+
+    Raises:
+        UnknownNameError: Its type does not exist, or a link that it joins.
+        ParameterError: Its axis has no length, or something is no number.
+    """
+    kind, axis = element.get("type", ""), None
+    if kind not in (*KINDS, "fixed"):
+        raise UnknownNameError(f"type of joint {name}", kind, (*KINDS, "fixed"))
+    ends = []
+    for end in ("parent", "child"):
+        found = element.find(end)
+        link = "" if found is None else found.get("link", "")
+        if link not in links:
+            raise UnknownNameError(f"{end} of joint {name}", link, links)
+        ends.append(link)
+    if kind != "fixed":
+        given = numbers_of(f"joint {name}", element.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        norm = float(length(given))
+        if norm < 1e-9:
+            raise ParameterError(f"axis of joint {name}", given.tolist(), "longer than 0")
+        axis = given / norm
+    origin = origin_of(f"joint {name}", element)
+    return UrdfJoint(
+        name=name,
+        kind=kind,
+        parent=ends[0],
+        child=ends[1],
+        origin=origin,
+        axis=axis,
+        element=element,
+    )
+
+
+def joints_by_child(joints: list[UrdfJoint]) -> dict[str, UrdfJoint]:
+    """The one joint that carries each link but the root."""
+    found: dict[str, UrdfJoint] = {}
+    for joint in joints:
+        if joint.child in found:
+            both = [found[joint.child].name, joint.name]
+            raise ParameterError(f"link {joint.child}", both, "the child of one joint")
+        found[joint.child] = joint
+    return found
+
+
+def root_link(links: Links, by_child: Mapping[str, UrdfJoint]) -> str:
+    """The one link that nothing carries; refuses circles and several."""
+    roots = [name for name in links if name not in by_child]
+    if len(roots) != 1:
+        raise ParameterError("links that are no child", roots, "one, the base")
+    for link in links:
+        chain_to(link, by_child)
+    return roots[0]
+
+
+def tip_of(tip: str, links: Links, joints: list[UrdfJoint]) -> str:
+    """Link that is the tip: the one of that name, or the only one that carries nothing."""
+    if tip:
+        if tip not in links:
+            raise UnknownNameError("tip", tip, links)
+        return tip
+    parents = {joint.parent for joint in joints}
+    ends = [name for name in links if name not in parents]
+    if len(ends) != 1:
+        raise ParameterError("tip", "", f"one of {', '.join(ends)}, or another link")
+    return ends[0]
+
+
+def chain_to(tip: str, by_child: Mapping[str, UrdfJoint]) -> list[UrdfJoint]:
+    """Joints from the root to a link."""
+    found: list[UrdfJoint] = []
+    link = tip
+    while link in by_child:
+        found.append(by_child[link])
+        link = found[-1].parent
+        if len(found) > len(by_child):
+            raise ParameterError(f"joint {found[-1].name}", link, "a parent that it does not carry")
+    return found[::-1]
+
+
+def limits_of(joint: UrdfJoint) -> tuple[float, float]:
+    """Lower and upper limit of a joint [rad, m]."""
+    where, limit = f"joint {joint.name}", joint.element.find("limit")
+    if joint.kind == "continuous":
+        lower, upper = -_ROUNDS, _ROUNDS
+    else:
+        lower = float(numbers_of(where, limit, "lower", (0.0,))[0])
+        upper = float(numbers_of(where, limit, "upper", (0.0,))[0])
+    if not lower < upper:
+        raise ParameterError(f"limits of {where}", (lower, upper), "lower < upper")
+    return lower, upper
+
+
+def turn_of_z(axis: Array) -> tuple[float, Array]:
+    """Sign of an axis along z, and the turn (4, 4) of z into the axis of that sign."""
+    sign = -1.0 if axis[2] < 0.0 else 1.0
+    return sign, transform(_turned_z(sign * axis), np.zeros(3))
+
+
+def _turned_z(axis: Array) -> Array:
+    """Shortest rotation (3, 3) that turns z into a unit vector (3,) with z >= 0."""
+    x, y, z = axis.tolist()
+    share = 1.0 / (1.0 + z)
+    return np.array(
+        [
+            [1.0 - x * x * share, -x * y * share, x],
+            [-x * y * share, 1.0 - y * y * share, y],
+            [-x, -y, z],
+        ]
+    )
+
+
+def origin_of(where: str, element: Xml.Element) -> Array:
+    """Transform (4, 4) of the origin of an element; ``where`` names it if it is no origin."""
+    found = element.find("origin")
+    roll, pitch, yaw = numbers_of(where, found, "rpy", (0.0, 0.0, 0.0)).tolist()
+    turn = product(product(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll))
+    return transform(turn, numbers_of(where, found, "xyz", (0.0, 0.0, 0.0)))
+
+
+def numbers_of(
+    where: str, element: Xml.Element | None, key: str, default: tuple[float, ...]
+) -> Array:
+    """Numbers of an attribute, or the default where element or attribute is missing."""
+    text = None if element is None else element.get(key)
+    if text is None:
+        return np.array(default)
+    found = list(_finite(text))
+    if len(found) != len(default):
+        wanted = f"{len(default)} finite numbers" if len(default) > 1 else "a finite number"
+        raise ParameterError(f"{key} of {where}", text, wanted)
+    return np.array(found)
+
+
+def _finite(text: str) -> Iterator[float]:
+    for word in text.split():
+        try:
+            value = float(word)
+        except ValueError:
+            continue
+        if math.isfinite(value):
+            yield value

@@ -1,0 +1,125 @@
+"""Visuals: what the links of an arm look like, as its file says, and where the meshes are."""
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kernels.portable import product
+from teleop_core.robots.urdf_tree import (
+    Links,
+    UrdfJoint,
+    chain_to,
+    numbers_of,
+    origin_of,
+    turn_of_z,
+)
+
+VisualKind = Literal["mesh", "box", "cylinder", "sphere"]
+_ENDINGS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
+_UP = 4  # folders above that of a URDF in which its meshes may be
+_PACKAGE = "package://"
+_SHAPES: dict[VisualKind, tuple[tuple[str, tuple[float, ...]], ...]] = {
+    "mesh": (("scale", (1.0, 1.0, 1.0)),), "box": (("size", (0.0, 0.0, 0.0)),),
+    "cylinder": (("radius", (0.0,)), ("length", (0.0,))), "sphere": (("radius", (0.0,)),),
+}  # fmt: skip
+"""Attributes of each shape of a visual [m], which are those of :class:`Visual` in this order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Visual:
+    """A shape of a link.
+
+    Attributes:
+        link: Name of the link.
+        joints: Number of joints that move between the base and it.
+        place: Its pose (4, 4) in the base, with the arm at home [m].
+        kind: What it is.
+        size: Scales along x, y and z of a mesh; of a box x, y, z, of a cylinder radius and length,
+            of a sphere its radius [m].
+        file: Name of a mesh as the file gives it; empty for other kinds.
+        urdf: The file.
+    """
+
+    link: str
+    joints: int
+    place: Array
+    kind: VisualKind
+    size: tuple[float, ...]
+    file: str
+    urdf: Path
+
+
+def mesh_file(name: str, urdf: Path) -> Path:
+    """File of a mesh that a URDF names.
+
+    ``package://NAME/REST`` is looked for in folders called NAME beside and above that of the URDF,
+    below these folders themselves, and in the packages of ``AMENT_PREFIX_PATH`` and
+    ``ROS_PACKAGE_PATH``. Any other name starts from the folder of the URDF.
+
+    Raises:
+        ParameterError: It is nowhere there, is no mesh, or leads elsewhere: out of the package, or
+            out of the fourth folder above the URDF.
+    """
+    if not name.lower().endswith(_ENDINGS):
+        raise ParameterError("mesh", name, f"a file with one of the endings {', '.join(_ENDINGS)}")
+    for root, path in _candidates(name, urdf.resolve().parent):
+        real = path.resolve()
+        if real.is_file():
+            if not real.is_relative_to(root.resolve()):
+                raise ParameterError("mesh", name, f"a file below {root}")
+            return real
+    raise ParameterError("mesh", name, f"a file in a package, or near {urdf}")
+
+
+def _candidates(name: str, folder: Path) -> Iterator[tuple[Path, Path]]:
+    """Where a mesh may be, each with the folder that it must be below."""
+    above = [each for each in (folder, *folder.parents)[: _UP + 1] if each != each.parent]
+    if not name.startswith(_PACKAGE):
+        yield above[-1], folder / name.removeprefix("file://")
+        return
+    package, _, rest = name.removeprefix(_PACKAGE).partition("/")
+    for each in above:
+        yield each, each / package / rest
+        yield each, each / rest
+    for prefix in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
+        yield Path(prefix) / "share" / package, Path(prefix) / "share" / package / rest
+    for place in filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)):
+        yield Path(place) / package, Path(place) / package / rest
+
+
+def visuals_of(
+    home: Mapping[str, float], links: Links, by_child: Mapping[str, UrdfJoint], urdf: Path
+) -> Iterator[Visual]:
+    """Shapes of all links, where they are at home: of each joint that moves [rad, m], others 0."""
+    for link, element in links.items():
+        T, moved = np.eye(4), 0
+        shapes = element.findall("visual")
+        for joint in chain_to(link, by_child) if shapes else ():
+            T = product(T, joint.origin)
+            if joint.name in home and joint.axis is not None:
+                T, moved = product(T, _motion(joint, home[joint.name])), moved + 1
+        for shape in shapes:
+            place, where = product(T, origin_of(f"visual of link {link}", shape)), f"link {link}"
+            for kind, keys in _SHAPES.items():
+                found = shape.find(f"geometry/{kind}")
+                if found is not None:
+                    size = [
+                        float(x) for key, one in keys for x in numbers_of(where, found, key, one)
+                    ]
+                    file = found.get("filename", "")
+                    yield Visual(link, moved, place, kind, tuple(size), file, urdf)
+
+
+def _motion(joint: UrdfJoint, value: float) -> Array:
+    """What a joint does (4, 4) at a value [rad, m] about or along its axis."""
+    sign, up = turn_of_z(np.asarray(joint.axis))
+    if joint.kind == "prismatic":
+        return transform(np.eye(3), value * np.asarray(joint.axis))
+    turn = transform(rotation("z", sign * value), np.zeros(3))
+    return product(product(up, turn), up.T)
