@@ -1,6 +1,7 @@
 """Scene of the console: what is drawn is where it is, and only what changed is sent."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -179,6 +180,21 @@ def test_every_robot_is_drawn(server, name):
     for camera in (scene.whole(), scene.tool(), scene.microscope()):
         assert np.isfinite(camera.quaternion).all()
     assert all(np.isfinite(frame.position).all() for frame in scene.arms[""].drawn.frames.values())
+
+
+def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(server, tmp_path):
+    server.scene.reset()
+    text = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text(encoding="utf-8")
+    box = '<visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
+    file = tmp_path / "arm.urdf"
+    file.write_text(text.replace('<link name="forearm">', f'<link name="forearm">{box}'))
+    scene = Scene(server, [Arm("", tc.load_robot(str(file), tip="tool0"))])
+    scene.show_ghost(is_shown=True)
+    for place in ("/arm/robot", "/arm/ghost"):
+        forearm = server.scene.get_handle_by_name(f"{place}/link3/link")
+        assert np.ptp(forearm.vertices, axis=0).max() == pytest.approx(0.3)
+        assert server.scene.get_handle_by_name(f"{place}/link3/joint") is None
+        assert server.scene.get_handle_by_name(f"{place}/link2/joint") is not None
 
 
 def test_a_joint_at_its_limit_is_drawn_in_another_colour(server):
