@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 import time
+from os import sched_getaffinity
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 _EPILOG = """\
-without a name the experiments are listed; `all` runs every one, in less than five minutes:
+without a name the experiments are listed; `all` runs every one, in four to six minutes:
   teleop experiment resolution                          a table: published, predicted, difference
   teleop experiment master_slave gravity --seed 5       other hands; sessions both need run once
   teleop experiment all --html experiments.html         one page with the source's figures
@@ -65,7 +66,7 @@ def _outcomes(names: tuple[str, ...], seed: int) -> "list[Outcome]":
     from teleop_lab.experiments import EXPERIMENTS, Bench
 
     found = [EXPERIMENTS.find(name) for name in dict.fromkeys(names) or EXPERIMENTS.names()]
-    bench, outcomes = Bench(seed), []
+    bench, outcomes = Bench(seed, workers=len(sched_getaffinity(0))), []
     for number, experiment in enumerate(found, start=1):
         begin = time.monotonic()
         with shown_progress(f"{number} of {len(found)}, {experiment.name}") as progress:

@@ -1,12 +1,17 @@
 """Bench: runs the sessions that experiments ask for, each once."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.chain.operators import Motion
 from teleop_core.evaluation import Score
 from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.kernels.geometry import Array
@@ -16,6 +21,8 @@ from teleop_core.slave.pair import ArmParameters
 Setting = float | str | bool | tuple[float, ...] | tuple[str, ...]
 Settings = Mapping[str, Setting]
 Progress = Callable[[int, int], None]
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 _WHOLE = 16  # sessions whose streams are kept, 25 MB each
 SEEDS = 3
 """Sessions with different hands of which figures are the mean."""
@@ -86,17 +93,23 @@ class Bench:
         seed: First seed; sessions of several hands take those after it too.
         progress: Told how far the session that is running is.
         settings: Parameters of every session, over its scenario.
+        workers: Processes that :meth:`map` spreads work over. With more than 1, a program must
+            keep what it runs behind ``if __name__ == "__main__":``.
 
     Raises:
         ParameterError: The seed is negative.
     """
 
     def __init__(
-        self, seed: int = 1, progress: Progress = _silent, settings: Settings | None = None
+        self,
+        seed: int = 1,
+        progress: Progress = _silent,
+        settings: Settings | None = None,
+        workers: int = 1,
     ) -> None:
         if seed < 0:
             raise ParameterError("seed", seed, "0 or more")
-        self.seed, self.progress = seed, progress
+        self.seed, self.progress, self._workers = seed, progress, workers
         self._settings = dict(settings or {})
         self._known: dict[object, Session] = {}
         self._streams: dict[object, Mapping[str, Stream]] = {}  # of the last sessions
@@ -162,7 +175,11 @@ class Bench:
         return ArmParameters.of(made.group("slave"), made.group("slave_sim"))
 
     def signals(
-        self, scenario: str, seconds: float, settings: Settings | None = None
+        self,
+        scenario: str,
+        seconds: float,
+        settings: Settings | None = None,
+        motion: Motion | None = None,
     ) -> Mapping[str, Array]:
         """What the stages of a session say, a row for each tick, without its score: faster.
 
@@ -170,6 +187,7 @@ class Bench:
             scenario: One of ``teleop scenarios``.
             seconds: How long it lasts [s].
             settings: Parameters over the scenario and the bench's settings.
+            motion: What the hand wants, in place of the scenario's operator.
 
         Raises:
             TeleopError: A setting or the scenario is wrong.
@@ -178,9 +196,27 @@ class Bench:
         from teleop_core.session.virtual import VirtualTime
 
         given = {"seed": self.seed, **self._settings, **dict(settings or {})}
-        session = VirtualTime(configuration(scenario, settings=given))
+        session = VirtualTime(configuration(scenario, settings=given, operator=motion))
         rows = session.run(round(seconds * 1e3))
         return {name: rows[name] for name in rows.dtype.names or ()}
+
+    def map(self, work: Callable[["Bench", Job], Result], jobs: Sequence[Job]) -> list[Result]:
+        """Results of ``work(bench, job)`` in the order of the jobs, done side by side.
+
+        Args:
+            work: A function of a module; its bench has the seed and the settings of this one.
+            jobs: Values that can be sent to another process.
+        """
+        do = partial(_work, work, self.seed, self._settings)
+        if self._workers == 1:
+            return list(self._counted(map(do, jobs), len(jobs)))
+        with ProcessPoolExecutor(self._workers, get_context("spawn")) as pool:
+            return list(self._counted(pool.map(do, jobs), len(jobs)))
+
+    def _counted(self, results: Iterable[Result], total: int) -> Iterator[Result]:
+        for done, result in enumerate(results, start=1):
+            self.progress(done, total)
+            yield result
 
     def _run(
         self, scenario: str, seed: int, settings: Settings
@@ -189,6 +225,10 @@ class Bench:
 
         recording = run(scenario, seed=seed, settings=settings, progress=self.progress)
         return recording.score(), _aligned({name: recording[name] for name in _KEPT})
+
+
+def _work(work: Callable[[Bench, Job], Result], seed: int, settings: Settings, job: Job) -> Result:
+    return work(Bench(seed, settings=settings), job)
 
 
 def _aligned(streams: dict[str, Stream]) -> Mapping[str, Stream]:

@@ -72,6 +72,7 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "points24": f"{_PLACE}.points24:POINTS24",
         "stability": f"{_PLACE}.stability:STABILITY",
         "zwidth": f"{_PLACE}.zwidth:ZWIDTH",
+        "transparency": f"{_PLACE}.transparency:TRANSPARENCY",
         "mma_frames": f"{_PLACE}.mma_frames:MMA_FRAMES",
         "mma_balance": f"{_PLACE}.mma_spring:MMA_BALANCE",
         "hybrid": f"{_PLACE}.hybrid:HYBRID",

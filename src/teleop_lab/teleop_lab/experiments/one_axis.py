@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,6 +110,52 @@ def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float
     return low
 
 
+class Mapped:
+    """Our hand, ideal device and mapping, tick by tick, before an arm that the caller has.
+
+    Args:
+        grip: The hand.
+        own: Parameters of the motion scaling.
+
+    Attributes:
+        master: The device and the hand.
+    """
+
+    def __init__(self, grip: Grip, own: Mapping[str, float | str] | None = None) -> None:
+        self.master = HapticMaster(ideal_device(grip))
+        self._mapping = MotionScaling(build(MotionScalingParameters, _MAPPING | dict(own or {})))
+        self._feel, self._tell, self._ticks = self.master.load(), self._mapping.load(), 0
+        self.master.signals["hand_servo_cp_ns"] = 1
+
+    @property
+    def push(self) -> Array:
+        """Push (3,) that the hand is given in the next tick [N], in the master's base."""
+        return self.master.signals["master_servo_cf"][:3]
+
+    def step(self, force: Array) -> Array:
+        """Go on by a tick; returns the command (3,) [m].
+
+        Args:
+            force: On the tip (3,) [N], as it arrives, in the slave's base.
+        """
+        felt, told = self.master.signals, self._mapping.signals
+        if self._ticks % _BLOCK == 0:
+            self.master.prepare(_BLOCK)
+        self._feel()
+        felt["hand_servo_cp_ns"] += 1
+        for name in ("master_measured_cp", "master_buttons"):
+            told[name] = felt[name]
+        told["slave_setpoint_cp"] = told["slave_servo_cp"]
+        told["slave_setpoint_cp_ns"] = self._ticks * TICK_NS
+        self._ticks += 1
+        told["master_measured_cp_ns"] = told["slave_measured_cf_ns"] = self._ticks * TICK_NS
+        told["slave_measured_cf"][:3] = force
+        self._tell()
+        felt["master_servo_cf"] = told["master_servo_cf"]
+        command: Array = told["slave_servo_cp"][:3].copy()
+        return command
+
+
 def growth(grip: Grip, delay: float, stiffness: float) -> float:
     """Rate [1/s] at which our hand, device and mapping swing up before a spring; negative: down.
 
@@ -120,36 +166,18 @@ def growth(grip: Grip, delay: float, stiffness: float) -> float:
         delay: Of the force, in whole ticks [s].
         stiffness: Of the spring [N/m], at the place where the slave's tip is commanded.
     """
-    master = HapticMaster(ideal_device(grip))
-    mapping = MotionScaling(build(MotionScalingParameters, _MAPPING))
-    felt, told = master.signals, mapping.signals
-    feel, tell = master.load(), mapping.load()
+    chain = Mapped(grip)
     late = deque([np.zeros(3)] * (round(delay / DT) + 1))
     place = np.empty(round((_SETTLE + _LOOK) / DT))
     origin = np.zeros(3)
-    felt["hand_servo_cp_ns"] = 1
     for i in range(len(place)):
-        if i % _BLOCK == 0:
-            master.prepare(_BLOCK)
         if i == _BLOCK:
-            master.state["hand_speed"][_AXIS] += _KICK
-        feel()
-        felt["hand_servo_cp_ns"] += 1
-        place[i] = master.state["position"][_AXIS]
-        for name in ("master_measured_cp", "master_buttons"):
-            told[name] = felt[name]
-        told["slave_setpoint_cp"], told["slave_setpoint_cp_ns"] = (
-            told["slave_servo_cp"],
-            i * TICK_NS,
-        )
-        told["master_measured_cp_ns"] = told["slave_measured_cf_ns"] = (i + 1) * TICK_NS
-        told["slave_measured_cf"][:3] = late.popleft()
-        tell()
-        command = told["slave_servo_cp"][:3].copy()
+            chain.master.state["hand_speed"][_AXIS] += _KICK
+        command = chain.step(late.popleft())
+        place[i] = chain.master.state["position"][_AXIS]
         if i < _BLOCK:
             origin = command
         late.append(-stiffness * (command - origin))
-        felt["master_servo_cf"] = told["master_servo_cf"]
     return growth_rate(np.diff(place)[round(_SETTLE / DT) :])
 
 
