@@ -16,9 +16,9 @@ INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-versi
 
 setup: $(VENV)/.installed
 
-$(VENV)/.installed: constraints.txt $(wildcard src/*/setup.py)
+$(VENV)/.installed: constraints.txt $(wildcard src/*/setup.py src/*/pyproject.toml)
 	$(PYTHON) -m venv $(VENV)
-	$(INSTALL) -e 'src/teleop_core[ros,console]' -e src/teleop_lab -e src/teleop_drill
+	$(INSTALL) -e 'src/teleop_core[ros,console]' -e src/teleop_lab -e src/teleop_drill -e src/lerobot_robot_teleop_core
 	$(BIN)/teleop compile
 	touch $@
 

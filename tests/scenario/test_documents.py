@@ -186,4 +186,6 @@ def test_version_is_the_same_wherever_it_stands():
     for package in ("teleop_core", "teleop_lab", "teleop_drill"):
         assert ET.parse(ROOT / f"src/{package}/package.xml").findtext("version") == version
         assert f'VERSION = "{version}"' in text_of(f"src/{package}/setup.py")
+    for said in (f'version = "{version}"', f"teleop_core=={version}"):
+        assert said in text_of("src/lerobot_robot_teleop_core/pyproject.toml")
     assert f"## {version}" in text_of("CHANGELOG.md")

@@ -1,0 +1,230 @@
+"""LeRobot: loops of another program lead the slave, within all its limits, and ask the hand."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import teleop_core as tc
+
+PACKAGE = Path(__file__).resolve().parents[2] / "src/lerobot_robot_teleop_core"
+sides = pytest.importorskip("teleop_core_lerobot", reason="lerobot_robot_teleop_core is missing")
+AT_HOME = ("slave.starts_at_home=true",)
+INWARD = np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # the third joint is at its upper limit at home
+# What a subclass must have, as LeRobot's documents ask: Bring your own hardware, 0.6.1.
+BOTH = {
+    "config_class", "name", "action_features", "is_connected", "is_calibrated", "connect",
+    "calibrate", "configure", "disconnect",
+}  # fmt: skip
+ROBOT = BOTH | {"observation_features", "get_observation", "send_action"}
+TELEOPERATOR = BOTH | {"feedback_features", "get_action", "send_feedback"}
+
+
+@pytest.fixture
+def slave():
+    made = sides.SlaveSide(scenario="free_motion", settings=AT_HOME)
+    made.begin()
+    return made
+
+
+def joints_of(side, named):
+    return np.array([named[key] for key in side.joint_keys])
+
+
+def inside(slave):
+    """Joints (n,) where it is, a little inside all limits."""
+    return joints_of(slave, slave.observe()) + 1e-4 * INWARD
+
+
+def sent(slave, joints):
+    """What comes back for joints (n,)."""
+    return joints_of(slave, slave.send(dict(zip(slave.joint_keys, joints, strict=True))))
+
+
+def test_actions_are_the_references_of_the_same_session_without_a_loop():
+    master = sides.MasterSide(scenario="free_motion", fps=30)
+    master.begin()
+    actions = [joints_of(master, master.next_action()) for _ in range(60)]
+    session = tc.VirtualTime(tc.configuration("free_motion"))
+    lead = session.lead
+    rows = session.run(lead + 2000)["slave_servo_jp"]
+    ticks = [lead + 1000 * k // 30 - 1 for k in range(1, 61)]
+    assert np.array_equal(actions, rows[ticks])
+    assert np.ptp(actions, axis=0).max() > 1e-3
+
+
+@pytest.mark.parametrize("fps", [1, 7, 30, 60, 1000])
+def test_as_many_calls_as_a_second_has_are_one_second(fps):
+    slave = sides.SlaveSide(scenario="free_motion", settings=AT_HOME, fps=fps)
+    slave.begin()
+    begin, home = slave._session.now_ns, slave.observe()
+    for _ in range(fps):
+        slave.send({key: home[key] for key in slave.joint_keys})
+    assert slave._session.now_ns - begin == 1_000_000_000
+
+
+def test_reference_within_all_limits_comes_back_and_the_slave_gets_there(slave):
+    begin = inside(slave)
+    goal = begin + 0.01 * INWARD
+    for share in np.linspace(0.0, 1.0, 31):
+        assert np.array_equal(
+            sent(slave, begin + share * (goal - begin)), begin + share * (goal - begin)
+        )
+    for _ in range(30):
+        sent(slave, goal)
+    assert joints_of(slave, slave.observe()) == pytest.approx(goal, abs=1e-3)
+
+
+def test_references_that_come_by_the_loop_are_joined_without_steps(slave):
+    begin = joints_of(slave, slave.observe())
+    slave._bag = "kept"  # keeps the rows
+    for k in range(60):
+        sent(slave, begin + 0.003 * min(k, 40) * INWARD)
+    setpoint = np.concatenate([block["slave_setpoint_js"] for block in slave._blocks])[:, 0]
+    step = np.abs(np.diff(setpoint)).max()
+    assert 0.0 < step < 3 * 0.003 / 33  # a stair has its whole rise in a few ticks
+
+
+def test_reference_beyond_a_joint_limit_comes_back_at_the_limit(slave):
+    robot = tc.load_robot("rcrt1")
+    joints = joints_of(slave, slave.observe())
+    reach = 0.03 * robot.drives.speed_limit
+    for _ in range(600):
+        wanted = joints + reach * (np.arange(robot.n) == 0)
+        back = sent(slave, wanted)
+        assert (back <= robot.upper).all()
+        if back[0] < wanted[0]:
+            break
+        joints = back
+    assert back[0] == robot.upper[0] < wanted[0]
+
+
+def test_reference_that_is_a_jump_comes_back_as_the_one_before(slave):
+    before = sent(slave, joints_of(slave, slave.observe()))
+    assert np.array_equal(sent(slave, before + 3.0 * INWARD), before)
+    assert joints_of(slave, slave.observe()) == pytest.approx(before, abs=1e-3)
+
+
+def test_stopped_slave_holds_and_says_where_whatever_is_sent():
+    slave = sides.SlaveSide(
+        scenario="free_motion", settings=(*AT_HOME, "slave.operation.events=[stop@0.5]")
+    )
+    slave.begin()
+    begin, back = joints_of(slave, slave.observe()), []
+    for k in range(60):
+        back.append(sent(slave, begin + 0.001 * k * INWARD))
+    assert np.ptp(back[:10], axis=0).min() > 5e-3
+    assert np.ptp(back[20:], axis=0).max() == 0.0
+    assert (np.abs(back[-1] - begin) < 0.03).all()
+
+
+def test_bag_has_what_was_observed_and_sent(tmp_path):
+    slave = sides.SlaveSide(
+        scenario="free_motion", settings=AT_HOME, fps=50, bag=str(tmp_path / "bag")
+    )
+    slave.begin()
+    lead = slave._session.now_ns // 1_000_000
+    begin, seen, given = inside(slave), [], []
+    for k in range(25):
+        seen.append(joints_of(slave, slave.observe()))
+        given.append(sent(slave, begin + 0.001 * k * INWARD))
+    slave.end()
+    bag = tc.open_recording(tmp_path / "bag")
+    measured = bag["slave/measured_js"]
+    ticks = lead + 20 * np.arange(25) - 1
+    assert np.array_equal(measured.values[ticks][:, : len(begin)], seen)
+    assert np.array_equal(bag["given/servo_jp"].values[ticks[1:]], given[:-1])
+
+
+def test_hand_feels_its_own_session_until_a_force_is_given():
+    master = sides.MasterSide(scenario="palpation", fps=10)
+    master.begin()
+    felt = []
+    for _ in range(30):
+        master.next_action()
+        felt.append(master._row["master_servo_cf"].copy())
+    session = tc.VirtualTime(tc.configuration("palpation"))
+    lead = session.lead
+    rows = session.run(lead + 3000)["master_servo_cf"]
+    assert np.abs(felt).max() > 0.05
+    assert np.array_equal(felt, rows[lead + 99 :: 100])
+
+
+def test_hand_feels_the_force_that_is_given_as_it_feels_one_that_is_measured():
+    felt = {}
+    for force in (0.0, 1.0, 2.0):
+        master = sides.MasterSide(scenario="palpation")
+        master.begin()
+        for _ in range(3):
+            master.feel({"force.x": 0.0, "force.y": 0.0, "force.z": force, "theta1.pos": 9.0})
+            master.next_action()
+        felt[force] = master._row["master_servo_cf"][:3].copy()
+    assert np.array_equal(felt[0.0], np.zeros(3))
+    assert np.linalg.norm(felt[1.0]) > 0.05
+    assert felt[2.0] == pytest.approx(2.0 * felt[1.0], rel=1e-6)
+
+
+def test_both_sides_refuse_what_they_cannot_use(slave):
+    with pytest.raises(tc.ParameterError, match=r"theta1\.pos") as caught:
+        slave.send({"theta1.pos": 0.0})
+    assert caught.value.name == "action"
+    with pytest.raises(tc.ParameterError, match="finite"):
+        sent(slave, joints_of(slave, slave.observe()) * np.nan)
+    with pytest.raises(tc.SessionError, match="runs already"):
+        slave.begin()
+    slave.end()
+    for call in (slave.end, slave.observe, lambda: slave.send({})):
+        with pytest.raises(tc.SessionError, match="begin one first"):
+            call()
+    with pytest.raises(tc.ParameterError, match="fps"):
+        sides.SlaveSide(fps=0)
+    with pytest.raises(tc.ParameterError, match="given_joints"):
+        sides.SlaveSide(settings=("teleop.stages=[network]",))
+    with pytest.raises(tc.UnknownNameError):
+        sides.MasterSide(robot="no_such_robot")
+    master = sides.MasterSide(scenario="free_motion")
+    master.begin()
+    with pytest.raises(tc.ParameterError, match=r"force\.z"):
+        master.feel({"force.x": 0.0, "force.y": 0.0})
+
+
+@pytest.mark.parametrize(
+    ("package", "base", "names"),
+    [
+        ("lerobot_robot_teleop_core", "Robot", ROBOT),
+        ("lerobot_teleoperator_teleop_core", "Teleoperator", TELEOPERATOR),
+    ],
+)
+def test_class_for_lerobot_has_what_its_documents_ask_for(package, base, names):
+    tree = ast.parse((PACKAGE / package / "__init__.py").read_text())
+    classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
+    device = next(c for c in classes.values() if [ast.unparse(b) for b in c.bases] == [base])
+    defined = {node.name for node in device.body if isinstance(node, ast.FunctionDef)}
+    defined |= {n.targets[0].id for n in device.body if isinstance(n, ast.Assign)}
+    assert defined >= names
+    assert f"{device.name}Config" in classes  # LeRobot finds the class by this name
+
+
+def test_lerobot_makes_both_by_their_type_and_a_loop_runs():
+    pytest.importorskip("lerobot", reason="lerobot is not installed: it brings torch")
+    from lerobot.robots import make_robot_from_config
+    from lerobot.robots.config import RobotConfig
+    from lerobot.teleoperators import TeleoperatorConfig, make_teleoperator_from_config
+    from lerobot.utils.import_utils import register_third_party_plugins
+
+    register_third_party_plugins()
+    kind, teleop_kind = (
+        base.get_choice_class("teleop_core") for base in (RobotConfig, TeleoperatorConfig)
+    )
+    robot = make_robot_from_config(kind(scenario="free_motion"))
+    teleop = make_teleoperator_from_config(teleop_kind(scenario="free_motion"))
+    with robot, teleop:
+        for _ in range(10):
+            action = teleop.get_action()
+            assert robot.send_action(action) == action
+            assert set(action) == set(robot.action_features) == set(teleop.action_features)
+            assert set(robot.get_observation()) == set(robot.observation_features)
+            teleop.send_feedback(robot.get_observation())
+    assert not robot.is_connected
+    assert not teleop.is_connected
