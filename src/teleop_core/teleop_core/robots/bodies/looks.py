@@ -6,6 +6,7 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.portable import product
 from teleop_core.robots.bodies.describe import bodies_of
 from teleop_core.robots.bodies.frames import seen_from
 from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
@@ -31,7 +32,7 @@ def looks_of(robot: Robot) -> dict[int, Mesh]:
         except TeleopError as error:
             warnings.warn(f"link {visual.link} is drawn without: {error}", stacklevel=2)
             continue
-        placed = vertices @ visual.place[:3, :3].T + visual.place[:3, 3]
+        placed = product(vertices, visual.place[:3, :3].T) + visual.place[:3, 3]
         frame = frames[visual.joints]
         parts.setdefault(visual.joints, []).append((_seen(frame, placed), faces))
     return {body: merged(meshes) for body, meshes in parts.items()}
@@ -41,7 +42,7 @@ def _seen(frame: Array, points: Array) -> Array:
     """Points (V, 3) of the base in a frame (7,)."""
     origin = seen_from(frame, np.zeros(3))
     axes = np.stack([seen_from(frame, axis) - origin for axis in np.eye(3)])
-    return np.asarray(points @ axes + origin)
+    return product(points, axes) + origin
 
 
 def _triangles(visual: Visual) -> Mesh:
