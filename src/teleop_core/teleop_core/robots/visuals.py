@@ -96,7 +96,18 @@ def _candidates(name: str, folder: Path) -> Iterator[tuple[Path, Path]]:
 def visuals_of(
     home: Mapping[str, float], links: Links, by_child: Mapping[str, UrdfJoint], urdf: Path
 ) -> Iterator[Visual]:
-    """Shapes of all links, where they are at home: of each joint that moves [rad, m], others 0."""
+    """Shapes of all links, in the order of the file.
+
+    Args:
+        home: Coordinate at home of each joint on the way to the tip that moves [rad, m], by its
+            name; all other joints stay at 0.
+        links: Elements of the links by their names.
+        by_child: The joint that carries each link.
+        urdf: The file.
+
+    Raises:
+        ParameterError: A place or a size is no number.
+    """
     for link, element in links.items():
         T, moved = np.eye(4), 0
         shapes = element.findall("visual")
@@ -118,8 +129,9 @@ def visuals_of(
 
 def _motion(joint: UrdfJoint, value: float) -> Array:
     """What a joint does (4, 4) at a value [rad, m] about or along its axis."""
-    sign, up = turn_of_z(np.asarray(joint.axis))
+    axis = np.asarray(joint.axis)
     if joint.kind == "prismatic":
-        return transform(np.eye(3), value * np.asarray(joint.axis))
+        return transform(np.eye(3), value * axis)
+    sign, up = turn_of_z(axis)
     turn = transform(rotation("z", sign * value), np.zeros(3))
     return product(product(up, turn), up.T)

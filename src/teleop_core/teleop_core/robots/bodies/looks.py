@@ -5,16 +5,14 @@ import warnings
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, TeleopError
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.kernels.portable import product
+from teleop_core.robots.bodies.body import HERE
 from teleop_core.robots.bodies.describe import bodies_of
-from teleop_core.robots.bodies.frames import seen_from
 from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
 from teleop_core.robots.bodies.solids import Solid
 from teleop_core.robots.robot import Robot
 from teleop_core.robots.visuals import Visual, mesh_file
-
-_HERE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def looks_of(robot: Robot) -> dict[int, Mesh]:
@@ -34,15 +32,9 @@ def looks_of(robot: Robot) -> dict[int, Mesh]:
             continue
         placed = product(vertices, visual.place[:3, :3].T) + visual.place[:3, 3]
         frame = frames[visual.joints]
-        parts.setdefault(visual.joints, []).append((_seen(frame, placed), faces))
+        seen = product(placed - frame[:3], rotations_from_quaternions(frame[None, 3:])[0])
+        parts.setdefault(visual.joints, []).append((seen, faces))
     return {body: merged(meshes) for body, meshes in parts.items()}
-
-
-def _seen(frame: Array, points: Array) -> Array:
-    """Points (V, 3) of the base in a frame (7,)."""
-    origin = seen_from(frame, np.zeros(3))
-    axes = np.stack([seen_from(frame, axis) - origin for axis in np.eye(3)])
-    return product(points, axes) + origin
 
 
 def _triangles(visual: Visual) -> Mesh:
@@ -53,7 +45,7 @@ def _triangles(visual: Visual) -> Mesh:
         TeleopError: The library that reads meshes is not installed.
     """
     if visual.kind != "mesh":
-        return mesh_of(Solid(visual.kind, visual.size, _HERE, "link"))
+        return mesh_of(Solid(visual.kind, visual.size, HERE, "link"))
     try:
         import trimesh
     except ImportError as error:
