@@ -27,6 +27,7 @@ def _mutant(
     return Mutant(name, text, ((file, before, after),), files)
 
 
+_BUTTON = "slave/world/button.py"
 _CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
 _SCALING, _LINK = "chain/mapping/motion_scaling.py", "chain/network/link.py"
 _TDPA, _CENTRE = "chain/passivity/tdpa.py", "chain/fixtures/remote_centre.py"
@@ -129,6 +130,10 @@ CODE_MUTANTS = (
             "return True", "puncture"),
     _mutant("shaft_glued", "the shaft's friction has no bound", _PUNCTURE,
             "s.drawn = min(max(drawn, -most), most)", "s.drawn = drawn", "puncture"),
+    _mutant("button_led", "friction of a button is given energy by its bound", _BUTTON,
+            "_STIFFER = 10.0", "_STIFFER = 0.2", "button"),
+    _mutant("button_up", "a button is free as soon as it leaves the stop", _BUTTON,
+            "elif depth <= p.click_travel:", "else:", "button"),
     _mutant("ridge_pushes", "at a ridge of a mesh the push is no gradient", "slave/world/mesh.py",
             "return value * slope", "return value", "mesh"),
     _mutant("inertia_still", "the observer takes inertia for what it was", _OBSERVER,

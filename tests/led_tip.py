@@ -1,14 +1,16 @@
 """Led tip: a tip that is led along any way through an object, what it feels and what it loses."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from teleop_core.kernels import kernel, pointer
-from teleop_core.kernels.fields import record
+from teleop_core.kernels.fields import fields_of, record
 from teleop_core.robots.kinematics import FK
 from teleop_core.slave.simulation import SimulationNumbers, SimulationState
 from teleop_core.slave.world import WORLD_OBJECTS
+from teleop_core.slave.world.button import ButtonNumbers
 from teleop_core.slave.world.contact import add_push, touch
 
 DT = 1e-3
@@ -47,11 +49,27 @@ def needle(name, parameters=None):
 
 
 @kernel
+def _stored_in_button(p, s, depth):
+    """Energy that a button can give back [J] by what moves along its normal."""
+    rising, falling = min(depth, p.click_travel), min(depth, p.stroke) - p.click_travel
+    energy = 0.5 * p.click_force * rising * rising / p.click_travel
+    if falling > 0.0:
+        slope = (p.contact_force - p.click_force) / (p.stroke - p.click_travel)
+        energy += p.click_force * falling + 0.5 * slope * falling * falling
+    beyond = max(depth - p.stroke, 0.0)
+    energy = (1.0 - 0.5 * p.hysteresis) * (energy + p.contact_force * beyond)
+    bristle = 10.0 * p.click_force / min(p.click_travel, p.stroke - p.click_travel)
+    return energy + 0.5 * p.world_stiffness * beyond**2 + 0.5 * bristle * s.held**2
+
+
+@kernel
 def _stored(p, s):
     """Energy that the object can give back [J]: by its surface, or by springs of the channel."""
     stiffness, depth, square = p.world_stiffness, max(-s.gap, 0.0), 0.0
     for k in range(3):
         square += s.stuck[k] * s.stuck[k] if s.gap < 0.0 else 0.0
+    if p.click_force > 0.0:
+        return 0.5 * stiffness * square + _stored_in_button(p, s, depth)
     if s.is_open:
         ahead = min(max(depth - s.cut, 0.0), p.cutting_force / stiffness)
         return 0.5 * stiffness * (square + s.drawn * s.drawn + ahead * ahead)
@@ -102,8 +120,33 @@ def lead(way, name="plane", parameters=None, **numbers):
              "shaft_friction": 20.0, "hole_radius": 2e-3}  # fmt: skip
     for key, value in (known | numbers).items():
         p[key] = value
+    for key, *_ in fields_of(ButtonNumbers):
+        p[key] = getattr(parameters, key, 0.0)
     times = np.arange(PIECES * (len(way) - 1) + 1) / PIECES
     fine = np.column_stack([np.interp(times, np.arange(len(way)), column) for column in way.T])
     felt, lost = np.zeros((len(way) - 1, 6)), np.zeros(len(way) - 1)
     _lead(p, s, needle(name, parameters), fine, felt, lost)
     return felt[:, :3], lost, s
+
+
+def along_z(*heights, speed=0.02):
+    """Straight way (N, 3) [m] through heights, at a speed [m/s]."""
+    legs = [
+        np.linspace(a, b, max(round(abs(b - a) / speed / DT), 200), endpoint=False)
+        for a, b in pairwise(heights)
+    ]
+    z = np.append(np.concatenate(legs), heights[-1])
+    return np.column_stack((np.zeros((len(z), 2)), z))
+
+
+def wandering(seed, ticks=3000):
+    """Way (N, 3) [m] that wanders through the surface at z = 0, and begins and ends above it."""
+    rng, times = np.random.default_rng(seed), DT * np.arange(ticks)
+    rates, phases = rng.uniform(0.3, 6.0, (6, 3)), rng.uniform(0.0, 2.0 * np.pi, (6, 3))
+    sizes = rng.normal(size=(6, 3)) * (1e-3, 1e-3, 5e-3)
+    way = np.einsum(
+        "ij,nij->nj", sizes, np.sin(2.0 * np.pi * times[:, None, None] * rates + phases)
+    )
+    share = np.minimum(1.0, np.minimum(times, times[::-1]) / 0.2)
+    way[:, 2] = share * (way[:, 2] - 2e-3) + (1.0 - share) * 0.01
+    return way

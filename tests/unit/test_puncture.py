@@ -8,22 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import teleop_core as tc
-from led_tip import DT, PIECES, lead
+from led_tip import PIECES, along_z, lead, wandering
 from teleop_core.base.errors import ParameterError
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
 TOP = -0.072  # of the block in the scenario ``puncture`` [m]
-
-
-def along_z(*heights, speed=0.02):
-    """Straight way (N, 3) [m] through heights, at a speed [m/s]."""
-    legs = [
-        np.linspace(a, b, max(round(abs(b - a) / speed / DT), 200), endpoint=False)
-        for a, b in pairwise(heights)
-    ]
-    z = np.append(np.concatenate(legs), heights[-1])
-    return np.column_stack((np.zeros((len(z), 2)), z))
 
 
 def test_the_push_rises_to_the_puncture_force_and_falls_to_the_cutting_force():
@@ -143,19 +133,6 @@ def test_no_motion_of_a_needle_gets_energy_from_what_it_punctures(
     piece = np.abs(np.diff(way, axis=0)).max() / PIECES
     assert lost[0] == 0.0
     assert np.diff(lost).min() >= -1e-5 * lost[-1] - 0.25 * stiffness * piece * piece
-
-
-def wandering(seed, ticks=3000):
-    """Way (N, 3) [m] that wanders through the surface at z = 0, and begins and ends above it."""
-    rng, times = np.random.default_rng(seed), DT * np.arange(ticks)
-    rates, phases = rng.uniform(0.3, 6.0, (6, 3)), rng.uniform(0.0, 2.0 * np.pi, (6, 3))
-    sizes = rng.normal(size=(6, 3)) * (1e-3, 1e-3, 5e-3)
-    way = np.einsum(
-        "ij,nij->nj", sizes, np.sin(2.0 * np.pi * times[:, None, None] * rates + phases)
-    )
-    share = np.minimum(1.0, np.minimum(times, times[::-1]) / 0.2)
-    way[:, 2] = share * (way[:, 2] - 2e-3) + (1.0 - share) * 0.01
-    return way
 
 
 @pytest.mark.parametrize("name", ["box", "sphere", "cylinder", "capsule"])

@@ -21,6 +21,7 @@ from teleop_core.slave.slave import SLAVE
 from teleop_core.slave.slave_sim import SLAVE_SIM
 
 _GRAPH = ("arms", "stages", "delays")
+_WORLD = "world."
 _TOOL = ("axes", "tool_axes", "tool_roll", "rotation_gain")
 
 
@@ -39,6 +40,7 @@ class Origin:
         geometry: Settings that its robot was made with.
         lag: By how many setpoints a measured pose comes after that which it was sampled with: by
             one since it is the arm's server that tells it.
+        world: What is stored of the object that the slave touches, by names without ``world.``.
         tool: Quaternions (4,) of the maps from the master's base to the slave's axes, and from the
             stylus to the tool; None where the tool does not turn as much as the stylus.
     """
@@ -52,6 +54,7 @@ class Origin:
     controller: str | None = None
     geometry: tuple[str, ...] = ()
     lag: int = 0
+    world: Mapping[str, object] = field(default_factory=dict)
 
     @cached_property
     def chain(self) -> tuple[tuple[str, Topic], ...]:
@@ -84,7 +87,7 @@ def read_origin(bag: Bag, arm: str = "") -> Origin:
     return Origin(
         _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
         _tool(layer, arm), *_slave(layer, arm), _geometry(layer, arm),
-        int(has_server),
+        int(has_server), _world(layer, arm),
     )  # fmt: skip
 
 
@@ -145,6 +148,12 @@ def _geometry(layer: Layer, arm: str) -> tuple[str, ...]:
     """Settings of the robot."""
     said = _said(layer, SLAVE_SIM.name, arm).get("geometry")
     return tuple(map(str, said)) if isinstance(said, list | tuple) else ()
+
+
+def _world(layer: Layer, arm: str) -> dict[str, object]:
+    """Parameters of the object that the slave touches, by names without what is before them."""
+    said = _said(layer, SLAVE_SIM.name, arm).items()
+    return {name[len(_WORLD) :]: value for name, value in said if name.startswith(_WORLD)}
 
 
 def _mapping(layer: Layer, arm: str, names: Iterable[str]) -> MotionScalingParameters:

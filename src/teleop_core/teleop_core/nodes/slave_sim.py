@@ -16,8 +16,10 @@ class SlaveSimNode(TickingNode):
         return [f"no slave/setpoint_js for {setpoint.age():.1f} s: stands"] if is_silent else []
 
     def values(self) -> dict[str, str]:
-        """Punctures of the object, and how deep the needle is, where it can be punctured."""
+        """Presses of a button; punctures, and how deep the needle is, where there can be any."""
         stage = self.stage
+        if stage.parameters["click_force"] > 0.0:
+            return {"presses": str(stage.presses)}
         if not (stage.parameters["puncture_force"] > 0.0 or stage.punctures):
             return {}
         return {"punctures": str(stage.punctures), "depth_mm": f"{1e3 * stage.depth:.2f}"}

@@ -140,7 +140,8 @@ def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
 def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     """Configuration and scenario that a recording was made with; empty ones for foreign bags.
 
-    Files of a robot and a mesh are as they were then, see :mod:`teleop_core.bags.kept_files`.
+    Files of a robot, a mesh and a field of heights are as they were then, see
+    :mod:`teleop_core.bags.kept_files`.
 
     Raises:
         TeleopError: The stored configuration is not one.
@@ -151,7 +152,7 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
         layer = {SESSION: {"arms": tuple(arms)}}
     files = recorded_files(bag.metadata)
     for values in layer.values():
-        for key in ("robot", "world.mesh.file"):
+        for key in ("robot", "world.mesh.file", "world.height_field.file"):
             if (name := values.get(key)) in files:
                 values[key] = files[str(name)]
     _begin_at_home(layer)
@@ -233,7 +234,7 @@ def describe(configuration: Configuration) -> dict[str, str]:
         about |= {f"{prefix}{n}": str(configuration.value(n, arm)) for n in ("robot", "seed")}
         about |= robot_texts(about[f"{prefix}robot"], prefix)
         world = configuration.value("world", arm)
-        if world is not None and world.kind.kind == "mesh":
+        if world is not None and world.kind.kind in {"mesh", "height_field"}:
             about |= mesh_texts(world.kind.parameters.file, prefix)
     return about | {"configuration": configuration.text()}
 

@@ -36,6 +36,7 @@ from teleop_core.slave.simulation import SimulationNumbers, SimulationState, sim
 from teleop_core.slave.stability import Loop, check_friction, check_stable, loop_key
 from teleop_core.slave.transmission import LONGEST_DELAY
 from teleop_core.slave.world import WORLD_OBJECTS
+from teleop_core.slave.world.button import ButtonNumbers
 from teleop_core.slave.world.parameters import WorldParameters
 from teleop_core.slave.world.puncture import PunctureNumbers
 
@@ -176,6 +177,11 @@ class SlaveSim(RunningStage):
         return int(self.state["punctures"])
 
     @property
+    def presses(self) -> int:
+        """How often the tip has pressed a button down to its stop so far."""
+        return int(self.state["presses"])
+
+    @property
     def depth(self) -> float:
         """How deep the tip was in the channel of its last puncture a tick ago [m]; 0 outside."""
         return max(-float(self.state["gap"]), 0.0) if self.state["is_open"] else 0.0
@@ -251,6 +257,8 @@ class SlaveSim(RunningStage):
         p["world_friction"] = made_of.friction
         for name, *_ in fields_of(PunctureNumbers):
             p[name] = getattr(world, name)
+        for name, *_ in fields_of(ButtonNumbers):
+            p[name] = getattr(world.kind.parameters, name, 0.0)
         self.arm.shape[:] = world.shape
 
     def _tip_at_start(self) -> Array:

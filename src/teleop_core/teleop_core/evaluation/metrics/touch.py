@@ -1,9 +1,12 @@
 """Touch: what the slave's tip felt of the world."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
+from teleop_core.base.errors import TeleopError
+from teleop_core.base.parameters import build
 from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
@@ -11,7 +14,11 @@ from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
-from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF
+from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF, SLAVE_TRUE_CP
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots import load_robot_set
+from teleop_core.slave.world.button import ButtonParameters
+from teleop_core.slave.world.parameters import WorldParameters
 
 GROUP = "what the slave touched"
 _NEXT_NS = 5_000_000
@@ -29,6 +36,39 @@ class TouchScore:
     drop_n: float | None = figure(
         "N", "largest fall of the force from sample to sample within 5 ms, as of a puncture"
     )
+    presses: int | None = figure(
+        "1", "how often a button was pressed to its stop, from click to click; null without one"
+    )
+
+
+class _Presses:
+    """Counts presses of a button by where the tip truly was.
+
+    Attributes:
+        count: So far; None where nothing is known of a button.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self.count: int | None = None
+        self._is_pressed = False
+        with suppress(TeleopError):  # of a robot or an object that is not there any more
+            world = build(WorldParameters, dict(context.origin.world))
+            if isinstance(world.kind.parameters, ButtonParameters) and context.robot:
+                robot = load_robot_set(context.robot, context.origin.geometry)
+                center = world.place or world.below(robot.fk(robot.start)[:3, 3])
+                self._world, self._button = world, world.kind.parameters
+                self._center, self.count = np.array(center), 0
+
+    def add(self, places: Array) -> None:
+        """Take places (N, 3) [m] of the tip."""
+        if self.count is None:
+            return
+        depth = np.array([-self._world.distance(place, self._center) for place in places])
+        is_down = depth >= self._button.stroke
+        is_known = is_down | (depth <= self._button.click_travel)  # in between it stays as it was
+        states = np.append(self._is_pressed, is_down[is_known])
+        self.count += int(np.sum(states[1:] & ~states[:-1]))
+        self._is_pressed = bool(states[-1])
 
 
 class TouchMetric(Metric):
@@ -42,6 +82,8 @@ class TouchMetric(Metric):
     topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF)
 
     def __init__(self, context: Context) -> None:
+        context.read((SLAVE_TRUE_CP,))
+        self._presses = _Presses(context)
         self._force = Moments()
         self._count, self._time_ns, self._seen = 0, 0, 0
         self._last = (0, 0.0)  # stamp, and force
@@ -51,6 +93,7 @@ class TouchMetric(Metric):
 
     def add(self, window: Window) -> None:
         """Take one window; the topic is sent where it changes, and now and then."""
+        self._presses.add(window.samples(SLAVE_TRUE_CP).values[:, :3])
         is_known = len(window.around(SLAVE_TRUE_CF)) > 0
         samples = window.samples(SLAVE_TRUE_CF if is_known else SLAVE_MEASURED_CF)
         if not len(samples.values):
@@ -75,19 +118,21 @@ class TouchMetric(Metric):
     def values(self) -> TouchScore:
         """Score of everything so far."""
         if not self._seen:
-            return TouchScore(None, None, None, None, None)
+            return TouchScore(None, None, None, None, None, None)
         spread, whole = self._force.spread(), self._last[0] - self._begin_ns
         share = self._time_ns / whole if whole else 0.0
         drop = self._drop if self._count else None
-        return TouchScore(self._count, spread.max, spread.rms, share, drop)
+        return TouchScore(self._count, spread.max, spread.rms, share, drop, self._presses.count)
 
     def rows(self) -> list[Row]:
         """Number of touches and the largest force; nothing where nothing was touched."""
         score = self.values()
         if not score.count:
             return []
+        presses = [] if score.presses is None else [Row(GROUP, "presses", "", str(score.presses))]
         return [
             Row(GROUP, "touches", "", str(score.count)),
+            *presses,
             row(GROUP, "force on the tip, max", "N", score.peak_n),
             row(GROUP, "largest fall of it", "N", score.drop_n),
             row(GROUP, "share of the time in touch", "%", 100.0 * (score.share or 0.0)),

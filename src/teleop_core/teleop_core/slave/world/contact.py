@@ -15,6 +15,12 @@ from teleop_core.kernels import inner
 from teleop_core.kernels.fields import PerJoint, Vector3
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.arm import Arm
+from teleop_core.slave.world.button import (
+    ButtonNumbers,
+    ButtonState,
+    follow_button,
+    push_of_button,
+)
 from teleop_core.slave.world.puncture import (
     PunctureNumbers,
     PunctureState,
@@ -27,7 +33,7 @@ NEAR = 5e-3
 """A tip that is farther outside [m] does not get there within a tick."""
 
 
-class WorldNumbers(PunctureNumbers):
+class WorldNumbers(PunctureNumbers, ButtonNumbers):
     """Fields of a parameter record with what the object is made of, and where it is."""
 
     has_world: int
@@ -37,7 +43,7 @@ class WorldNumbers(PunctureNumbers):
     world_center: Vector3
 
 
-class ContactState(PunctureState):
+class ContactState(PunctureState, ButtonState):
     """Fields of a state record with the contact at the start of the tick."""
 
     is_near: int
@@ -60,9 +66,9 @@ def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: A
     """Write the force (3,) [N] on a tip that moved (3,) [m] since the tick began, at a speed (3,).
 
     Along the normal a spring with the damper of Hunt and Crossley, which pulls nobody back, and
-    pushes with the puncture force at most; across it a bristle as stiff, which holds until it
-    carries the dry friction, and then slips. In a channel the needle's push along it, and across
-    it the bristle, which does not slip there.
+    pushes with the puncture force at most; in a button it begins at the stop. Across it a
+    bristle as stiff, which holds until it carries the dry friction, and then slips. In a channel
+    the needle's push along it, and across it the bristle, which does not slip there.
 
     Returns:
         The part along the normal [N].
@@ -81,7 +87,10 @@ def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: A
         share = 1.0 if s.gap < 0.0 else 0.0
     else:
         depth = -(s.gap + out)
-        normal_force = p.world_stiffness * depth * (1.0 - p.world_damping * rate)
+        pressed = max(depth - p.stroke, 0.0) if p.click_force > 0.0 else depth
+        normal_force = p.world_stiffness * pressed * (1.0 - p.world_damping * rate)
+        if p.click_force > 0.0:
+            normal_force = max(normal_force, 0.0) + push_of_button(p, s, depth)
         if depth <= 0.0 or normal_force <= 0.0:
             force[0] = force[1] = force[2] = 0.0
             return 0.0
@@ -182,6 +191,8 @@ def touch(p: WorldNumbers, s: ContactState, arm: Arm, q: Array, dq: Array, felt:
     before, s.gap = s.gap, arm.distance(arm.offset, arm.shape, arm.normal)
     if s.punctures > 0:
         follow_channel(p, s, p.world_stiffness, before, arm.offset, arm.normal)
+    if p.click_force > 0.0:
+        follow_button(p, s, before)
     s.is_near = int(s.gap < NEAR)
     if s.is_near:
         _begin_at(s, arm, q, dq, speed)

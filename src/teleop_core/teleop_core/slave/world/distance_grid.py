@@ -1,4 +1,4 @@
-"""Distance grid: how far places are from a mesh, made once and kept for the user.
+"""Distance grid: how far places are from a mesh or heights, made once and kept for the user.
 
 What is kept is found by the digest of the file and of all that the grid depends on, so a grid
 serves every session, and a file that changes gets one of its own.
@@ -17,14 +17,14 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array, rotation
 from teleop_core.kernels.portable import dot, product
 from teleop_core.kernels.progress import told
 from teleop_core.kernels.store import user_cache
 from teleop_core.slave.world.contact import NEAR
+from teleop_core.slave.world.heights import read_heights
+from teleop_core.slave.world.spline import write_spline
 from teleop_core.slave.world.triangles import (
-    FILE,
     Triangles,
     edges_of,
     read_triangles,
@@ -45,12 +45,27 @@ _SHARP = math.cos(math.radians(30.0))
 
 
 class GridRequest(NamedTuple):
-    """What a grid depends on: file, length of its unit [m], its angles [rad], step [m]."""
+    """What a grid depends on.
+
+    Attributes:
+        file: Path of what is touched.
+        scale: Length of a mesh's unit; between heights of a field [m].
+        angles: Of a mesh [rad]; empty for a field of heights.
+        step: Between nodes of the grid [m].
+        kind: Name of the object.
+    """
 
     file: str
     scale: float
     angles: tuple[float, ...]
     step: float
+    kind: str = "mesh"
+
+    def error(self, name: str, value: object, text: str) -> ParameterError:
+        """What is said of the file, ``scale`` or ``step``, by the parameter of the object."""
+        is_spacing = name == "scale" and self.kind != "mesh"
+        full = f"world.{self.kind}.{'spacing' if is_spacing else name}"
+        return ParameterError(full, value, text)
 
 
 class DistanceGrid(NamedTuple):
@@ -70,15 +85,17 @@ def distance_grid(request: GridRequest) -> DistanceGrid:
     """Grid of a mesh, from the user's cache if it is there; making it takes seconds.
 
     Raises:
-        ParameterError: There is no such file, it is no closed mesh with a volume, or it does not
-            fit the scale or the step; see :func:`read_triangles`.
+        ParameterError: There is no such file, it is no closed mesh with a volume or no field of
+            heights, or it does not fit the scale or the step; see :func:`read_triangles` and
+            :func:`read_heights`.
     """
     path = Path(request.file).expanduser()
     try:
         data = path.read_bytes()
     except OSError as error:
-        text = f"a file with a mesh, such as an STL or OBJ ({error.strerror})"
-        raise ParameterError(FILE, request.file, text) from error
+        what = "a mesh, such as an STL or OBJ" if request.kind == "mesh" else "heights, CSV or .npy"
+        text = f"a file with {what} ({error.strerror})"
+        raise request.error("file", request.file, text) from error
     about = (_MADE, path.suffix.lower(), *map(repr, request[1:]))
     return _found(hashlib.sha256("\n".join(about).encode() + data).hexdigest(), request)
 
@@ -121,10 +138,8 @@ def _keep(kept: Path, grid: DistanceGrid) -> None:
 def _make(request: GridRequest) -> DistanceGrid:
     """Read the mesh and make its grid, and tell how far that is."""
     path, step = Path(request.file).expanduser(), request.step
-    x, y, z = request.angles
-    turned = product(rotation("z", z), product(rotation("y", y), rotation("x", x)))
     with told(f"making the distance grid of {path.name}") as tell:
-        triangles = read_triangles(path, path.read_bytes(), request.scale * turned)
+        triangles = _read(request, path)
         low, high = triangles.points.min(axis=0), triangles.points.max(axis=0)
         _check_size(request, high - low)
         nodes = _nodes(high - low, step)
@@ -139,23 +154,13 @@ def _make(request: GridRequest) -> DistanceGrid:
     return DistanceGrid(numbers, _outline(triangles))
 
 
-@kernel
-def write_spline(lines: Array) -> None:
-    """Write the coefficients of cubic B-splines through values (N, n, M) along the second axis.
-
-    They go on straight beyond their ends. Through nodes with the coefficients c a spline has the
-    values (c[i - 1] + 4 c[i] + c[i + 1]) / 6, a tridiagonal system.
-    """
-    last = lines.shape[1] - 1
-    share = np.zeros(last)
-    for i in range(lines.shape[0]):
-        for j in range(1, last):
-            share[j] = 1.0 / (4.0 - share[j - 1])
-            for k in range(lines.shape[2]):
-                lines[i, j, k] = share[j] * (6.0 * lines[i, j, k] - lines[i, j - 1, k])
-        for j in range(last - 1, 0, -1):
-            for k in range(lines.shape[2]):
-                lines[i, j, k] -= share[j] * lines[i, j + 1, k]
+def _read(request: GridRequest, path: Path) -> Triangles:
+    """Read what is touched."""
+    if request.kind != "mesh":
+        return read_heights(path, path.read_bytes(), request.scale, request.step)
+    x, y, z = request.angles
+    turned = product(rotation("z", z), product(rotation("y", y), rotation("x", x)))
+    return read_triangles(path, path.read_bytes(), request.scale * turned)
 
 
 def _nodes(size: Array, step: float) -> list[int]:
@@ -173,19 +178,19 @@ def _check_size(request: GridRequest, size: Array) -> None:
     longest = float(size.max())
     if not _SIDES[0] <= longest <= _SIDES[1]:
         text = (
-            f"such that the mesh, now {longest:.3g} m long, is between {_SIDES[0]:g} and "
-            f"{_SIDES[1]:g} m long"
+            f"such that the {request.kind.replace('_', ' ')}, now {longest:.3g} m long, is between "
+            f"{_SIDES[0]:g} and {_SIDES[1]:g} m long"
         )
-        raise ParameterError("world.mesh.scale", request.scale, text)
+        raise request.error("scale", request.scale, text)
     fits = request.step
     while math.prod(_nodes(size, fits)) > _MOST:
         fits *= 1.05
     if fits > request.step:
         text = f"at least {fits:.2g} m for a mesh of this size: its grid would be too large"
-        raise ParameterError("world.mesh.step", request.step, text)
+        raise request.error("step", request.step, text)
     if (shortest := float(size.min())) < _THINNEST * request.step:
         text = f"at most {shortest / _THINNEST:.2g} m for a mesh that is so thin"
-        raise ParameterError("world.mesh.step", request.step, text)
+        raise request.error("step", request.step, text)
 
 
 def _outline(triangles: Triangles) -> Array:

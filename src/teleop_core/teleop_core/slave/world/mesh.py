@@ -12,6 +12,7 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WorldObject
 from teleop_core.slave.world.distance_grid import EDGE, HEADER, GridRequest, distance_grid
+from teleop_core.slave.world.spline import slopes, weights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,25 +34,6 @@ class MeshParameters:
 
 
 @inner
-def _weights(t: float) -> tuple[float, float, float, float]:
-    """Weights of the four nodes around a place, a share t of a step behind the second."""
-    u = 1.0 - t
-    return (
-        u * u * u / 6.0, (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
-        (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0, t * t * t / 6.0,
-    )  # fmt: skip
-
-
-@inner
-def _slopes(t: float) -> tuple[float, float, float, float]:
-    """Derivatives of the weights over t."""
-    u = 1.0 - t
-    return (
-        -0.5 * u * u, t * (1.5 * t - 2.0), u * (2.0 - 1.5 * u), 0.5 * t * t
-    )  # fmt: skip
-
-
-@inner
 def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
     """Where a place is in the grid along an axis, or where the grid ends before it.
 
@@ -69,8 +51,8 @@ def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
 def _gradient(shape: Array, at: tuple[int, int, int], share: tuple[float, float, float],
               gradient: Array) -> float:  # fmt: skip
     """Write the gradient (3,) of the spline behind a node; returns its value [m]."""
-    wx, wy, wz = _weights(share[0]), _weights(share[1]), _weights(share[2])
-    sx, sy, sz = _slopes(share[0]), _slopes(share[1]), _slopes(share[2])
+    wx, wy, wz = weights(share[0]), weights(share[1]), weights(share[2])
+    sx, sy, sz = slopes(share[0]), slopes(share[1]), slopes(share[2])
     rows, columns = int(shape[1]), int(shape[2])
     value = along_x = along_y = along_z = 0.0
     for i in range(4):

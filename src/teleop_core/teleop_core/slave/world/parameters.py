@@ -109,6 +109,8 @@ class WorldParameters:
     def __post_init__(self) -> None:
         if len(self.place) not in {0, 3}:
             raise ParameterError("world.place", self.place, "x, y, z, or empty")
+        if self.puncture_force > 0.0 and getattr(self.kind.parameters, "click_force", 0.0) > 0.0:
+            raise ParameterError("world.puncture_force", self.puncture_force, "0 for a button")
 
     def below(self, tip: Array) -> Array:
         """Middle of the object (3,) [m] that lies straight below a tip (3,) [m], a gap apart.

@@ -1,0 +1,66 @@
+"""Spline: cubic B-splines through values at even steps, straight beyond their ends."""
+
+import numpy as np
+
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.geometry import Array
+
+
+@kernel
+def write_spline(lines: Array) -> None:
+    """Write the coefficients of cubic B-splines through values (N, n, M) along the second axis.
+
+    They go on straight beyond their ends. Through nodes with the coefficients c a spline has the
+    values (c[i - 1] + 4 c[i] + c[i + 1]) / 6, a tridiagonal system.
+    """
+    last = lines.shape[1] - 1
+    share = np.zeros(last)
+    for i in range(lines.shape[0]):
+        for j in range(1, last):
+            share[j] = 1.0 / (4.0 - share[j - 1])
+            for k in range(lines.shape[2]):
+                lines[i, j, k] = share[j] * (6.0 * lines[i, j, k] - lines[i, j - 1, k])
+        for j in range(last - 1, 0, -1):
+            for k in range(lines.shape[2]):
+                lines[i, j, k] -= share[j] * lines[i, j + 1, k]
+
+
+@inner
+def weights(t: float) -> tuple[float, float, float, float]:
+    """Weights of the four nodes around a place, a share t of a step behind the second."""
+    u = 1.0 - t
+    return (
+        u * u * u / 6.0, (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
+        (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0, t * t * t / 6.0,
+    )  # fmt: skip
+
+
+@inner
+def slopes(t: float) -> tuple[float, float, float, float]:
+    """Derivatives of the weights over t."""
+    u = 1.0 - t
+    return (
+        -0.5 * u * u, t * (1.5 * t - 2.0), u * (2.0 - 1.5 * u), 0.5 * t * t
+    )  # fmt: skip
+
+
+@kernel
+def write_between(coefficients: Array, between: Array) -> None:
+    """Write the values of splines at even places from their first to their last node.
+
+    Args:
+        coefficients: Of splines along the second axis (N, n, M), as :func:`write_spline` gives.
+        between: Written (N, k (n - 1) + 1, M), k places a step.
+    """
+    steps = coefficients.shape[1] - 1
+    parts = (between.shape[1] - 1) // steps
+    for j in range(between.shape[1]):
+        node = min(j // parts, steps - 1)
+        before, after = max(node - 1, 0), min(node + 2, steps)
+        a, b, c, d = weights((j - node * parts) / parts)
+        for i in range(between.shape[0]):
+            for k in range(between.shape[2]):
+                here, there = coefficients[i, node, k], coefficients[i, node + 1, k]
+                last = coefficients[i, before, k] if node > 0 else 2.0 * here - there
+                following = coefficients[i, after, k] if node + 1 < steps else 2.0 * there - here
+                between[i, j, k] = a * last + b * here + c * there + d * following

@@ -1,0 +1,216 @@
+"""Height field: a table of heights as an object to touch, beside plane and sphere."""
+
+from itertools import repeat
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import teleop_core as tc
+from led_tip import lead
+from teleop_core.base.errors import ParameterError
+from teleop_core.console.world_nodes import object_outline
+from teleop_core.robots import load_robot
+from teleop_core.slave.world.height_field import HEIGHT_FIELD, HeightFieldParameters
+from teleop_core.slave.world.heights import THICKNESS, read_heights
+from teleop_core.slave.world.mesh import MESH, MeshParameters
+
+SPACING = 2e-3
+X, Y = np.meshgrid(
+    SPACING * (np.arange(31) - 15.0), SPACING * (np.arange(25) - 12.0), indexing="ij"
+)
+TILT = np.array((0.3, -0.2))
+BALL, DEEP = 0.05, -0.045  # radius of a ball, and height of its middle [m]
+FIELDS = {
+    "flat": np.zeros_like(X),
+    "tilted": TILT[0] * X + TILT[1] * Y,
+    "ball": DEEP + np.sqrt(BALL**2 - X**2 - Y**2),
+    "waves": 1.5e-3 * np.sin(X / 4e-3) * np.cos(Y / 5e-3),
+}
+AWAY = 8e-3  # from the edges of a field [m]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Tables of heights, and a cache of its own."""
+    made = tmp_path_factory.mktemp("heights")
+    for name, heights in FIELDS.items():
+        np.savetxt(made / f"{name}.csv", heights, delimiter=",")
+        np.save(made / f"{name}.npy", heights)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TELEOP_KERNELS", str(Path.home() / ".cache" / "teleop_core" / "kernels"))
+        patch.setenv("XDG_CACHE_HOME", str(made / "cache"))
+        yield made
+
+
+def field(folder, name, ending="csv", **more):
+    """Parameters of a field."""
+    return HeightFieldParameters(file=str(folder / f"{name}.{ending}"), **more)
+
+
+def found(group, places, part=HEIGHT_FIELD):
+    """Distances (N,) and normals (N, 3) of an object at places (N, 3)."""
+    normals, shape = np.zeros((len(places), 3)), part.numbers(group)
+    distances = [part.distance(*row) for row in zip(places, repeat(shape), normals, strict=False)]
+    return np.array(distances), normals
+
+
+def near_surface(name, rng, count=20_000):
+    """Places (N, 3) to 3 mm from a surface and away from its edges; distances and normals there."""
+    half = (0.5 * np.array((np.ptp(X), np.ptp(Y)))) - AWAY
+    places = np.column_stack(
+        (rng.uniform(-half, half, (count, 2)), rng.uniform(-0.02, 0.02, count))
+    )
+    if name == "ball":
+        ways = places - (0.0, 0.0, DEEP)
+        size = np.linalg.norm(ways, axis=1)
+        distances, normals = size - BALL, ways / size[:, None]
+    else:
+        slope = TILT if name == "tilted" else np.zeros(2)
+        up = np.append(-slope, 1.0) / np.sqrt(1.0 + slope @ slope)
+        distances, normals = places @ up, np.tile(up, (count, 1))
+    is_near = np.abs(distances) < 3e-3
+    return places[is_near], distances[is_near], normals[is_near]
+
+
+@pytest.mark.parametrize(
+    ("name", "distance", "angle"),
+    [("flat", 6e-6, 0.1), ("tilted", 6e-6, 0.2), ("ball", 6e-6, 0.1)],
+)
+def test_a_field_has_distance_and_normal_of_its_plane_or_sphere_within_the_bounds(
+    name, distance, angle, folder
+):
+    places, wanted, outward = near_surface(name, np.random.default_rng(1))
+    measured, normal = found(field(folder, name), places)
+    assert len(places) > 1000
+    assert np.abs(measured - wanted).max() < distance
+    turn = 2.0 * np.arcsin(0.5 * np.linalg.norm(normal - outward, axis=1))
+    assert np.degrees(turn.max()) < angle
+
+
+def test_between_heights_the_surface_is_that_of_a_cubic_spline_of_others(folder):
+    """Natural at the ends, as ours."""
+    from scipy.interpolate import CubicSpline
+
+    data = (folder / "waves.npy").read_bytes()
+    points = read_heights(Path("waves.npy"), data, SPACING, 1e-3).points
+    rows, columns = 4 * 30 + 1, 4 * 24 + 1
+    top = points[: rows * columns].reshape(rows, columns, 3)
+    x, y = top[:, 0, 0], top[0, :, 1]
+    along = CubicSpline(X[:, 0], FIELDS["waves"], axis=0, bc_type="natural")(x)
+    wanted = CubicSpline(Y[0], along, axis=1, bc_type="natural")(y)
+    np.testing.assert_allclose(top[..., 2], wanted, atol=1e-15)
+
+
+def test_the_block_is_a_closed_mesh_for_a_library_of_others(folder):
+    import trimesh
+
+    heights = FIELDS["waves"]
+    data = (folder / "waves.npy").read_bytes()
+    mesh = trimesh.Trimesh(*read_heights(Path("waves.npy"), data, SPACING, 1e-3), process=False)
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    floor = mesh.bounds[0, 2]
+    assert floor == pytest.approx(heights.min() - THICKNESS, abs=2e-4)
+    mean = mesh.volume / (np.ptp(X) * np.ptp(Y))
+    assert mean == pytest.approx(-floor, abs=1e-4)  # waves have a mean near zero
+    assert found(field(folder, "waves"), np.array([(0.0, 0.0, floor - 5e-3)]))[0] > 4.9e-3
+
+
+def test_rows_are_places_along_x_and_both_formats_say_the_same(folder):
+    places = np.array([(0.01, 0.0, 3e-3), (0.0, 0.01, -2e-3)])
+    for ending in ("csv", "npy"):
+        distances, _ = found(field(folder, "tilted", ending), places)
+        np.testing.assert_allclose(distances, 0.0, atol=1e-8)
+
+
+def test_the_normal_turns_without_a_kink_where_triangles_and_cells_meet(folder):
+    x = np.linspace(-0.02, 0.02, 8001)
+    height = 1.5e-3 * np.sin(x / 4e-3)
+    _, normal = found(field(folder, "waves"), np.column_stack((x, 0.0 * x, height - 2e-4)))
+    rate = np.linalg.norm(np.diff(normal, axis=0), axis=1) / np.diff(x)
+    sharpest = 1.5e-3 / 4e-3**2  # curvature of the waves [1/m]
+    assert rate.max() < 1.6 * sharpest
+    assert np.abs(np.diff(rate)).max() < 0.02 * sharpest
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.6])
+def test_no_motion_gains_energy_from_a_field(friction, folder):
+    """Tips that are led around closed ways through it, also across its edges."""
+    rng, group, shares = np.random.default_rng(5), field(folder, "waves"), []
+    share = np.linspace(0.0, 1.0, 3001)
+    for _ in range(40):
+        way = sum(
+            (1.0 - np.cos(2.0 * np.pi * k * share))[:, None] * rng.normal(size=3)
+            for k in range(1, 5)
+        )
+        way = way / np.abs(way).max() * (0.05, 0.04, 0.02) + (0.0, 0.0, 0.008)
+        force, lost, _ = lead(
+            way, "height_field", group, puncture_force=0.0, world_stiffness=1000.0,
+            world_friction=friction, world_damping=2.0 * friction,
+        )  # fmt: skip
+        turned = np.abs((force[:-1] * np.diff(way[:-1], axis=0)).sum(axis=1)).sum()
+        if turned > 1e-3 and not force[-1].any():
+            shares.append(lost[-1] / turned)
+    assert len(shares) > 10
+    assert min(shares) > (0.0 if friction else -1e-3)
+
+
+def test_a_recording_replays_to_the_bit_when_its_file_is_gone(folder, tmp_path):
+    path = tmp_path / "ball.csv"
+    path.write_bytes((folder / "ball.csv").read_bytes())
+    settings = {"world": "height_field", "world.height_field.file": str(path),
+                "world.place": [0.241, -0.236, -0.077]}  # fmt: skip
+    recording = tc.run("palpation", duration=8.0, out=tmp_path / "bag", settings=settings)
+    before = recording["slave/true_cf"].values
+    assert np.abs(before).max() > 0.1
+    path.unlink()
+    again = tc.replay(recording.path)
+    np.testing.assert_array_equal(again["slave/true_cf"].values, before)
+
+
+def test_the_page_draws_the_field_where_it_lies(folder):
+    place = np.array((0.2, -0.2, -0.1))
+    values = {"kind": "height_field", "height_field.file": str(folder / "ball.csv")}
+    drawn = object_outline(values | {"place": tuple(place.tolist())}, load_robot("rcrt1"))
+    offsets = drawn.reshape(-1, 3) - place
+    np.testing.assert_allclose(np.ptp(offsets[:, :2], axis=0), (np.ptp(X), np.ptp(Y)), atol=1e-9)
+    assert offsets[:, 2].max() == pytest.approx(FIELDS["ball"].max(), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"1,2,x", "ValueError"), (b"", "no data"), (b"0,0\n0,0", "4 x 4"),
+        (b"0,0,0,nan\n" * 4, "finite"), (b"\xff\xfe", "Unicode"),
+    ],
+)  # fmt: skip
+def test_a_file_that_is_no_table_of_heights_is_refused(content, said, folder):
+    path = folder / "bad.csv"
+    path.write_bytes(content)
+    with pytest.raises(ParameterError, match=said) as error:
+        HEIGHT_FIELD.numbers(HeightFieldParameters(file=str(path)))
+    assert error.value.name == "world.height_field.file"
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "parameter"),
+    [
+        ({"spacing": 1e-5}, "step"), ({"step": 5e-5}, "step"), ({"spacing": 0.1}, "step"),
+        ({"spacing": 0.1, "step": 5e-3}, "spacing"),
+    ],
+)  # fmt: skip
+def test_a_field_that_does_not_fit_its_numbers_is_refused_by_their_name(more, parameter, folder):
+    np.save(folder / "narrow.npy", np.zeros((25, 4)))
+    name = "narrow" if parameter == "spacing" else "flat"
+    with pytest.raises(ParameterError) as error:
+        HEIGHT_FIELD.numbers(field(folder, name, "npy", **more))
+    assert error.value.name == f"world.height_field.{parameter}"
+
+
+def test_a_file_that_is_not_there_is_refused():
+    for part, group in ((HEIGHT_FIELD, HeightFieldParameters()), (MESH, MeshParameters())):
+        with pytest.raises(ParameterError, match="a file with") as error:
+            part.numbers(group)
+        assert error.value.name == f"world.{part.name}.file"
