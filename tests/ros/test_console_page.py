@@ -173,6 +173,7 @@ def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page, console, 
         other.until(f"{DRIVER} !== '{driver}'")
         ready(other)
         pull(other, 0, -PULLED)
+        page.until("!document.body.innerText.includes('clutched')")  # the slave is led
     page.shows("clutched")
     page.click("Take control")
     page.until(f"{DRIVER} === '{driver}'")  # only who drives may save
