@@ -58,11 +58,11 @@ class _Presses:
                 center = world.place or world.below(robot.fk(robot.start)[:3, 3])
                 self._world, self._button = world, world.kind.parameters
                 self._center, self.count = np.array(center), 0
+                context.read((SLAVE_TRUE_CP,))
 
     def add(self, places: Array) -> None:
-        """Take places (N, 3) [m] of the tip."""
-        if self.count is None:
-            return
+        """Take places (N, 3) [m] of the tip; only where a button is known."""
+        assert self.count is not None
         depth = np.array([-self._world.distance(place, self._center) for place in places])
         is_down = depth >= self._button.stroke
         is_known = is_down | (depth <= self._button.click_travel)  # in between it stays as it was
@@ -82,7 +82,6 @@ class TouchMetric(Metric):
     topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF)
 
     def __init__(self, context: Context) -> None:
-        context.read((SLAVE_TRUE_CP,))
         self._presses = _Presses(context)
         self._force = Moments()
         self._count, self._time_ns, self._seen = 0, 0, 0
@@ -93,7 +92,8 @@ class TouchMetric(Metric):
 
     def add(self, window: Window) -> None:
         """Take one window; the topic is sent where it changes, and now and then."""
-        self._presses.add(window.samples(SLAVE_TRUE_CP).values[:, :3])
+        if self._presses.count is not None:
+            self._presses.add(window.samples(SLAVE_TRUE_CP).values[:, :3])
         is_known = len(window.around(SLAVE_TRUE_CF)) > 0
         samples = window.samples(SLAVE_TRUE_CF if is_known else SLAVE_MEASURED_CF)
         if not len(samples.values):

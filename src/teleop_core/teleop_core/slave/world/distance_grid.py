@@ -136,7 +136,7 @@ def _keep(kept: Path, grid: DistanceGrid) -> None:
 
 
 def _make(request: GridRequest) -> DistanceGrid:
-    """Read the mesh and make its grid, and tell how far that is."""
+    """Read what is touched and make its grid, and tell how far that is."""
     path, step = Path(request.file).expanduser(), request.step
     with told(f"making the distance grid of {path.name}") as tell:
         triangles = _read(request, path)
@@ -186,10 +186,10 @@ def _check_size(request: GridRequest, size: Array) -> None:
     while math.prod(_nodes(size, fits)) > _MOST:
         fits *= 1.05
     if fits > request.step:
-        text = f"at least {fits:.2g} m for a mesh of this size: its grid would be too large"
+        text = f"at least {fits:.2g} m for what is of this size: its grid would be too large"
         raise request.error("step", request.step, text)
     if (shortest := float(size.min())) < _THINNEST * request.step:
-        text = f"at most {shortest / _THINNEST:.2g} m for a mesh that is so thin"
+        text = f"at most {shortest / _THINNEST:.2g} m for what is so thin"
         raise request.error("step", request.step, text)
 
 
