@@ -10,7 +10,7 @@ from led_tip import PIECES, along_z, lead, wandering
 from teleop_core.base.errors import ParameterError
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
-from teleop_core.slave.world.button import BUTTON, ButtonParameters
+from teleop_core.slave.world.button import BUTTON, ButtonParameters, count_presses
 
 STOP = 20_000.0  # stiffness of the stop [N/m]
 
@@ -63,6 +63,17 @@ def test_a_press_counts_at_the_stop_and_again_after_the_click_on_the_way_back():
     assert press(2e-3, stop, -2.01e-3, stop)[-1].presses == 1
     assert press(2e-3, stop, -1.99e-3, stop)[-1].presses == 2
     assert [press(2e-3, z)[-1].is_pressed for z in (-3.1e-3, -2.9e-3)] == [1, 0]
+
+
+@pytest.mark.parametrize("turn", [-2.01e-3, -1.99e-3])
+def test_the_score_counts_presses_along_a_way_as_the_button_does(turn):
+    way = along_z(2e-3, -3.01e-3, turn, -3.01e-3, 2e-3)
+    s, count, is_pressed = press(way=way)[-1], 0, False
+    for depths in np.array_split(-way[:, 2], 7):
+        new, is_pressed = count_presses(depths, ButtonParameters(), is_pressed=is_pressed)
+        count += new
+    assert count == s.presses
+    assert not is_pressed
 
 
 @pytest.mark.parametrize("damping", [0.0, 100.0])

@@ -17,7 +17,7 @@ from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF, SLAVE_TRUE_CP
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
-from teleop_core.slave.world.button import ButtonParameters
+from teleop_core.slave.world.button import ButtonParameters, count_presses
 from teleop_core.slave.world.parameters import WorldParameters
 
 GROUP = "what the slave touched"
@@ -64,11 +64,8 @@ class _Presses:
         """Take places (N, 3) [m] of the tip; only where a button is known."""
         assert self.count is not None
         depth = np.array([-self._world.distance(place, self._center) for place in places])
-        is_down = depth >= self._button.stroke
-        is_known = is_down | (depth <= self._button.click_travel)  # in between it stays as it was
-        states = np.append(self._is_pressed, is_down[is_known])
-        self.count += int(np.sum(states[1:] & ~states[:-1]))
-        self._is_pressed = bool(states[-1])
+        new, self._is_pressed = count_presses(depth, self._button, is_pressed=self._is_pressed)
+        self.count += new
 
 
 class TouchMetric(Metric):

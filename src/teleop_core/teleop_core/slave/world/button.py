@@ -131,6 +131,25 @@ def push_of_button(p: ButtonNumbers, s: ButtonState, depth: float) -> float:
     return spring - most + min(max(friction, -most), most)
 
 
+def count_presses(
+    depths: Array, parameters: ButtonParameters, *, is_pressed: bool
+) -> tuple[int, bool]:
+    """Count presses along a way, as :func:`follow_button` does tick by tick.
+
+    Args:
+        depths: Of the tip behind the surface, shape (N,) [m].
+        parameters: Of the button.
+        is_pressed: Whether it was pressed before the first of them.
+
+    Returns:
+        Number of new presses, and whether it is pressed at the end.
+    """
+    is_down = depths >= parameters.stroke
+    is_known = is_down | (depths <= parameters.click_travel)  # in between it stays as it was
+    states = np.append(is_pressed, is_down[is_known])
+    return int(np.sum(states[1:] & ~states[:-1])), bool(states[-1])
+
+
 def button_outline(parameters: ButtonParameters) -> Array:
     """The post, and its upper end where that is on its stop, (124, 3) [m] around the middle."""
     post = cylinder_outline(parameters)
