@@ -56,9 +56,9 @@ class Tap:
     def take(self) -> None:
         """Take what has come: time of sending [ns] and joints."""
         while (taken := self._setpoints.take()) is not None:
-            found = self._layout.decode_one(taken[0])
+            found = self._layout.decode_one(taken.data)
             if found is not None:
-                self.rows.append((int(taken[1]["source_timestamp"]), np.array(found[1])))
+                self.rows.append((taken.sent_ns, np.array(found[1])))
 
     def press(self) -> int:
         """Press the button; returns when that was sent [ns]."""
