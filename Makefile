@@ -11,7 +11,7 @@ export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 .PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format docs docs-links bench bench-setup endurance fuzz mutants drill-mutants flaky clean
 
 # Python compiles a module when it is first imported: most of them never are.
-INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check \
+INSTALL := $(BIN)/python -m pip install --quiet --no-compile --use-pep517 --disable-pip-version-check \
     -c constraints.txt --config-settings editable_mode=compat
 
 setup: $(VENV)/.installed
@@ -87,7 +87,7 @@ test-slow: $(VENV)/.tested crtk_msgs
 
 # Long tests whose law a shorter one tests in CI with another case; a quarter of an hour.
 soak: $(VENV)/.tested crtk_msgs
-	$(ALONE) -m soak
+	$(BIN)/pytest -n 1 -m soak tests
 
 # Broken files, texts and messages, other ones each time; an hour. The tests have a short form of it.
 FUZZ_CASES ?= 1000000

@@ -18,6 +18,8 @@ from teleop_core.graph.layers import declared_groups
 from teleop_core.graph.topics import (
     BY_NAME,
     DIAGNOSTICS,
+    IMPEDANCE_TOPICS,
+    JAW_TOPICS,
     NETWORK_TOPICS,
     OPERATOR_BUTTONS,
     OPERATOR_SERVO_CP,
@@ -45,6 +47,7 @@ VALUES = {
     Kind.BUTTONS: "clutch, fixture, mode; 1 pressed",
     Kind.JOINTS: "position of each joint [rad or m]",
     Kind.STATE: "position, velocity, effort of all joints",
+    Kind.JAW: "position [rad], velocity [rad/s], effort [N·m] of `jaw`",
 }
 
 
@@ -88,12 +91,21 @@ def topics_page(graph: Graph) -> str:
         topic_row(t, f"{writers[t]}, with [passivity](passivity.md)", with_ports)
         for t in PASSIVITY_TOPICS
     ]
+    with_yield = build_graph(stages=["network", "impedance"])
+    writers = {t: member.name for member in with_yield.members for t in member.writes}
+    rows += [
+        topic_row(t, f"{writers[t]}, with [impedance](world.md#a-slave-that-yields)", with_yield)
+        for t in IMPEDANCE_TOPICS
+    ]
     with_filter = build_graph(stages=["tremor_filter"])
     writer = "[tremor_filter](tremor_filters.md), a further stage"
     rows += [topic_row(topic, writer, with_filter) for topic in TREMOR_FILTER.writes]
     with_centre = build_graph(stages=["remote_centre"])
     writer = "[remote_centre](remote_centre.md), a further stage"
     rows += [topic_row(topic, writer, with_centre) for topic in REMOTE_CENTRE_STAGE.writes]
+    with_jaw = build_graph(stages=["network", "jaw_command", "jaw", "jaw_sim"])
+    writers = {t: member.name for member in with_jaw.members for t in member.writes}
+    rows += [topic_row(t, f"{writers[t]}, with a [jaw](gripper.md)", with_jaw) for t in JAW_TOPICS]
     return page([
         "# Topics",
         "CRTK names, standard messages, SI units. Streams are offered reliable with a queue of "

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.kernels import kernel, pointer
-from teleop_core.kernels.fields import fields_of, record
+from teleop_core.kernels.fields import fields_of, record, record_array
 from teleop_core.robots.kinematics import FK
-from teleop_core.slave.simulation import SimulationNumbers, SimulationState
+from teleop_core.slave.simulation import SimulationNumbers
 from teleop_core.slave.world import WORLD_OBJECTS
 from teleop_core.slave.world.button import ButtonNumbers
-from teleop_core.slave.world.contact import add_push, touch
+from teleop_core.slave.world.contact import ContactState, add_push, touch
 
 DT = 1e-3
 PIECES = 16  # pieces of way in a tick, along each of which the push does its work
@@ -19,14 +19,14 @@ PIECES = 16  # pieces of way in a tick, along each of which the push does its wo
 
 @kernel
 def straight(q, geometry, jacobian):
-    """Jacobian of a tip whose three joints are its place."""
+    """Jacobian of a tip whose joints are its place, and its turns about the base's axes if six."""
     jacobian[:] = 0.0
-    for k in range(3):
+    for k in range(jacobian.shape[1]):
         jacobian[k, k] = 1.0
 
 
 class Needle(NamedTuple):
-    """What a contact takes of an arm, of three joints that are the tip's place [m]."""
+    """What a contact takes of an arm, whose joints are the tip's place [m], and its turns [rad]."""
 
     jacobian: object
     distance: object
@@ -39,12 +39,13 @@ class Needle(NamedTuple):
     J: np.ndarray
 
 
-def needle(name, parameters=None):
+def needle(name, parameters=None, joints=3):
     """A needle before an object, with the defaults of its parameters if there are no others."""
     part = WORLD_OBJECTS.find(name)
     return Needle(
-        pointer(straight, FK), part.distance_pointer, np.zeros(3), np.zeros(3), np.zeros((4, 4)),
-        part.numbers(parameters or part.parameters()), np.zeros(3), np.zeros(3), np.zeros((6, 3)),
+        pointer(straight, FK), part.distance_pointer, np.zeros(joints), np.zeros(3),
+        np.zeros((4, 4)), part.numbers(parameters or part.parameters()), np.zeros(3), np.zeros(3),
+        np.zeros((6, joints)),
     )  # fmt: skip
 
 
@@ -79,19 +80,20 @@ def _stored(p, s):
 
 
 @kernel
-def _lead(p, s, arm, way, felt, lost):
+def _lead(p, contacts, arm, way, felt, lost):
     """Lead the tip along ``way`` (N, 3), a tick each ``PIECES`` rows.
 
     Writes the force at the begin of each tick (ticks, 6), and the energy lost so far (ticks,): what
     the tip gave less what is stored.
     """
     speed, push, middle, energy = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
+    s = contacts[0]
     for tick in range(len(felt)):
         first = tick * PIECES
         for k in range(3):
             arm.T[k, 3] = way[first, k]
             speed[k] = (way[first + 1, k] - way[first, k]) * PIECES / 1e-3
-        touch(p, s, arm, way[first], speed, felt[tick])
+        touch(p, contacts, arm, way[first], speed, felt[tick])
         lost[tick] = energy - _stored(p, s)
         if not s.is_near:
             continue
@@ -100,7 +102,7 @@ def _lead(p, s, arm, way, felt, lost):
                 middle[k] = 0.5 * (way[i, k] + way[i + 1, k])
                 speed[k] = (way[i + 1, k] - way[i, k]) * PIECES / 1e-3
                 push[k] = 0.0
-            add_push(p, s, middle, speed, push)
+            add_push(p, contacts, middle, speed, push)
             for k in range(3):
                 energy -= push[k] * (way[i + 1, k] - way[i, k])
 
@@ -115,7 +117,7 @@ def lead(way, name="plane", parameters=None, **numbers):
         numbers: Of it, beside those of soft tissue.
     """
     # Whole records: numba takes a record for another one that begins with the same fields.
-    p, s = record(SimulationNumbers, 3), record(SimulationState, 3)
+    p, contacts = record(SimulationNumbers, 3), record_array(ContactState, 1, 3)
     known = {"world_stiffness": 200.0, "puncture_force": 0.5, "cutting_force": 0.1,
              "shaft_friction": 20.0, "hole_radius": 2e-3}  # fmt: skip
     for key, value in (known | numbers).items():
@@ -125,8 +127,8 @@ def lead(way, name="plane", parameters=None, **numbers):
     times = np.arange(PIECES * (len(way) - 1) + 1) / PIECES
     fine = np.column_stack([np.interp(times, np.arange(len(way)), column) for column in way.T])
     felt, lost = np.zeros((len(way) - 1, 6)), np.zeros(len(way) - 1)
-    _lead(p, s, needle(name, parameters), fine, felt, lost)
-    return felt[:, :3], lost, s
+    _lead(p, contacts, needle(name, parameters), fine, felt, lost)
+    return felt[:, :3], lost, contacts[0]
 
 
 def along_z(*heights, speed=0.02):

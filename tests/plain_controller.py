@@ -1,7 +1,10 @@
-"""A plain controller of a real arm, in rclpy alone: the arm is an RCRT-1 with names of its own.
+"""A plain controller of a real arm, in rclpy alone: an RCRT-1 with names of its own, a UR5e,
+or a gripper.
 
 python plain_controller.py joint_state|forward_command|joint_trajectory|crtk
+    [rcrt1|ur5e|gripper [SEED]]
 
+With a seed the arm stands somewhere near where it else does.
 It says where its joints are, among those of a gripper, 500 times a second, and goes to what it is
 told. What it is told on ``misbehave`` it does: ``names``, ``order``, ``stale``, ``back``, ``jump``,
 ``mute``, ``strange``; nothing ends it. On ``witness`` it says how far the first command was from
@@ -10,6 +13,7 @@ speed makes up in a period of its own.
 """
 
 import math
+import random
 import signal
 import sys
 import time
@@ -21,10 +25,25 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory
 
-JOINTS = ("base", "shoulder", "slide", "roll", "pitch", "yaw")  # ours theta1, theta2, d3 ...
-STANDS = (0.1, -1.9, 0.4, 0.0, 0.1, 0.0)  # the shoulder counts the other way
-SPEED = (3.0, 3.0, 0.06, 7.0, 13.0, 13.0)
-ORDER = ("yaw", "pitch", "roll", "slide", "shoulder", "base")  # of forward commands
+ARMS = {
+    "rcrt1": (
+        ("base", "shoulder", "slide", "roll", "pitch", "yaw"),  # ours theta1, theta2, d3 ...
+        (0.1, -1.9, 0.4, 0.0, 0.1, 0.0),  # the shoulder counts the other way
+        (3.0, 3.0, 0.06, 7.0, 13.0, 13.0),
+        ("yaw", "pitch", "roll", "slide", "shoulder", "base"),
+    ),
+    "ur5e": (
+        tuple(
+            f"{name}_joint"
+            for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+        ),
+        (0.1, -1.5, 1.4, -1.5, -1.6, 0.2),
+        (math.pi,) * 6,
+        (),
+    ),
+    "gripper": (("knuckle",), (0.7,), (4.0,), ()),  # 0 open, 0.8 closed: it has gripped something
+}
+"""Names of the joints, where they stand, rated speeds, order of forward commands where another."""
 COMMANDS = {
     "joint_state": (JointState, "/robot_joint_command", "/robot_joint_states"),
     "forward_command": (
@@ -41,8 +60,12 @@ RATE, BANDWIDTH = 500.0, 200.0
 class Controller(Node):
     """Joints whose speed is in proportion to their distance from what they are told."""
 
-    def __init__(self, kind: str) -> None:
+    def __init__(self, kind: str, arm: str = "rcrt1", seed: str = "") -> None:
         super().__init__("plain_controller")
+        self.joints, stands, self.rated, order = ARMS[arm]
+        self.order = order or self.joints
+        chance = random.Random(seed)
+        off = [chance.uniform(-0.3, 0.3) if seed else 0.0 for _ in stands]
         message, told, says = COMMANDS[kind]
         self._sender = self.create_publisher(JointState, says, 10)
         self._witness = self.create_publisher(Float64MultiArray, "witness", 10)
@@ -53,11 +76,11 @@ class Controller(Node):
             (self.create_subscription(message, told, take, 1000), take),  # none is lost
             (self.create_subscription(String, "misbehave", self._misbehave, 10), self._misbehave),
         ]
-        self.place = dict(zip(JOINTS, STANDS, strict=True))
+        self.place = {j: s + o for j, s, o in zip(self.joints, stands, off, strict=True)}
         self.goal = dict(self.place)
         self.is_leading, self.arrival = False, 0.0
         self.first, self.largest, self.mode, self.frozen_ns = math.nan, 0.0, "", 0
-        self.speed, self.now, self.cycles = dict.fromkeys(JOINTS, 0.0), time.monotonic(), 0
+        self.speed, self.now, self.cycles = dict.fromkeys(self.joints, 0.0), time.monotonic(), 0
 
     def cycle(self) -> None:
         """Take all that has come, go on by the time since the last cycle, and say where it is."""
@@ -76,13 +99,14 @@ class Controller(Node):
     def _misbehave(self, message: String) -> None:
         self.mode, self.frozen_ns = message.data, time.time_ns()
         if self.mode == "jump":
-            self.place["base"] += 0.5
-            self.goal["base"] += 0.5
+            self.place[self.joints[0]] += 0.5
+            self.goal[self.joints[0]] += 0.5
 
     def _go(self, goal: dict[str, float]) -> None:
         start = self.goal if self.is_leading else self.place
         share = max(
-            abs(goal[n] - start[n]) / (s / RATE) for n, s in zip(JOINTS, SPEED, strict=True)
+            abs(goal[n] - start[n]) / (s / RATE)
+            for n, s in zip(self.joints, self.rated, strict=True)
         )
         if not self.is_leading:
             self.first, self.is_leading = share, True
@@ -93,7 +117,7 @@ class Controller(Node):
         self._go(dict(zip(message.name, message.position, strict=True)))
 
     def _array(self, message: Float64MultiArray) -> None:
-        self._go(dict(zip(ORDER, message.data, strict=True)))
+        self._go(dict(zip(self.order, message.data, strict=True)))
 
     def _trajectory(self, message: JointTrajectory) -> None:
         (point,) = message.points
@@ -106,14 +130,14 @@ class Controller(Node):
         passed = self.now - begun
         left = self.arrival - begun  # to the end of a trajectory's point
         share = passed / left if left > passed else 1.0 - math.exp(-BANDWIDTH * passed)
-        for name, rated in zip(JOINTS, SPEED, strict=True):
+        for name, rated in zip(self.joints, self.rated, strict=True):
             most = 1.1 * rated * passed
             way = min(max(share * (self.goal[name] - self.place[name]), -most), most)
             self.place[name] += way
             self.speed[name] = way / passed
 
     def _said(self) -> JointState:
-        names = ["finger", *JOINTS]
+        names = ["finger", *self.joints]
         if self.mode == "order":
             names.reverse()
         message = JointState(name=names)
@@ -140,7 +164,7 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: ended.append(number))
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    controller, due = Controller(sys.argv[1]), time.monotonic()
+    controller, due = Controller(*sys.argv[1:]), time.monotonic()
     # No executor: it would wait, wake and look through its entities for each message anew, and on a
     # slow machine fall ever farther behind what it is told.
     while not ended:

@@ -62,6 +62,7 @@ setup(
     ],
     extras_require={
         "mesh": ["trimesh"],
+        "urdf": ["xacro", "robot_descriptions"],
         "console": ["viser>=1.1,<1.2", "msgspec", "pygame-ce", "hidapi"],
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces", "setproctitle"],
         "test": [
@@ -76,6 +77,8 @@ setup(
             "pin",
             "mujoco",
             "trimesh",
+            "xacro",
+            "robot_descriptions",
             "roboticstoolbox-python",
             "mcap-ros2-support",
             "ruff",

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, TwistStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -22,6 +22,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
 from live_process import wait_until
+from teleop_core.kernels.geometry import framed_wrenches
 from teleop_core.nodes.children import free_domain
 from teleop_drill.conformance import Verdict
 from teleop_drill.nodes.conformance import examine, left_behind
@@ -168,6 +169,40 @@ def test_speeds_end_with_the_messages_and_hold_ends_a_move(client):
     client.send("hold", Empty())
     client.reaches(("ENABLED", True, False))
     assert client.joints()[2] > goal[2] + 0.001
+
+
+def six(wrench):
+    force, torque = wrench.force, wrench.torque
+    return np.array([force.x, force.y, force.z, torque.x, torque.y, torque.z])
+
+
+def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_stamp(client):
+    node, newest = client.peer.node, client.newest
+    for name in ("body/measured_cf", "spatial/measured_cf"):
+        node.create_subscription(WrenchStamped, f"slave/{name}", client.taker(name), 10)
+    node.create_subscription(PoseStamped, "slave/measured_cp", client.taker("measured_cp"), 10)
+    message = WrenchStamped()
+    message.wrench.force.x, message.wrench.torque.z = 2.0, 0.1
+
+    def tip():
+        p, q = newest["measured_cp"].pose.position, newest["measured_cp"].pose.orientation
+        return np.array([p.x, p.y, p.z, q.w, q.x, q.y, q.z])
+
+    def told():  # between the zeros of the simulated sensor; the pose is one of the arm at rest
+        client.send("measured_cf", message)
+        client.spin()
+        if not {"body/measured_cf", "spatial/measured_cf", "measured_cp"} <= newest.keys():
+            return None
+        body, spatial = newest["body/measured_cf"], newest["spatial/measured_cf"]
+        if spatial.wrench.force.x != 2.0 or body.header.stamp != spatial.header.stamp:
+            return None
+        expected = framed_wrenches(six(message.wrench), tip())
+        said = six(body.wrench), six(spatial.wrench)
+        return np.allclose(said, expected, rtol=0.0, atol=1e-6) and (body, spatial)
+
+    body, spatial = client.wait(told, "the force in both frames")
+    assert body.header.stamp.sec > 0
+    assert (body.header.frame_id, spatial.header.frame_id) == ("slave_tip", "slave_base")
 
 
 def test_a_disabled_master_pushes_with_no_force(peer):

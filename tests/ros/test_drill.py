@@ -1,11 +1,11 @@
 """Drill: the short form of the fault matrix, as the command that people run."""
 
-import json
 import subprocess
 import sys
 
 import pytest
 
+from drill_runs import run_drill
 from mutants import ROOT
 from teleop_drill.drill import SHORT
 
@@ -25,17 +25,6 @@ def test_a_broken_safety_is_found(name):
     command = [sys.executable, str(ROOT / "tests/mutants.py"), name, "--composed"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-def run_drill(tmp_path, *arguments):
-    """Exit code, output and outcomes by name of ``teleop drill``."""
-    file = tmp_path / "drill.json"
-    command = [sys.executable, "-m", "teleop_core.cli", "drill", *arguments, "--json", str(file)]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)
-    text = done.stdout + done.stderr
-    assert file.exists(), text
-    found = json.loads(file.read_text(encoding="utf-8"))["faults"]
-    return done.returncode, text, {one["fault"]: one for one in found}
 
 
 def test_the_short_form_of_the_fault_matrix_holds_in_five_processes(tmp_path):

@@ -13,7 +13,7 @@ from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
 from teleop_core.graph import topics
 from teleop_core.nodes.children import environment
-from teleop_core.nodes.naming import taken_names
+from teleop_core.nodes.start import taken_names
 from teleop_core.robots import load_robot
 
 pytestmark = pytest.mark.ros

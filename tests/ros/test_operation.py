@@ -154,7 +154,6 @@ def button(peer):
     peer.start("slave")
     plain = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
     peer.wait(lambda: plain.get_subscription_count() == 2, "both readers of the stop")
-    plain.publish(Bool(data=False))
     return plain
 
 
@@ -178,18 +177,42 @@ def say(button, *, pressed, released):
 
 
 def test_a_press_that_releases_follow_at_once_stops_the_arm(peer, button):
+    button.publish(Bool(data=False))
     for released in (1, 12, 30, 100) * 3:
         say(button, pressed=1, released=released)
         peer.wait(lambda: state(peer) is State.FAULT, f"FAULT before {released} releases")
         go_on(peer)
 
 
-@pytest.mark.parametrize("released", [35, 6000])
-def test_a_press_while_the_slave_stands_still_stops_the_arm(peer, button, released):
+@pytest.fixture
+def still_slave(peer, button):
+    """Function that stops the process of a slave that knows the button, and returns it."""
     slave = psutil.Process(peer.nodes[0].process.pid)
-    slave.send_signal(signal.SIGSTOP)
-    peer.wait(lambda: slave.status() == psutil.STATUS_STOPPED, "a slave that stands still")
+
+    def stand_still():
+        slave.send_signal(signal.SIGSTOP)
+        peer.wait(lambda: slave.status() == psutil.STATUS_STOPPED, "a slave that stands still")
+        return slave
+
+    return stand_still
+
+
+@pytest.mark.parametrize("released", [35, 6000])
+def test_a_press_while_the_slave_stands_still_stops_the_arm(peer, button, still_slave, released):
+    say(button, pressed=0, released=1)
+    slave = still_slave()
     say(button, pressed=5, released=released)
+    slave.send_signal(signal.SIGCONT)
+    peer.wait(lambda: state(peer) is State.FAULT, "FAULT after the stall")
+    go_on(peer)
+
+
+@pytest.mark.parametrize("released", [100, 6000])
+def test_a_press_that_is_the_first_word_of_a_button_is_heard_though_it_was_lost(
+    peer, button, still_slave, released
+):
+    slave = still_slave()
+    say(button, pressed=1, released=released)
     slave.send_signal(signal.SIGCONT)
     peer.wait(lambda: state(peer) is State.FAULT, "FAULT after the stall")
     go_on(peer)

@@ -83,7 +83,11 @@ def test_every_teleop_command_parses_with_its_settings(name):
 
 
 @pytest.mark.slow
-def test_every_session_of_a_documented_command_can_be_begun():
+def test_every_session_of_a_documented_command_can_be_begun(tmp_path, monkeypatch):
+    for name in ("bags", "config", "examples"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    (tmp_path / "my_arm.urdf").symlink_to(ROOT / "examples/ur5e.urdf")  # "yours" of a document
+    monkeypatch.chdir(tmp_path)
     parsers = next(action.choices for action in _parser()._actions if action.dest == "command")
     helps = "\n".join(parser.format_help() for parser in parsers.values())
     shown = re.findall(r"^ +teleop (.+?)(?:  .*)?$", helps, re.MULTILINE)

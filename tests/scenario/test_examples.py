@@ -53,6 +53,16 @@ def test_own_architecture_feels_force_as_position_force_does_and_less_drag(tmp_p
     assert felt[3] >= felt[1] > 2.0 * felt[2]
 
 
+def test_more_channels_keep_a_late_hand_calm_and_the_fourth_lets_the_tip_go_where_it_is_led(
+    tmp_path,
+):
+    text = run("channels", tmp_path)
+    fastest, way = numbers(r"most (\d+) mm/s", text), numbers(r"(-?[\d.]+) mm from", text)
+    assert fastest[1] > 2.0 * max(fastest[5], fastest[7])
+    assert abs(way[6]) < 0.1
+    assert way[4] > 1.0
+
+
 def test_delay_takes_least_of_what_waves_let_feel_and_they_alone_press_no_harder(tmp_path):
     text = run("far_touch", tmp_path)
     felt, most = numbers(r"feels ([\d.]+) N", text), numbers(r"tip ([\d.]+) N at most", text)
@@ -83,6 +93,17 @@ def test_a_tool_keeps_to_its_port_within_a_millimetre(tmp_path):
     assert len(off) == 2
     assert 0.0 < max(off) < 0.6
     assert max(off) < max(most) < 2.0
+
+
+def test_a_block_is_carried_where_the_fingers_hold_it_and_lost_where_they_do_not(tmp_path):
+    text = run("pick", tmp_path)
+    ways, force = numbers(r"carried (-?[\d.]+) mm", text), numbers(r"drops, ([\d.]+) N", text)
+    slips = numbers(r"(\d+) slips", text)
+    assert ways[0] == pytest.approx(30.0, abs=1.0)
+    assert slips[0] == 0
+    assert ways[2] == pytest.approx(0.0, abs=0.5)  # 2 x 0.05 x 3.86 N < 0.49 N, its weight
+    assert slips[2] == 1
+    assert max(force) < 5.0
 
 
 def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path):

@@ -1,6 +1,7 @@
 """Robots from files in recordings: what is replayed and scored is the arm that moved."""
 
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import teleop_core as tc
 from teleop_core.bags.arms import of_arm
 from teleop_core.bags.kept_files import recorded_files
+from teleop_core.base.errors import ParameterError
 from teleop_core.cli import main
 from teleop_core.session.runner import recorded_configuration
 
@@ -24,7 +26,15 @@ rows:
   - {a: 0.3, d: -q, lower: 0.0, upper: 0.2, home: 0.1}
   - {theta: q}
 """
-ROBOTS = {"arm.urdf": (URDF, ["tip=tool0"]), "scara.yaml": (TABLE, [])}
+XACRO = URDF.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ').replace(
+    '<link name="base"/>',
+    '<link name="base"/><xacro:arg name="lift" default="0"/><!-- <xacro:arg/> ${1 / 0} -->',
+).replace('xyz="0 0 0.42"', 'xyz="0 0 ${0.4 + $(arg lift)}"')  # fmt: skip
+ROBOTS = {
+    "arm.urdf": (URDF, ["tip=tool0"]),
+    "scara.yaml": (TABLE, []),
+    "arm.xacro": (XACRO, ["tip=tool0", "xacro.lift=0.05"]),
+}
 
 
 def gone(path):
@@ -33,7 +43,7 @@ def gone(path):
 
 def longer(path):
     path.write_text(re.sub(r"\b0\.(3|4)\b", r"0.\g<1>3", path.read_text()))
-    assert path.read_text() not in (URDF, TABLE)
+    assert path.read_text() not in (URDF, TABLE, XACRO)
 
 
 def no_text(path):
@@ -56,11 +66,12 @@ def replayed(bag, prefix=""):
 @pytest.mark.parametrize("becomes", [gone, longer, no_text])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_session_replays_to_the_bit_whatever_became_of_the_file_of_its_robot(
-    name, becomes, tmp_path
+    name, becomes, tmp_path, monkeypatch
 ):
     recording, path = recorded(tmp_path, name)
     before = replayed(recording.path)
     becomes(path)
+    monkeypatch.setitem(sys.modules, "xacro", None)  # as where it is not installed
     np.testing.assert_array_equal(replayed(recording.path), before)
     again = tc.replay(recording.path, out=tmp_path / "again")  # which holds the arm as well
     np.testing.assert_array_equal(replayed(again.path), before)
@@ -103,6 +114,23 @@ def test_a_file_that_says_what_it_said_is_read_where_it_lies(tmp_path):
     assert Path(copy).name == path.name
     assert Path(copy).read_text() == URDF
     assert recorded_configuration(recording.bag)[0]["slave"]["robot"] == copy
+
+
+def test_nothing_of_a_recording_is_expanded(tmp_path):
+    kept = {"robot": str(tmp_path / "arm.xacro"), "robot_file": XACRO}
+    with pytest.raises(ParameterError, match=r"xyz of joint \w+ is '0 0 \$"):
+        tc.load_robot(recorded_files(kept)[kept["robot"]], tip="tool0")
+
+
+def test_of_a_xacro_the_urdf_is_recorded_that_its_arguments_made(tmp_path):
+    recording, path = recorded(tmp_path, "arm.xacro")
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(recording.metadata["robot_file"])
+    assert 'xyz="0 0 0.45"' in urdf.read_text()
+    one = tc.load_robot(str(path), **{"xacro.lift": "0.05"}, tip="tool0")
+    np.testing.assert_array_equal(
+        one.fk(one.home), tc.load_robot(str(urdf), tip="tool0").fk(one.home)
+    )
 
 
 def test_robots_of_a_name_store_no_file(tmp_path):

@@ -149,4 +149,4 @@ def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(wrong)
 
 def test_an_unknown_architecture_is_refused_with_those_there_are():
     with pytest.raises(UnknownNameError, match="position_position"):
-        configure("palpation", settings=["reflection.architecture=four_channel"])
+        configure("palpation", settings=["reflection.architecture=five_channel"])

@@ -170,6 +170,27 @@ def test_an_arm_that_jumped_is_commanded_nothing_while_it_is_enabled():
     assert made.hear(home_sample(made, now + 4 * MS), now + 4 * MS)
 
 
+def test_an_arm_that_the_server_left_behind_is_not_passed_on_while_it_is_enabled():
+    made, now = bridge(), 10**9
+    made.signals["slave_operation"][0] = State.ENABLED
+    there = home_sample(made, now)
+
+    def hear(time_ns):
+        return made.hear(Sample(there.names, there.position, (), (), time_ns), time_ns)
+
+    made.signals["slave_setpoint_js"][0] += 0.1  # the server was heard too late
+    assert hear(now)
+    assert made.command(now + MS, 0.0, True) is None
+    assert hear(now + 50 * MS)
+    assert not hear(now + 150 * MS)
+    made.signals["slave_setpoint_js"][0] -= 0.1  # it comes by, on its way elsewhere
+    assert made.command(now + 151 * MS, 0.0, True) is None
+    assert "to begin" in made.trouble()
+    made.signals["slave_operation"][0] = State.FAULT
+    assert hear(now + 152 * MS)
+    assert made.command(now + 153 * MS, 0.0, True) is not None
+
+
 @pytest.mark.parametrize("rate", RATES)
 def test_commands_go_out_at_the_rate_that_was_asked_for(rate):
     made = bridge(rate=rate)

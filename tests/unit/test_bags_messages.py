@@ -43,13 +43,14 @@ def joint_state(names, position, velocity=(), effort=()) -> Record:
 
 @pytest.mark.parametrize("kind", [kind for kind in Kind if kind is not Kind.REPORT])
 def test_reading_gives_back_what_was_written(kind):
+    names = ("jaw",) if kind is Kind.JAW else ("a", "b")
     values = np.arange(1.0, 1.0 + kind.width(2))
     message = write_values(
-        kind, empty_message(kind), 3_000_000_004, values, frame_id="f", joint_names=("a", "b")
+        kind, empty_message(kind), 3_000_000_004, values, frame_id="f", joint_names=names
     )
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
     assert message.header.frame_id == "f"
-    stamp_ns, read = read_values(kind, message, ("a", "b"))
+    stamp_ns, read = read_values(kind, message, names)
     assert stamp_ns == 3_000_000_004
     np.testing.assert_array_equal(read, values)
 

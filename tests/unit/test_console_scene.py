@@ -11,6 +11,7 @@ import teleop_core as tc
 from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.console.body_nodes import ROLES
 from teleop_core.console.fixture_outlines import Look, scale_of, unit_outline
+from teleop_core.console.jaw_nodes import finger_poses
 from teleop_core.console.link import Arm, ArmView, View
 from teleop_core.console.look import GOOD, WRONG
 from teleop_core.console.recorded import RecordedLink
@@ -355,3 +356,44 @@ def test_without_an_object_none_is_drawn_and_one_without_a_place_lies_below_the_
     assert not len(object_outline({"kind": "not installed here"}, robot))
     foreign = {"kind": "sphere", "elsewhere.radius": 0.1, "sphere.radius": 0.01}
     assert len(object_outline(foreign, robot))
+
+
+def test_two_fingers_stand_at_the_tip_as_far_apart_as_the_jaw_is_open_and_the_block_where_it_is(
+    server, link
+):
+    picked = tc.run("pick", duration=6.0)
+    scene, view = drawn(server, RecordedLink(picked.bag), picked.duration - 0.1)
+    jaw, seen = scene.arms[""].jaw, view.arms[""].streams
+    np.testing.assert_allclose(jaw.block.position, seen["slave/jaw/object_cp"][:3], atol=STILL)
+    ends = [node.position + 0.02 * turned(node)[:, 2] for node in jaw.fingers]
+    angle = seen["slave/jaw/measured_js"][0]
+    width = 2.0 * 0.04 * np.sin(0.5 * angle)
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(width, abs=1e-4)
+    np.testing.assert_allclose(np.mean(ends, axis=0), seen["slave/true_cp"][:3], atol=1e-3)
+    begins = [node.position - 0.02 * turned(node)[:, 2] for node in jaw.fingers]
+    np.testing.assert_allclose(begins[0], begins[1], atol=1e-4)  # they turn about one pivot
+    none, _ = drawn(server, link, 3.0)
+    assert not none.arms[""].jaw.fingers
+    assert none.arms[""].jaw.block is None
+
+
+def test_every_block_and_every_peg_of_a_board_is_drawn_where_it_stands(server):
+    carried = tc.run("peg_transfer", duration=17.0)
+    scene, view = drawn(server, RecordedLink(carried.bag), carried.duration - 0.1)
+    jaw = scene.arms[""].jaw
+    board = view.arms[""].streams["slave/jaw/board"]
+    assert board[0] == 1.0  # the first one stands on another peg
+    found = [jaw.blocks[i].position for i in sorted(jaw.blocks)]
+    np.testing.assert_allclose(found, board[3:12].reshape(3, 3), atol=STILL)
+    axes = [[x, y] for y in (-0.2357, -0.2757) for x in (0.231, 0.256, 0.281)]
+    np.testing.assert_allclose([node.position[:2] for node in jaw.pegs], axes, atol=STILL)
+    feet = [node.position[2] - 0.5 * node.dimensions[2] for node in jaw.pegs]
+    np.testing.assert_allclose(feet, board[5] - 0.01, atol=STILL)  # where blocks stand
+
+
+def test_the_pads_are_at_the_tip_whatever_the_angle():
+    tip = np.array([0.3, -0.1, 0.2, 0.5, 0.5, -0.5, 0.5])
+    for angle in (0.0, 0.4, 1.0):
+        poses = finger_poses(tip, angle, 0.04)
+        pads = poses[:, :3] + 0.02 * rotations_from_quaternions(poses[:, 3:])[:, :, 2]
+        np.testing.assert_allclose(pads.mean(axis=0), tip[:3], atol=1e-12)

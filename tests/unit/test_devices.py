@@ -32,7 +32,7 @@ class Session:
     def __init__(self, room=None, **parameters):
         self.hand = RemoteHand(room=room)
         self.pilot = Pilot(self.hand, PilotParameters(**parameters))
-        self.rows, self._looks = np.zeros((0, 12)), 0
+        self.rows, self._looks = np.zeros((0, 13)), 0
 
     def for_time(self, duration, reading):
         for _ in range(round(duration / DT / AHEAD)):
@@ -138,6 +138,36 @@ def test_no_device_is_told_in_one_line_that_lists_what_was_found(name):
         operator.opens(parameters)
 
 
+# -- the jaw ---------------------------------------------------------------------------------------
+
+
+def closed(run, share):
+    """How far the hand closes the jaw a tenth of a second after the device said a share."""
+    return run.for_time(0.1, Reading(np.zeros(6), jaw=share))[-1, 12]
+
+
+def test_the_jaw_is_closed_as_far_as_the_device_says_whether_the_stylus_is_held_or_not():
+    run = Session()
+    assert [closed(run, share) for share in (0.0, 0.4, 1.0, 0.2)] == [0.0, 0.4, 1.0, 0.2]
+    assert [closed(run, share) for share in (1.5, -0.5)] == [1.0, 0.0]
+
+
+def test_a_device_that_comes_back_opens_the_jaw_only_after_it_was_closed_as_far_as_before():
+    run = Session()
+    assert closed(run, 0.8) == 0.8
+    run.pilot.lose()
+    assert [closed(run, share) for share in (0.0, 0.7)] == [0.8, 0.8]
+    assert [closed(run, share) for share in (0.9, 0.0)] == [0.9, 0.0]
+
+
+def test_a_device_that_leads_no_jaw_and_one_that_says_no_number_leave_it_as_it_is():
+    run = Session()
+    closed(run, 0.8)
+    assert closed(run, None) == 0.8
+    run.hand.close(np.nan)
+    assert closed(run, None) == 0.8
+
+
 # -- 3-D mouse -------------------------------------------------------------------------------------
 
 
@@ -226,7 +256,7 @@ def gamepad(pad):
 def test_a_gamepad_at_rest_says_nothing(gamepad):
     reading = gamepad.read()
     assert (beyond(reading.rates, 0.12) == 0.0).all()
-    assert reading[1:] == (False, False, False)
+    assert reading[1:] == (False, False, False, None)
 
 
 @pytest.mark.parametrize(
@@ -245,12 +275,25 @@ def test_each_stick_of_a_gamepad_moves_or_turns_along_its_axis(pad, gamepad, axi
 def test_buttons_of_a_gamepad(pad, gamepad):
     for button, place in (("left shoulder", 1), ("right shoulder", 1), ("a", 2), ("b", 3)):
         pad.press(button)
-        pressed = gamepad.read()[1:]
+        pressed = gamepad.read()[1:4]
         assert pressed == tuple(place == k for k in (1, 2, 3))
         pad.press(button, is_pressed=False)
         assert not any(gamepad.read()[1:])
     pad.press("up")
     assert gamepad.read().rates[3] == -1.0
+
+
+def test_the_right_trigger_closes_the_jaw_where_that_is_wanted_and_rolls_no_more(pad):
+    from teleop_core.chain.devices.gamepad import GamepadParameters, open_gamepad
+
+    made = open_gamepad(GamepadParameters(device="virtual", triggers="jaw"))
+    try:
+        for trigger, share, jaw in (("left", 1.0, 0.0), ("right", 0.0, 0.5), ("right", 1.0, 1.0)):
+            pad.move(f"{trigger} trigger", share)
+            assert made.read().jaw == pytest.approx(jaw, abs=1e-3)
+            assert made.read().rates[5] == 0.0
+    finally:
+        made.close()
 
 
 def test_a_gamepad_that_is_unplugged_is_gone(pad, gamepad):

@@ -262,6 +262,17 @@ def test_an_arm_that_goes_on_goes_neither_faster_nor_slower_than_the_hand(joints
     assert wrong("loss", seen(joints)) == names
 
 
+def test_an_arm_follows_where_its_joints_go_and_not_where_its_setpoints_alone_do():
+    wanted, limit = round_and_round()[:60], NUMBERS.speed_limit
+    rng = np.random.default_rng(3)
+    still = wanted[:1] + 1e-6 * limit * rng.standard_normal(wanted.shape)
+    late = wanted - 40 * (wanted[1] - wanted[0])
+    assert measure.follows(wanted, late, limit)
+    assert not measure.follows(wanted, still, limit)
+    assert not measure.follows(still[:1].repeat(60, axis=0), wanted, limit)
+    assert not measure.follows(wanted, wanted[:20], limit)
+
+
 def test_measured_joints_that_are_not_where_the_tip_is_are_found():
     assert wrong("loss", seen(round_and_round(), lies=0.5)) == ["apart_m"]
 

@@ -26,6 +26,10 @@ from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
     REMOTE_CENTRE,
+    SLAVE_JAW_BOARD,
+    SLAVE_JAW_GRIP,
+    SLAVE_JAW_MEASURED_JS,
+    SLAVE_JAW_SERVO_JP,
     SLAVE_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_REACH,
@@ -214,6 +218,48 @@ def test_a_tool_that_follows_misses_its_remote_centre_by_the_distance_of_its_sha
     assert score.value("remote_centre.off_rms_mm") == pytest.approx(12.5**0.5, abs=EXACT_MM)
     least = 1e3 * np.hypot(3e-3, 0.10)
     assert score.value("remote_centre.least_depth_mm") == pytest.approx(least, abs=EXACT_MM)
+
+
+def test_grips_slips_and_drops_of_the_recording_count_and_the_delay_is_from_hand_to_grip(
+    recipe, path
+):
+    count = len(recipe.stamps)
+    grip, asked = np.zeros((count, 6)), np.full((count, 1), 0.8)
+    grip[:, 3:] = [7.0, 5.0, 3.0]  # what was before
+    for begin, push in ((300, 4.0), (900, 6.0)):
+        asked[begin - 100 : begin - 50, 0] = np.linspace(0.8, 0.0, 51)[1:]  # closes for 50 ms
+        asked[begin - 50 : begin + 200, 0] = 0.0
+        grip[begin : begin + 200, :2] = push, 1.0
+        grip[begin:, 3] += 1.0
+    grip[1000:, 4:] += [1.0, 2.0]
+    topics = {SLAVE_JAW_GRIP: grip, SLAVE_JAW_SERVO_JP: asked, SLAVE_JAW_MEASURED_JS: grip[:, :3]}
+    recipe.topics += topics
+    recipe.rows |= {t: (recipe.stamps, rows, recipe.stamps) for t, rows in topics.items()}
+    score = evaluate(recipe.write(path))
+    names = ("grips", "slips", "drops", "peak_force_n")
+    assert [score.value(f"jaw.{name}") for name in names] == [2, 1, 2, 6.0]
+    assert score.value("jaw.delay_s") == pytest.approx(0.1, abs=1e-9)
+
+
+def test_a_transfer_takes_from_the_last_grip_to_rest_and_what_was_before_does_not_count(
+    recipe, path
+):
+    count = len(recipe.stamps)
+    grip, board = np.zeros((count, 6)), np.zeros((count, len(SLAVE_JAW_BOARD.columns)))
+    grip[:, 3], board[:, :2] = 7.0, [4.0, 2.0]  # what was before
+    for begin in (300, 600, 900):
+        grip[begin:, 3] += 1.0
+    board[:, 2] = np.where(np.arange(count) == 650, 1.25, 0.0)
+    board[500:, 0] += 1.0  # 200 ms after the first grip
+    board[1000:, 0] += 1.0  # 100 ms after the last one
+    board[700:, 1] += 1.0
+    topics = {SLAVE_JAW_GRIP: grip, SLAVE_JAW_BOARD: board}
+    recipe.topics += topics
+    recipe.rows |= {t: (recipe.stamps, rows, recipe.stamps) for t, rows in topics.items()}
+    score = evaluate(recipe.write(path))
+    names = ("transferred", "dropped", "peak_pull_n")
+    assert [score.value(f"transfer.{name}") for name in names] == [2, 1, 1.25]
+    assert score.value("transfer.time_s") == pytest.approx(0.15, abs=1e-9)
 
 
 # -- latency, ticks, gaps --------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from teleop_core.base.parameters import build
 from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.robots import load_robot
 from teleop_core.slave.commands import CommandStatus
-from teleop_core.slave.operation import Fault, State
+from teleop_core.slave.operation import Event, Fault, State
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 from teleop_core.slave.slave import Slave, SlaveParameters
 
@@ -95,6 +95,30 @@ def test_a_longer_silence_of_the_arm_is_a_fault_whose_setpoint_stands_still():
     assert Fault(int(led.slave.operation["fault"])) is Fault.FEEDBACK
     assert led.slave.operation["fault_bound"] == 0.5
     assert np.array_equal(led.tick(follows=True), still)
+
+
+def test_an_arm_that_was_lost_is_led_from_where_it_is_found_and_only_when_it_is_enabled_again():
+    led = following(**{"operation.longest_silence": 0.5})
+    for _ in range(600):
+        held = led.tick(speaks=False, follows=True)
+    there = np.clip(
+        held + 0.1, ARM.lower, ARM.upper
+    )  # a bridge that died let it stand while the server braked
+    found = [held, *(led.tick(there, follows=True) for _ in range(3000))]
+    near = led.slave.parameters["near"]
+    assert (np.abs(found[-1] - there) <= near).all()
+    steps = np.abs(np.diff(found, axis=0))
+    assert (steps <= LIMIT * DT * (1.0 + 1e-9)).all()
+    for _ in range(100):  # once: an arm that sags under its load is not followed down
+        assert np.array_equal(led.tick(there - 2.0 * near, follows=True), found[-1])
+    assert Fault(int(led.slave.operation["fault"])) is Fault.FEEDBACK
+    for event in (Event.RESET, Event.ENABLE):
+        led.slave.request(event.name.lower())
+    led.commanded = found[-1].copy()
+    goes_on = [found[-1], *(led.tick(follows=True) for _ in range(300))]
+    assert led.state is State.ENABLED
+    assert (np.abs(np.diff(goes_on, axis=0)) <= LIMIT * DT * (1.0 + 1e-9)).all()
+    assert (goes_on[-1] < found[-1]).all()
 
 
 def test_a_move_that_the_arm_did_not_see_goes_on_to_its_goal_once_it_speaks_again():

@@ -74,6 +74,7 @@ def test_fitted_spread_of_the_runs_is_the_measured_one(found):
     assert ((ratio > 0.7) & (ratio < 1.3)).all()
 
 
+@pytest.mark.soak
 def test_numbers_that_made_rests_come_back_from_them(published):
     inside = np.clip(published.targets, ARM.lower, ARM.upper)
     truth = {"coulomb": (0.15, 0.4, 1.0, 0.01, 0.0012, 0.0009), "bias": (-0.05,) + (0.0,) * 5,
@@ -91,10 +92,8 @@ def test_numbers_that_made_rests_come_back_from_them(published):
 
 
 def test_plain_squares_believe_point_1_and_weigh_less(published, found):
-    free = ["coulomb.theta2", "weight.m2b_L0b"]
-    robust, plain = (fit(published, slave(), free, loss=loss) for loss in ("cauchy", "linear"))
-    assert robust.value("weight.m2b_L0b") == pytest.approx(found.value("weight.m2b_L0b"), rel=0.05)
-    assert plain.value("weight.m2b_L0b") < 0.6 * robust.value("weight.m2b_L0b")
+    plain = fit(published, slave(), ["coulomb.theta2", "weight.m2b_L0b"], loss="linear")
+    assert plain.value("weight.m2b_L0b") < 0.6 * found.value("weight.m2b_L0b")
 
 
 def test_an_unknown_loss_is_refused(published):

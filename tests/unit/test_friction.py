@@ -37,8 +37,8 @@ class Joint:
         for k in range(count):
             self.q[1:3] = self.slave.robot.home[1:3]
             self.dq[:3] = 0.0
-            integrate(arm.acceleration, arm.dynamics, self.p, self.s, self.steps, self.effort,
-                      self.q, self.dq, DT)  # fmt: skip
+            integrate(arm.acceleration, arm.dynamics, self.p, self.s, arm.contacts, self.steps,
+                      self.effort, self.q, self.dq, DT)  # fmt: skip
             found[k] = self.q[JOINT]
         return found
 

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pinocchio
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels import geometry, kernel
+from teleop_core.robots import load_robot
 
 # Sums of a few products of numbers of size one.
 ROUNDING = 1e-14
@@ -29,6 +31,43 @@ vectors = st.tuples(*[st.floats(-4.0, 4.0)] * 3).map(np.array)
 @kernel
 def angle_between(a, b):
     return geometry.rotation_angle_between(a, b)
+
+
+@given(quaternions, vectors, vectors, vectors, vectors, vectors)
+def test_a_force_has_the_same_power_in_the_frames_of_tip_and_base(q, place, force, torque, v, w):
+    """Each with the twist of its own frame (Murray, Li and Sastry 1994, section 2.5)."""
+    pose = np.concatenate((place, q))
+    body, spatial = geometry.framed_wrenches(np.concatenate((force, torque)), pose)
+    turn = Rotation.from_quat(q, scalar_first=True)
+    of_tip = np.concatenate((turn.inv().apply(v), turn.inv().apply(w)))
+    at_base = np.concatenate((v - np.cross(w, place), w))
+    power = force @ v + torque @ w
+    assert body @ of_tip == pytest.approx(power, abs=1e3 * ROUNDING)
+    assert spatial @ at_base == pytest.approx(power, abs=1e3 * ROUNDING)
+
+
+@given(quaternions, vectors, vectors, vectors)
+def test_a_force_is_brought_from_tip_to_base_as_pinocchio_does(q, place, force, torque):
+    wrench, pose = np.concatenate((force, torque)), np.concatenate((place, q))
+    body, spatial = geometry.framed_wrenches(wrench, pose)
+    found = pinocchio.SE3(matrix_of(q), place).act(pinocchio.Force(body))
+    np.testing.assert_allclose(found.vector, spatial, atol=1e2 * ROUNDING)
+
+
+def test_a_force_in_another_frame_needs_the_same_effort_of_every_joint():
+    """As dVRK has it: each is what its own Jacobian's transpose turns into the joints' efforts."""
+    robot = load_robot("rcrt1")
+    pose = np.empty(7)
+    T = robot.fk(robot.home)
+    geometry.pose_from_transform(T, pose)
+    wrench = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
+    J = robot.jacobian(robot.home)  # linear rows first, along the base, of the tip
+    body, spatial = geometry.framed_wrenches(wrench, pose)
+    R = np.kron(np.eye(2), T[:3, :3].T)
+    of_base = J.copy()
+    of_base[:3] -= np.cross(J[3:].T, T[:3, 3]).T
+    np.testing.assert_allclose((R @ J).T @ body, J.T @ wrench, atol=TWICE_ROUNDED)
+    np.testing.assert_allclose(of_base.T @ spatial, J.T @ wrench, atol=TWICE_ROUNDED)
 
 
 def matrix_of(quaternion):

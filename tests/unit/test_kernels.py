@@ -9,6 +9,7 @@ import pytest
 
 from teleop_core.kernels import (
     IS_COMPILED,
+    apart,
     bound,
     inner,
     is_kernel,
@@ -149,6 +150,51 @@ def test_kernel_from_source_calls_what_it_is_given_and_is_made_once():
     assert made(2.0) == 24.0
     assert kernel_from_source(text, "twice", {"polynomial": polynomial, "FACTOR": 2.0}) is made
     assert kernel_from_source(text, "twice", {"polynomial": polynomial, "FACTOR": 3.0})(2.0) == 36.0
+
+
+@kernel
+def turned(product, q, out):
+    product(q, q, out)
+
+
+@kernel
+def take_all(source, target):
+    target[:] = source
+
+
+@kernel
+def hand_on(take, source, target):
+    take(source, target)
+
+
+def test_kernel_that_stands_apart_gives_the_bits_of_one_whose_code_is_copied():
+    q, here, there = np.array([0.1, 0.7, -0.5, 0.3]), np.empty(4), np.empty(4)
+    multiply_quaternions(q, q, here)
+    turned(apart(multiply_quaternions, q, q, there), q, there)
+    assert here.tolist() == there.tolist()
+
+
+@compiled_only
+def test_code_of_a_kernel_that_stands_apart_is_not_in_its_caller():
+    product = uncached("@kernel\ndef product(x):\n    return x * x\n", "product")
+    call = uncached("@kernel\ndef call(product, x):\n    return product(x)\n", "call")
+    assert call(apart(product, 3.0), 3.0) == 9.0
+    assert ["fmul" in text for text in product.inspect_llvm().values()] == [True]
+    assert ["fmul" in text for text in call.inspect_llvm().values()] == [False]
+
+
+def test_what_a_kernel_that_stands_apart_raises_comes_to_its_caller():
+    long, short = np.ones(3), np.empty(2)
+    with pytest.raises(ValueError, match=r"size|shape"):
+        hand_on(apart(take_all, long, short), long, short)
+
+
+def test_kernel_that_makes_an_array_is_called_by_a_generated_one_that_is_compiled_before_it():
+    text = "@kernel\ndef swapped(x, y):\n    pair = np.empty(2)\n    pair[0], pair[1] = y, x\n"
+    space = {"kernel": kernel, "np": np}
+    exec(text + "    return pair[0] - pair[1]\n", space)
+    source = "def call(x, y):\n    return swapped(x, y)\n"
+    assert kernel_from_source(source, "call", {"swapped": space["swapped"]})(1.0, 3.0) == 2.0
 
 
 def test_traceback_of_generated_source_shows_its_line():

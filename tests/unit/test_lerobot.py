@@ -199,8 +199,10 @@ def test_both_sides_refuse_what_they_cannot_use(slave):
 def test_class_for_lerobot_has_what_its_documents_ask_for(package, base, names):
     tree = ast.parse((PACKAGE / package / "__init__.py").read_text())
     classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
-    device = next(c for c in classes.values() if [ast.unparse(b) for b in c.bases] == [base])
+    bases = ["Connection", base]  # in this order: what is shared stands in for LeRobot's abstract
+    device = next(c for c in classes.values() if [ast.unparse(b) for b in c.bases] == bases)
     defined = {node.name for node in device.body if isinstance(node, ast.FunctionDef)}
+    defined |= set(vars(sides.Connection))
     defined |= {n.targets[0].id for n in device.body if isinstance(n, ast.Assign)}
     assert defined >= names
     assert f"{device.name}Config" in classes  # LeRobot finds the class by this name

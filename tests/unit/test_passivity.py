@@ -170,6 +170,49 @@ def test_a_command_goes_against_the_force_as_far_as_credit_and_hand_pay_for(step
     assert height == pytest.approx(-step * k, abs=1e-6)
 
 
+def test_drift_goes_by_the_way_on_which_the_hand_comes_back_and_drives_the_arm_nowhere():
+    command, step = slave_law(), 1e-4
+    for k in range(300):
+        height = command(-step * k)[1]
+    waits = height
+    for k in range(299, -1, -1):  # back, in the air
+        port, given = command(-step * k, push=0.0)
+        assert given >= height - 0.03 * 1e-3 - 1e-15
+        if -step * k <= waits:
+            assert given <= waits + 1e-12
+        height = given
+    assert not port[DRIFT : DRIFT + 3].any()
+    assert height == 0.0
+
+
+@pytest.mark.parametrize(
+    ("moved", "met"), [((3e-3, 0, 0), 0), ((0, 0, -1e-3), 0), ((3e-3, 0, 1e-3), 1e-3)]
+)
+def test_only_the_way_against_its_drift_brings_the_hand_back(moved, met):
+    port, last, air = np.zeros(len(ENERGY)), np.array([0.0, 0, 0, 1, 0, 0, 0]), np.zeros(6)
+    begin_round(port, 2.0, 1.0)
+    port[DRIFT + 2] = -5e-3
+    command = np.array([moved[0], 0.0, moved[2] - 5e-3, 1, 0, 0, 0])
+    numbers = np.array([0.2, 0.0, 0.01, 1e-3, 2.0])  # else no drift is made up for
+    tdpa_slave(numbers, np.zeros(12), np.zeros(3), air, last, port, port, command, 1e-3)
+    assert port[DRIFT + 2] == pytest.approx(met - 5e-3, rel=1e-9)
+    assert command[2] == pytest.approx(moved[2] - met, abs=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_exact_arm_gives_a_spring_no_more_than_credit_however_the_hand_goes(seed):
+    """The tip is where its command is; the way of the last tick is counted with the next one."""
+    rng, command, force = np.random.default_rng(seed), slave_law(), 0.0
+    stiffness, height, tip, into, out = 10.0 ** rng.uniform(2.0, 4.0), 0.0, 0.0, 0.0, 0.0
+    for speed in np.repeat(rng.normal(0.0, 2e-5, 60), 50):
+        height += speed
+        before, tip = tip, min(command(height, into=into, out=out, push=force)[1], 0.0)
+        pushed = 0.5 * stiffness * (before**2 - tip**2)  # what the spring gave
+        into, out, force = max(pushed, 0.0), max(-pushed, 0.0), -stiffness * tip
+        # Nobody knew by how much the force grows in a tick: the last one whole, others by 0.1 %.
+        assert 0.5 * stiffness * (tip**2 - (before - tip) ** 2) <= 1.001e-3
+
+
 def test_a_touch_that_is_over_leaves_nothing_in_the_tank():
     memory, port, push, still = np.zeros(12), np.zeros(len(ENERGY)), np.zeros(3), np.zeros(3)
 
@@ -224,9 +267,14 @@ def test_with_another_passivity_energies_begin_anew_while_a_session_runs():
 
 STEP = 55e-6
 """Step of the device's reading [m]."""
+YIELDING = {
+    name: (f"reflection.architecture={name}", "teleop.stages=[network,impedance,passivity]")
+    for name in ("three_channel", "four_channel")
+}
+"""Settings of architectures before a slave that yields."""
 
 
-def drawn(rng, kind):
+def drawn(rng, kind, architecture="position_force"):
     """Settings of a session drawn at random: world, gains, hand and network."""
     stiffness = 10.0 ** rng.uniform(1.5, 4.7)
     there = rng.uniform(0.0, 0.5)
@@ -243,7 +291,8 @@ def drawn(rng, kind):
         f"world.damping={rng.choice([0.0, 0.5])}", f"hand.stiffness={rng.uniform(100.0, 1000.0)}",
         f"world.friction_coefficient={rng.choice([0.0, 0.5])}", f"seed={rng.integers(1000)}",
         f"operator.kind={rng.choice(['line', 'human', 'circle'])}",
-        f"position_force.force_gain={rng.uniform(0.3, 3.0)}", *ways,
+        f"{architecture}.force_gain={rng.uniform(0.3, 3.0)}", *ways,
+        *YIELDING.get(architecture, ()),
     )  # fmt: skip
 
 
@@ -293,16 +342,18 @@ def left_at_the_hand(rows, scale):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("architecture", ["position_force", "three_channel", "four_channel"])
 @pytest.mark.parametrize("kind", ["tank", "tdpa"])
-def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(kind):
+def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(kind, architecture):
     """Delay to 1 s there and back, jitter, loss to a half, 30 N/m to 50 kN/m, any grip."""
     rng = np.random.default_rng(7)
     for _ in range(10):
-        texts = drawn(rng, kind)
+        texts = drawn(rng, kind, architecture)
         rows = pressing(*texts, ticks=9000)
         force = np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1)
         assert force.max() <= 3.3 + 1e-9, texts
-        assert fastest(rows) < 0.2, texts
+        # A far spring drags before it lets go: what a hand then gets it has put into the tank.
+        assert fastest(rows) < (0.2 if architecture == "position_force" else 0.3), texts
         check_ports(rows)
         if kind == "tank":
             assert gained(rows) < 3.3 * STEP, texts
@@ -320,3 +371,15 @@ def steel(kind):
 def test_steel_throws_a_hand_50_ms_away_and_passivity_keeps_it():
     assert steel("none") > 0.15
     assert steel("tdpa") < 0.06
+
+
+@pytest.mark.parametrize("kind", ["tank", "tdpa"])
+def test_four_channels_100_ms_away_give_the_hand_no_energy_and_the_slave_none_that_is_unpaid(kind):
+    late = ("network.there.least_delay=0.05", "network.back.least_delay=0.05")
+    rows = pressing(
+        f"reflection.passivity={kind}", *YIELDING["four_channel"], "world.material=silicone", *late
+    )
+    check_ports(rows)
+    assert np.linalg.norm(rows["master_servo_cf"], axis=1).max() > 0.5
+    assert gained(rows) < 3.3 * STEP
+    assert fastest(rows) < 0.1

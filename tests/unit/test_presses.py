@@ -36,6 +36,19 @@ def test_a_sender_that_is_found_late_has_lost_nothing():
     assert presses.lost == 0
 
 
+def test_a_message_that_was_lost_before_the_first_of_its_sender_counts_as_a_press():
+    presses = Presses()
+    assert presses.lose(0) == ()
+    assert (*presses.lose(3), *told(presses, (4, False))) == (True, False)
+    assert (presses.lose(3), presses.lose(4), presses.lost) == ((), (True,), 4)
+
+
+def test_what_numbers_tell_of_one_sender_hides_no_loss_that_the_middleware_alone_knows():
+    presses = Presses()
+    told(presses, (1, False), (9, False))
+    assert (presses.lose(2), presses.lose(2), presses.lost) == ((True,), (), 7)
+
+
 def test_senders_do_not_fill_the_gaps_of_each_other():
     presses = Presses()
     told(presses, (1, False))

@@ -275,7 +275,7 @@ def swing(steps, ticks=400):
     for name in ("viscous", "coulomb", "bristle"):
         p[name] = 0.0
     for _ in range(ticks):
-        integrate(slave.arm.acceleration, ROW, p, s, steps, none, q, dq, 1e-3)
+        integrate(slave.arm.acceleration, ROW, p, s, slave.arm.contacts, steps, none, q, dq, 1e-3)
     return q, dq
 
 

@@ -13,7 +13,7 @@ from teleop_core.chain.operators import OPERATORS, Setting
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.rest import REST_TILT
 from teleop_core.chain.operators.shapes import PHASES
-from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP
 
 START_NS = 1_700_000_000_000_000_000
 COUNT = 201
@@ -24,17 +24,18 @@ REST = Rotation.from_euler("x", REST_TILT)
 CENTER = (0.01, 0.0, 0.03)
 
 
-def bag(path, times=T, pressed=None):
+def bag(path, times=T, pressed=None, closed=None):
     """Recording of the samples at their times [s]."""
     rows = np.rint(times * 100.0).astype(int)
     stamps = START_NS + np.rint(times * 1e9).astype(np.int64)
     poses = np.column_stack((PLACES[rows], TURNS[rows].as_quat(scalar_first=True)))
-    topics = [MASTER_MEASURED_CP] + ([MASTER_BUTTONS] if pressed is not None else [])
-    with BagWriter(path, topics, ()) as writer:
+    changes = {MASTER_BUTTONS: pressed, HAND_JAW: closed}
+    changes = {topic: found for topic, found in changes.items() if found is not None}
+    with BagWriter(path, [MASTER_MEASURED_CP, *changes], ()) as writer:
         block = {MASTER_MEASURED_CP: (stamps, poses, stamps)}
-        if pressed is not None:
-            at = START_NS + np.rint(np.array(list(pressed)) * 1e9).astype(np.int64)
-            block[MASTER_BUTTONS] = at, np.array(list(pressed.values()), float), at
+        for topic, found in changes.items():
+            at = START_NS + np.rint(np.array(list(found)) * 1e9).astype(np.int64)
+            block[topic] = at, np.array(list(found.values()), float).reshape(len(at), -1), at
         writer.write_block(block)
     return path
 
@@ -106,6 +107,13 @@ def test_buttons_are_pressed_when_they_were(tmp_path):
     rows = motion(bag(tmp_path / "bag", pressed=pressed))(np.array([0.0, 0.301, 0.499, 0.501, 1.5]))
     expected = [(0, 0, 0), (1, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
     assert np.array_equal(rows[:, 6:9], expected)
+
+
+def test_the_jaw_is_closed_as_far_as_it_was_recorded(tmp_path):
+    rows = motion(bag(tmp_path / "bag", closed={0.3: 0.25, 0.5: 1.0}))
+    closed = rows(np.array([0.0, 0.299, 0.301, 0.499, 0.501, 1.5]))[:, 12]
+    np.testing.assert_array_equal(closed, [0.0, 0.0, 0.25, 0.25, 1.0, 1.0])
+    assert not motion(bag(tmp_path / "open"))(T)[:, 9:].any()
 
 
 def test_hand_approaches_the_centre_smoothly_and_then_follows(tmp_path):

@@ -34,7 +34,7 @@ class Run:
 
     def __init__(self, hand=None, **parameters):
         self.hand = hand or RemoteHand(RemoteParameters(**parameters))
-        self.rows, self.last = np.zeros((0, 12)), 0.0
+        self.rows, self.last = np.zeros((0, 13)), 0.0
 
     def for_time(self, duration, wanted=None, period=0.02):
         """Go on; ``wanted(time)`` says what pose comes every so often, or None for silence."""

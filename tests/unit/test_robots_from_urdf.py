@@ -1,6 +1,7 @@
 """Robots from URDF: what pinocchio reads from the same file, and every mistake by its element."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,9 @@ import pinocchio
 import pytest
 
 from random_arms import random_urdf
-from teleop_core.base.errors import ParameterError, RecordingError, TeleopError, UnknownNameError
+from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.robots import load_robot
-from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics
+from teleop_core.robots.chain_dynamics import inertia_matrix, inverse_dynamics, tip_efforts
 from teleop_core.robots.kinematics import IkStatus
 from teleop_core.session.api import configuration, run
 from teleop_core.session.notes import notes_of
@@ -79,6 +80,65 @@ def test_efforts_and_accelerations_of_the_links_are_those_of_pinocchio(seed, tmp
     robot.dynamics.acceleration(q, dq, given, row, found)
     expected = pinocchio.aba(model, data, theirs, dq, given)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_wrench_on_the_tip_acts_as_in_pinocchio(seed, tmp_path):
+    text, tip = random_urdf(seed, 1 + seed)
+    path = tmp_path / "arm.urdf"
+    path.write_text(text.replace('effort="20"', 'effort="1e4"'))
+    robot = load_robot(str(path), tip=tip, dynamics="links")
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(robot.lower, robot.upper)
+    dq, ddq, given = rng.normal(size=(3, robot.n))
+    wrench = rng.normal(0.0, 30.0, 6)
+    whole = pinocchio.buildModelFromXML(text)
+    held = [whole.getJointId(n) for n in whole.names if n not in ("universe", *robot.joint_names)]
+    model = pinocchio.buildReducedModel(whole, held, pinocchio.neutral(whole))
+    data, theirs = model.createData(), model_and_q(text, robot, q, model)[2]
+    frame = model.frames[model.getFrameId(tip)]
+    pinocchio.framesForwardKinematics(model, data, theirs)
+    turned = pinocchio.SE3(data.oMf[model.getFrameId(tip)].rotation.T, np.zeros(3))
+    forces = [pinocchio.Force.Zero() for _ in range(model.njoints)]
+    forces[frame.parentJoint] = frame.placement.act(turned.act(pinocchio.Force(wrench)))
+    row, effort, more = robot.dynamics.parameters.copy(), np.empty(robot.n), np.empty(robot.n)
+    inverse_dynamics(q, dq, ddq, row, effort)
+    tip_efforts(q, wrench, row, more)
+    expected = pinocchio.rnea(model, data, theirs, dq, ddq, forces)
+    np.testing.assert_allclose(effort - more, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
+    found = robot.forward_dynamics(q, dq, given, wrench)
+    expected = pinocchio.aba(model, data, theirs, dq, given, forces)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10 * abs(expected).max())
+    free = pinocchio.aba(model, data, theirs, dq, given)
+    found = robot.forward_dynamics(q, dq, given)
+    np.testing.assert_allclose(found, free, rtol=0.0, atol=1e-10 * abs(free).max())
+
+
+def test_a_follower_and_its_leader_do_the_work_that_a_wrench_does(tmp_path):
+    path = tmp_path / "arm.urdf"
+    pitch, mimic = '"wrist_2"/><axis xyz="0 1 0"/>', '<mimic joint="elbow" multiplier="0.5"/>'
+    assert pitch in TEXT
+    path.write_text(TEXT.replace(pitch, pitch + mimic, 1))
+    arm = load_robot(str(path), dynamics="links", **TOOL)
+    assert arm.n == 5
+    q = np.random.default_rng(2).uniform(arm.lower, arm.upper)
+    zero, wrench = np.zeros(arm.n), np.array([3.0, -5.0, 8.0, 0.4, 0.2, -0.3])
+    M_inverse = [arm.forward_dynamics(q, zero, e) for e in np.eye(arm.n)]
+    M_inverse -= arm.forward_dynamics(q, zero, zero)
+    change = arm.forward_dynamics(q, zero, zero, wrench) - arm.forward_dynamics(q, zero, zero)
+    np.testing.assert_allclose(change, (arm.jacobian(q).T @ wrench) @ M_inverse, atol=1e-9)
+
+
+def test_forward_dynamics_are_asked_of_a_slave_with_vectors_of_its_joints():
+    arm = load_robot(str(EXAMPLE), **TOOL)
+    with pytest.raises(ShapeError, match="dq"):
+        arm.forward_dynamics(arm.home, np.zeros(5), np.zeros(6))
+    with pytest.raises(ShapeError, match="wrench"):
+        arm.forward_dynamics(arm.home, np.zeros(6), np.zeros(6), np.zeros(3))
+    with pytest.raises(ParameterError, match="effort"):
+        arm.forward_dynamics(arm.home, np.zeros(6), np.full(6, np.nan))
+    with pytest.raises(ParameterError, match="dynamics is None"):
+        replace(arm, drives=None, dynamics=None).forward_dynamics(*np.zeros((3, 6)))
 
 
 @pytest.mark.parametrize("dynamics", ["independent", "links"])
@@ -260,6 +320,27 @@ MISTAKES = {
     "two roots": (changed("<joint", '<link name="lost"/><joint'), "lost"),
     "two parents": (changed('child link="camera"', 'child link="tool0"'), "link tool0"),
     "a circle beside the root": (changed(*CIRCLE), "joint tool_mount"),
+    "a circle of all links": (
+        (
+            '<robot name="r"><link name="a"/><link name="b"/>'
+            '<joint name="ab" type="fixed"><parent link="a"/><child link="b"/></joint>'
+            '<joint name="ba" type="fixed"><parent link="b"/><child link="a"/></joint></robot>',
+            {},
+        ),
+        "joint ",
+    ),
+    "a link that carries itself": (
+        changed('<parent link="upper_arm"/>', '<parent link="forearm"/>'),
+        "joint elbow",
+    ),
+    "no parent": (changed('<parent link="upper_arm"/>', ""), "parent of joint elbow"),
+    "planar": (changed(ELBOW, '"elbow" type="planar"'), "type of joint elbow"),
+    "no type": (changed(ELBOW, '"elbow"'), "type of joint elbow"),
+    "an endless axis": (changed("0 1 0", "0 inf 0"), "xyz of joint shoulder"),
+    "a tiny axis": (changed("0 1 0", "0 1e-12 0"), "axis of joint shoulder"),
+    "negative velocity": (changed('velocity="3.1"', 'velocity="-3.1"'), "velocity of joint elbow"),
+    "an inertia that is no number": (changed('izz="0.008"', 'izz="nan"'), "izz of link forearm"),
+    "a mass that is no number": (changed('mass value="3.0"', 'mass value="x"'), "link forearm"),
     "unknown parent": (changed('parent link="forearm"', 'parent link="fore"'), "of joint roll"),
     "floating": (changed(ELBOW, '"elbow" type="floating"'), "joint elbow"),
     "no length of axis": (changed("0 1 0", "0 0 0"), "axis of joint shoulder"),
@@ -304,5 +385,3 @@ def test_a_file_that_is_no_xml_or_not_there_is_one_line(tmp_path):
     path.write_text(TEXT[:500])
     with pytest.raises(RecordingError, match=r"arm\.urdf"):
         load_robot(str(path))
-    with pytest.raises(TeleopError, match=r"xacro arm\.xacro > arm\.urdf"):
-        load_robot("arm.xacro")

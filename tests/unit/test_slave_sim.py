@@ -89,7 +89,18 @@ def one_tick_error(rate, steps):
     q, dq, effort = np.zeros(6), np.ones(6), np.full(6, 0.3 * rate)
     slave = SlaveSim(SlaveSimParameters())
     slave.parameters["viscous"], slave.parameters["coulomb"] = rate, 0.0
-    integrate(SPIN, np.ones(6), slave.parameters, slave.state, steps, effort, q, dq, DT)
+    integrate(
+        SPIN,
+        np.ones(6),
+        slave.parameters,
+        slave.state,
+        slave.arm.contacts,
+        steps,
+        effort,
+        q,
+        dq,
+        DT,
+    )
     exact = expm(np.array([[0, 1, 0], [0, -rate, 1], [0, 0, 0]]) * 1e-3) @ [0.0, 1.0, effort[0]]
     return max(abs(q[0] - exact[0]) / 1e-3, abs(dq[0] - exact[1]))
 
@@ -120,7 +131,7 @@ def test_more_steps_change_the_path_of_the_arm_less_and_less():
         q, dq = MIDDLE.copy(), np.array([1.0, -1.0, 0.02, 1.0, -1.0, 1.0])
         for _ in range(100):
             integrate(
-                arm.acceleration, arm.dynamics, slave.parameters, slave.state, steps,
+                arm.acceleration, arm.dynamics, slave.parameters, slave.state, arm.contacts, steps,
                 effort, q, dq, DT,
             )  # fmt: skip
         ends.append(q)

@@ -31,6 +31,7 @@ from teleop_core.commands.arguments import (
     ros_module,
     session_arguments,
     setting_arguments,
+    without_argument,
 )
 from teleop_core.commands.progress import shown_progress
 
@@ -162,6 +163,7 @@ def _add_live(commands: Any) -> None:
     live.add_argument(
         "--composed", action="store_true", help="all nodes in one process: the fastest session"
     )
+    without_argument(live)
 
 
 def _add_replay(commands: Any) -> None:
@@ -261,7 +263,10 @@ def _live(arguments: argparse.Namespace) -> int:
 
     configuration = configured(arguments)
     is_composed = bool(arguments.composed)
-    ros_module("live").live(configuration, arguments.out, Console(), is_composed=is_composed)
+    ros_module("live").live(
+        configuration, arguments.out, Console(), is_composed=is_composed,
+        without=arguments.without,
+    )  # fmt: skip
     print(done(arguments.out, "recorded"))
     return 0
 

@@ -22,7 +22,9 @@ from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_CP, Topic
 
 ARMS_KEY = "arms"
 NAMESPACE_KEY = "namespace"
-_OF_ONE_ARM = {"robot", "robot_file", "seed", "mesh", "mesh_file"}
+_OF_ONE_ARM = {
+    "robot", "robot_file", "robot_meshes", "seed", "mesh", "mesh_file", "drives", "drives_file"
+}  # fmt: skip
 
 
 def arm_names(bag: Bag) -> tuple[str, ...]:

@@ -87,7 +87,7 @@ def template(kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> Templat
         for name in joint_names:
             cdr.string(name)
         for part in range(3):
-            is_filled = part == 0 or kind is Kind.STATE
+            is_filled = part == 0 or kind.has_motion
             cdr.length(count * is_filled)
             if is_filled and count:
                 cdr.gap("d", slice(part * count, (part + 1) * count))

@@ -162,7 +162,7 @@ def _six(first: Any, second: Any) -> list[float]:
 
 def _joints(kind: Kind, message: Any, joint_names: tuple[str, ...]) -> list[float] | Refusal:
     row: list[float] = []
-    parts = ("position", "velocity", "effort") if kind is Kind.STATE else ("position",)
+    parts = ("position", "velocity", "effort") if kind.has_motion else ("position",)
     for part in parts:
         found = read_joints(message, part, joint_names)
         if found is Refusal.WRONG_LENGTH and part != "position" and not len(getattr(message, part)):

@@ -54,15 +54,8 @@ def records_of(topics: list[Topic]) -> tuple[list[Schema], list[Channel]]:
     return schemas, channels
 
 
-class _Plain(yaml.SafeDumper):
-    """Writes equal parts in full instead of as references."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
 def _text(value: Any) -> str:
-    return yaml.dump(value, Dumper=_Plain, sort_keys=False, allow_unicode=True)
+    return yaml.dump(value, Dumper=plain_yaml.FullDumper, sort_keys=False, allow_unicode=True)
 
 
 def _parsed(qos: str) -> Any:

@@ -34,6 +34,14 @@ class _Loader(yaml.SafeLoader):
     }
 
 
+class FullDumper(yaml.SafeDumper):
+    """Writes equal parts in full instead of as references, which rcl cannot read."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        """Never refer to what was written before."""
+        return True
+
+
 def parse(text: str) -> Any:
     """Value of a text: mappings, lists, texts, numbers, truth values or None.
 
@@ -104,14 +112,14 @@ def read(path: Path) -> Any:
     return parse(read_text(path))
 
 
-def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
-    """Text of a regular file of at most so many bytes; raises as :func:`read`."""
+def read_text(path: Path) -> str:
+    """Text of a regular file of at most :data:`LARGEST_TEXT` bytes; raises as :func:`read`."""
     try:
         check_regular(path)
         with path.open("rb") as file:
-            data = file.read(largest + 1)
-        if len(data) > largest:
-            raise UnreadableError(f"has more than {largest} bytes")
+            data = file.read(LARGEST_TEXT + 1)
+        if len(data) > LARGEST_TEXT:
+            raise UnreadableError(f"has more than {LARGEST_TEXT} bytes")
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise UnreadableError(f"is not UTF-8 ({error.reason} at byte {error.start})") from error

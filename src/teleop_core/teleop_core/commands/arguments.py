@@ -20,10 +20,15 @@ def geometry_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def command(
-    commands: Any, name: str, run: Callable[[argparse.Namespace], int], text: str
-) -> argparse.ArgumentParser:
-    """Parser of a command, which calls ``run`` and says ``text`` in its help."""
-    parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
+    commands: Any, name: str, run: Callable[[argparse.Namespace], int], text: str,
+    examples: str | None = None,
+) -> argparse.ArgumentParser:  # fmt: skip
+    """Parser of a command, which calls ``run``; its help says ``text``, and last the examples."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=text, description=text, epilog=examples
+    )
+    if examples is not None:  # line by line, as they stand in the source
+        parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.set_defaults(run=run)
     parser.add_argument(
         "--parts", type=Path, action="append", default=[], metavar="FILE.py", dest="more_parts",
@@ -38,6 +43,15 @@ def out_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, required=True, help="directory for the recording; it must not exist yet"
     )
+
+
+def without_argument(parser: argparse.ArgumentParser) -> None:
+    """Let a command leave out nodes for which others stand."""
+    parser.add_argument(
+        "--without", action="append", default=[], metavar="NODE",
+        help="start no such node: another stands in its place, as arm_bridge in that of slave_sim, "
+        "on the same ROS_DOMAIN_ID; may be repeated",
+    )  # fmt: skip
 
 
 def session_arguments(parser: argparse.ArgumentParser) -> None:

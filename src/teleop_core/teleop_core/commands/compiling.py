@@ -20,8 +20,7 @@ Job = tuple[str, str, str]
 def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
     """Add the command's parser."""
     text = "compile the kernels of built-in parts now, on all processors"
-    parser = command(commands, "compile", _run, text)
-    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser = command(commands, "compile", _run, text, _EPILOG)
     parser.add_argument("--all", action="store_true", help="also those that no scenario needs")
 
 

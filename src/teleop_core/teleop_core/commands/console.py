@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.texts import printable
-from teleop_core.commands.arguments import command, ros_module, setting_arguments
+from teleop_core.commands.arguments import (
+    command,
+    ros_module,
+    setting_arguments,
+    without_argument,
+)
 
 if TYPE_CHECKING:
     from teleop_core.console.server import ConsoleServer
@@ -33,8 +38,7 @@ _PRIORITY = 20
 def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "see a session in the browser, drive it, replay a recording"
-    parser = command(commands, "console", _run, text)
-    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser = command(commands, "console", _run, text, _EPILOG)
     parser.add_argument("bag", type=Path, nargs="?", help="recording to replay")
     parser.add_argument("--attach", action="store_true", help="show a session that runs already")
     parser.add_argument("--domain", type=int, metavar="N", help="its ROS domain, for --attach")
@@ -46,6 +50,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--no-browser", action="store_true", help="open no browser")
     parser.add_argument("--scenario", help="one of `teleop scenarios`, with a person as its hand")
     parser.add_argument("--out", type=Path, help="directory of the recording (default: bags/…)")
+    without_argument(parser)
     setting_arguments(parser)
 
 
@@ -124,7 +129,7 @@ def _drive(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
         out = first if not number else first.with_name(f"{first.name}_session{number + 1}")
         with splash(server) as say:
             configuration = _configured(arguments, texts)
-            session = ConsoleSession(configuration, out, _both(say))
+            session = ConsoleSession(configuration, out, _both(say), arguments.without)
             try:
                 link = session.link()
             except BaseException:

@@ -41,12 +41,10 @@ def add(commands: Any) -> None:
 
 
 def _add_import(commands: Any) -> None:
-    parser = command(
-        commands, "import", _import, "turn a file from another system into a recording"
-    )
+    text = "turn a file from another system into a recording"
     listed = "\n".join(f"  --preset {name:9} {one.text}" for name, one in PRESETS.items())
-    parser.description, parser.epilog = _IMPORT, _EXAMPLES % listed
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser = command(commands, "import", _import, text, _EXAMPLES % listed)
+    parser.description = _IMPORT
     parser.add_argument("file", type=Path, metavar="FILE", help="file or directory to import")
     out_argument(parser)
     parser.add_argument(
@@ -185,9 +183,9 @@ examples:
 
 
 def _add_export(commands: Any) -> None:
-    parser = command(commands, "export", _export, "write recordings as tables or a data set")
-    parser.description, parser.epilog = _EXPORT, _EXPORT_EXAMPLES
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    text = "write recordings as tables or a data set"
+    parser = command(commands, "export", _export, text, _EXPORT_EXAMPLES)
+    parser.description = _EXPORT
     parser.add_argument("bags", type=Path, nargs="+", metavar="BAG", help="recordings to export")
     parser.add_argument(
         "--out", type=Path, required=True, metavar="X",

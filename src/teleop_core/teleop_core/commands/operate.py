@@ -29,12 +29,10 @@ commands: release, """ + ", ".join(STATE_COMMANDS)
 
 def add(commands: Any) -> None:
     """Add the parsers of both commands."""
-    stop = command(commands, "stop", _stop, "emergency stop of the arms that run here")
-    stop.epilog, stop.formatter_class = _STOP, argparse.RawDescriptionHelpFormatter
-    operate = command(
-        commands, "operate", _operate, "enable, home, pause or reset arms, or show their states"
-    )
-    operate.epilog, operate.formatter_class = _OPERATE, argparse.RawDescriptionHelpFormatter
+    text = "emergency stop of the arms that run here"
+    stop = command(commands, "stop", _stop, text, _STOP)
+    text = "enable, home, pause or reset arms, or show their states"
+    operate = command(commands, "operate", _operate, text, _OPERATE)
     operate.add_argument("words", nargs="*", metavar="COMMAND", help="see below")
     operate.add_argument("--arm", help="namespace of one arm (default: all)")
     for parser in (stop, operate):

@@ -9,6 +9,7 @@ import viser
 from teleop_core.base.errors import TeleopError
 from teleop_core.console.body_nodes import BodyNodes, extent
 from teleop_core.console.fixture_outlines import Look, OutlineNode, scale_of, unit_outline
+from teleop_core.console.jaw_nodes import JawNodes
 from teleop_core.console.link import Arm, ArmView, box_of
 from teleop_core.console.look import MEASURED, WANTED, Color
 from teleop_core.console.master_nodes import MasterNodes
@@ -51,6 +52,7 @@ class ArmNodes:
     Attributes:
         bodies: Bodies of its robot.
         world: What its tip touches.
+        jaw: Its fingers, and what they grip.
         low: Lowest corner (3,) [m] of what arm and master take, in slave_base.
         high: Highest corner (3,) [m].
         fixture: What its fixture is.
@@ -76,6 +78,7 @@ class ArmNodes:
         self._stand = stand_beside(self._own_low, self._own_high, self._axes)
         self.master = MasterNodes(server, f"{self.path}/master", self._stand)
         self.world = WorldNodes(server, self.path, robot)
+        self.jaw = JawNodes(server, self.path)
         self.fixture = Look()
         self.outline = OutlineNode(server, f"{self.path}/fixture", self._stand.quaternion)
         self._poses = self.drawn.move(start)
@@ -153,6 +156,7 @@ class ArmNodes:
         self._draw_fixture(view, is_touched=felt > _TOUCH)
         push = view.get(SLAVE_MEASURED_CF)
         self.world.draw(self._poses[-1][:3], None if push is None else push[:3])
+        self.jaw.draw(self._poses[-1], view)
 
     def _draw_ghost(self, view: ArmView) -> None:
         """Draw the reference posture, every third time: it tells no more than where to."""

@@ -16,6 +16,9 @@ from teleop_core.base.parameters import specs, values_of
 from teleop_core.console.link import Arm, ArmView, ParameterInfo, Setting
 from teleop_core.graph.topics import (
     OPERATION,
+    SLAVE_JAW_BOARD,
+    SLAVE_JAW_MEASURED_JS,
+    SLAVE_JAW_OBJECT_CP,
     SLAVE_MEASURED_CF,
     SLAVE_MEASURED_JS,
     SLAVE_OPERATION,
@@ -32,7 +35,9 @@ from teleop_core.slave.operation.report import operation_text
 MOST = 200 << 20
 """Bytes of samples that are kept; of longer recordings every second, third ... sample is."""
 _STAMP_BYTES = 16
-_KEPT = (*STREAMS, SLAVE_MEASURED_CF)
+_KEPT = (
+    *STREAMS, SLAVE_MEASURED_CF, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP, SLAVE_JAW_BOARD,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,13 +24,16 @@ def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
         robot: The slave, below whose start an object without a place lies.
     """
     nothing, kind = np.empty((0, 2, 3)), values.get("kind", "empty")
-    own = {name: value for name, value in values.items()
-           if name in {"kind", "place", "gap"} or name.startswith(f"{kind}.")}  # fmt: skip
+    of_object = ("tool_", f"{kind}.")
+    own = {
+        name: value for name, value in values.items()
+        if name in {"kind", "place", "gap"} or name.startswith(of_object)
+    }  # fmt: skip
     with suppress(Exception):  # of another's kind anything may fail, and the page goes on
         world = build(WorldParameters, own)
         if world.kind.kind == "empty":
             return nothing
-        center = np.array(world.place or world.below(robot.fk(robot.start)[:3, 3]))
+        center = np.array(world.place or world.below(robot.fk(robot.start)))
         part = WORLD_OBJECTS.find(world.kind.kind)
         points = np.asarray(part.outline(world.kind.parameters), np.float64) + center
         pairs = np.stack((points[:-1], points[1:]), axis=1)

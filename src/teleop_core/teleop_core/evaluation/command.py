@@ -40,9 +40,7 @@ def evaluate_bags(
         EvaluationError: A recording cannot be scored, or a file not be written.
         RecordingError: A recording is missing, damaged, or lacks a topic.
     """
-    for file in (json_file, html_file):
-        if file is not None:
-            check_place(file)
+    check_places(json_file, html_file)
     found = [study for path in paths for study in studies(Bag(path), span=span)]
     scores = [study.score for study in found]
     for score in scores:
@@ -66,22 +64,27 @@ def _page(found: Sequence[Study]) -> str:
     return report_page(found)
 
 
-def check_place(file: Path) -> None:
-    """Refuse a place where no file can be written, before there is anything to write.
+def check_places(*files: Path | None) -> None:
+    """Refuse places where no file can be written, before there is anything to write.
+
+    Args:
+        files: Where files go; None for one that is not wanted.
 
     Raises:
-        EvaluationError: The directory is missing, the place is one, or nothing can be made there.
+        EvaluationError: A directory is missing, a place is one, or nothing can be made there.
     """
-    if not file.parent.is_dir():
-        raise EvaluationError(f"{file}: the directory {file.parent} does not exist; make it first")
-    if file.is_dir():
-        raise EvaluationError(f"{file}: is a directory, must be a file")
-    part = file.with_name(file.name + ".part")
-    try:
-        part.touch()
-        part.unlink()
-    except OSError as error:
-        raise EvaluationError(f"{file}: cannot be written: {error.strerror}") from error
+    for file in filter(None, files):
+        if not file.parent.is_dir():
+            text = f"the directory {file.parent} does not exist; make it first"
+            raise EvaluationError(f"{file}: {text}")
+        if file.is_dir():
+            raise EvaluationError(f"{file}: is a directory, must be a file")
+        part = file.with_name(file.name + ".part")
+        try:
+            part.touch()
+            part.unlink()
+        except OSError as error:
+            raise EvaluationError(f"{file}: cannot be written: {error.strerror}") from error
 
 
 def write_whole(file: Path, text: str) -> None:

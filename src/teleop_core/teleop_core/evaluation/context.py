@@ -1,14 +1,18 @@
 """Context: what a metric knows of the recording when it is made, and what metrics share."""
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Protocol, TypeVar, cast
 
+from teleop_core.bags.kept_files import recorded_files, recorded_geometry
 from teleop_core.bags.reader import Bag
-from teleop_core.base.errors import EvaluationError
+from teleop_core.base.errors import EvaluationError, TeleopError
 from teleop_core.evaluation.origin import Origin
 from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.evaluation.windows import Span, Window
 from teleop_core.graph.topics import Topic
+from teleop_core.robots import load_robot_set
+from teleop_core.robots.robot import Robot
 
 
 class Accumulator(Protocol):
@@ -42,6 +46,15 @@ class Context:
         self._read: dict[str, Topic] = {}
         self._parts: dict[Callable[[Context], Accumulator], Accumulator] = {}
         self._has_begun = False
+
+    def load_robot(self) -> Robot | None:
+        """What moved, as it was recorded; None if that is not told, or is not installed."""
+        if self.robot is not None:
+            with suppress(TeleopError, OSError):
+                files = recorded_files(self.bag.metadata)
+                geometry = recorded_geometry(self.origin.geometry, files)
+                return load_robot_set(files.get(self.robot, self.robot), geometry)
+        return None
 
     def expected(self, topic: Topic) -> int:
         """Messages of a topic in the recording."""

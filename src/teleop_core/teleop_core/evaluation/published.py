@@ -38,8 +38,6 @@ FINE = Published("fine", 0.1, (0.293, 0.791), (0.153, 0.811), (0.105, 0.832), (0
 
 BOX_OVERSHOOT_MM = 1.0
 """How far the source's paths went beyond each wall, about [mm] (section 7.6)."""
-ORIENTATION_MAX_DEG = 0.9
-"""What the source claims for every angle in both modes [deg] (chapter 8)."""
 
 
 def published_for(

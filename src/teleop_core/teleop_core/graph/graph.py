@@ -10,7 +10,7 @@ from functools import cached_property
 
 from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
 from teleop_core.graph.stage import STAGES, Stage
-from teleop_core.graph.topics import Kind, Topic
+from teleop_core.graph.topics import BY_NAME, Kind, Topic
 
 __all__ = [
     "BUILT_IN",
@@ -284,6 +284,7 @@ class Graph:
             for topic in stage.writes:
                 alike = [t.name for t in stage.reads if t.kind is topic.kind]
                 is_lost = topic.name not in read and not topic.adds_to and not stage.replaced
+                is_lost = is_lost and topic.name not in BY_NAME
                 if is_lost and alike and stage.name not in BUILT_IN:
                     found.append(
                         f"stage {stage.name!r} writes {topic.name}, which no stage reads; "

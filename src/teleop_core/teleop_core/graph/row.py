@@ -79,6 +79,12 @@ class Row(Fields):
     network_master_energy_ns: int
     network_slave_energy: Array
     network_slave_energy_ns: int
+    slave_servo_cf: Array
+    slave_servo_cf_ns: int
+    network_servo_cf: Array
+    network_servo_cf_ns: int
+    impedance_servo_cp: Array
+    impedance_servo_cp_ns: int
     master_filtered_cp: Array
     master_filtered_cp_ns: int
     master_filtered_out: Array
@@ -87,3 +93,19 @@ class Row(Fields):
     remote_centre_servo_cp_ns: int
     remote_centre_place: Array
     remote_centre_place_ns: int
+    hand_jaw: Array
+    hand_jaw_ns: int
+    slave_jaw_servo_jp: Array
+    slave_jaw_servo_jp_ns: int
+    network_jaw_servo_jp: Array
+    network_jaw_servo_jp_ns: int
+    slave_jaw_setpoint_js: Array
+    slave_jaw_setpoint_js_ns: int
+    slave_jaw_measured_js: Array
+    slave_jaw_measured_js_ns: int
+    slave_jaw_grip: Array
+    slave_jaw_grip_ns: int
+    slave_jaw_object_cp: Array
+    slave_jaw_object_cp_ns: int
+    slave_jaw_board: Array
+    slave_jaw_board_ns: int

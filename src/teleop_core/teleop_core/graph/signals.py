@@ -34,22 +34,19 @@ def topic_fields(topics: Iterable[Topic], joints: int) -> list[Field]:
     return fields
 
 
-def make_signals(
-    topics: Iterable[Topic], joints: int, notes: Iterable[Field] = (), count: int = 1
-) -> Any:
-    """Zeroed signals (count,) with unit quaternions, so that every pose is valid from the start.
+def make_signals(topics: Iterable[Topic], joints: int, notes: Iterable[Field] = ()) -> Any:
+    """Zeroed signals (1,) with unit quaternions, so that every pose is valid from the start.
 
     Args:
         topics: What the record has ports for.
         joints: Number of joints of the arm; 0 if no topic has joints.
         notes: Further fields, which are recorded by nobody.
-        count: Number of records.
 
     Returns:
-        Records with ``now_ns``, the time of the tick [ns], the topics' fields, and the notes.
+        One record with ``now_ns``, the time of the tick [ns], the topics' fields, and the notes.
     """
     ports = list(topics)
-    signals = records([("now_ns", "i8"), *topic_fields(ports, joints), *notes], count)
+    signals = records([("now_ns", "i8"), *topic_fields(ports, joints), *notes], 1)
     for topic in ports:
         if topic.kind is Kind.POSE:
             signals[topic.field][:, 3] = 1.0

@@ -71,6 +71,7 @@ class Kind(Enum):
     JOINTS   position of each joint [rad or m]
     STATE    position, velocity, effort of all joints: 3 n columns
     NUMBERS  the numbers that the topic names in ``columns``
+    JAW      position [rad], velocity [rad/s], effort [N·m] of a jaw, a joint of its own
     REPORT   no fixed columns: key-value pairs
     ======== ==================================================================
     """
@@ -79,7 +80,8 @@ class Kind(Enum):
     TWIST = "geometry_msgs/msg/TwistStamped"
     WRENCH = "geometry_msgs/msg/WrenchStamped"
     BUTTONS = "sensor_msgs/msg/Joy"
-    # Blanks keep those of one message type apart; see ros_type.
+    # Blanks keep those of one message type apart; see ros_type. Unknown topics get the last.
+    JAW = "sensor_msgs/msg/JointState   "
     NUMBERS = "sensor_msgs/msg/JointState  "
     JOINTS = "sensor_msgs/msg/JointState"
     STATE = "sensor_msgs/msg/JointState "
@@ -98,7 +100,12 @@ class Kind(Enum):
     @property
     def has_names(self) -> bool:
         """Whether its messages carry the names of their numbers."""
-        return self.has_joints or self is Kind.NUMBERS
+        return self.has_joints or self in {Kind.NUMBERS, Kind.JAW}
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether its messages carry velocity and effort beside position."""
+        return self in {Kind.STATE, Kind.JAW}
 
     def columns(self, joint_names: tuple[str, ...]) -> tuple[str, ...]:
         """Names of the columns, for a robot with these joints; none for reports."""
@@ -111,17 +118,21 @@ class Kind(Enum):
 
     def width(self, joints: int) -> int:
         """Number of columns for a robot with this many joints, or a topic with so many names."""
-        fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0}
+        fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0,
+                 Kind.JAW: 3}  # fmt: skip
         return {
             Kind.NUMBERS: joints, Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed
         }[self]  # fmt: skip
 
 
+JAW = ("jaw",)
+"""Name of the one joint of a jaw."""
 _COLUMNS = {
     Kind.POSE: ("x", "y", "z", "qw", "qx", "qy", "qz"),
     Kind.TWIST: ("vx", "vy", "vz", "wx", "wy", "wz"),
     Kind.WRENCH: ("fx", "fy", "fz", "tx", "ty", "tz"),
     Kind.BUTTONS: ("clutch", "fixture", "mode"),
+    Kind.JAW: ("position", "velocity", "effort"),
     Kind.REPORT: (),
 }
 
@@ -226,6 +237,8 @@ class Topic:
         """Names in its messages, for a robot with these joints; empty without any."""
         if self.kind is Kind.NUMBERS:
             return self.columns
+        if self.kind is Kind.JAW:
+            return JAW
         return joint_names if self.kind.has_joints else ()
 
 
@@ -259,6 +272,11 @@ MASTER_SERVO_CF = Topic(
     "master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base"
 )
 SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, passed_on("master/measured_cp"), "slave_base")
+SLAVE_SERVO_CF = Topic(
+    "slave/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "slave_base", is_seldom=True
+)
+"""Force with which the hand leads the tip, of a session with a stage ``impedance``: what the hand
+bears of the push that answers the slave, times the gain of the architecture; no torque."""
 SLAVE_SERVO_JP = Topic("slave/servo_jp", Kind.JOINTS, passed_on("slave/servo_cp"), "slave_base")
 SLAVE_REACH = Topic(
     "slave/reach", Kind.NUMBERS, passed_on("slave/servo_cp"), "slave_base",
@@ -321,9 +339,13 @@ NETWORK_REACH = Topic(
 )
 NETWORK_STATE = Topic(
     "network/state", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
-    columns=("sent_there", "lost_there", "behind_there", "sent_back", "lost_back", "behind_back"),
+    columns=(
+        "sent_there", "lost_there", "behind_there", "sent_back", "lost_back", "behind_back",
+        "clock_ahead",
+    ),
 )  # fmt: skip
-"""Packets sent, lost, and by how many the newest that arrived is behind, of both directions."""
+"""Packets sent, lost, and by how many the newest that arrived is behind, of both directions; by how
+much the slave's clock is ahead of the master's [s]."""
 ENERGY = (
     "law", "round", "energy_in", "energy_out", "told", "heard", "margin", "withheld",
     "turn_in", "turn_out", "drift_x", "drift_y", "drift_z",
@@ -347,6 +369,11 @@ PASSIVITY_SERVO_CP = Topic(
     "passivity/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"
 )
 """The slave's command as passivity lets it through."""
+NETWORK_SERVO_CF = Topic("network/servo_cf", Kind.WRENCH, arrived("slave/servo_cf"), "slave_base")
+IMPEDANCE_SERVO_CP = Topic(
+    "impedance/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"
+)
+"""The slave's command, yielding to the force on its tip."""
 REMOTE_CENTRE_SERVO_CP = Topic(
     "remote_centre/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base"
 )
@@ -356,6 +383,38 @@ REMOTE_CENTRE = Topic(
     columns=("x", "y", "z", "shaft_x", "shaft_y", "shaft_z"), is_seldom=True,
 )  # fmt: skip
 """The remote centre [m], and the shaft that passes through it, in the tip's frame."""
+SLAVE_JAW_SERVO_JP = Topic(
+    "slave/jaw/servo_jp", Kind.NUMBERS, passed_on("master/measured_cp"), "slave_base", columns=JAW
+)
+"""Angle between the two fingers of the jaw that the master's side asks for [rad]."""
+SLAVE_JAW_SETPOINT_JS = Topic(
+    "slave/jaw/setpoint_js", Kind.NUMBERS, in_force("slave/jaw/servo_jp"), "slave_base", columns=JAW
+)
+SLAVE_JAW_MEASURED_JS = Topic("slave/jaw/measured_js", Kind.JAW, SAMPLED, "slave_base")
+SLAVE_JAW_GRIP = Topic(
+    "slave/jaw/grip", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
+    columns=("force", "is_gripped", "slid", "grips", "slips", "drops"),
+)  # fmt: skip
+"""What only a simulator knows: the push of each finger [N], whether the object is between them, how
+far it slid in the present grip or the last one [m], and how often it was gripped, slid by more than
+a millimetre, and was lost above the table."""
+SLAVE_JAW_OBJECT_CP = Topic("slave/jaw/object_cp", Kind.POSE, SAMPLED, "slave_base", is_seldom=True)
+"""Where the object is that the jaw can grip, which only a simulator knows."""
+JAW_OBJECTS = 6
+"""Most objects that stand on a board at once."""
+SLAVE_JAW_BOARD = Topic(
+    "slave/jaw/board", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
+    columns=(
+        "transferred", "dropped", "pull",
+        *(f"{axis}{i}" for i in range(JAW_OBJECTS) for axis in "xyz"),
+    ),
+)  # fmt: skip
+"""What only a simulator knows: how many objects came onto another peg, how many came to rest on
+none, the pull of a peg on the gripped one, across [N], and the middle of each object [m], all zeros
+for one that is not there."""
+NETWORK_JAW_SERVO_JP = Topic(
+    "network/jaw_servo_jp", Kind.NUMBERS, arrived("slave/jaw/servo_jp"), "slave_base", columns=JAW
+)
 NETWORK_MASTER_ENERGY = Topic(
     "network/master_energy", Kind.NUMBERS, arrived("master/energy"), "master_base", columns=ENERGY
 )
@@ -370,6 +429,10 @@ HAND_TREMOR = Topic(
     "hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z"), is_seldom=True
 )  # fmt: skip
 """By how much the tip is off [m], whatever the device's friction swallows of the hand's motion."""
+HAND_JAW = Topic(
+    "hand/jaw", Kind.NUMBERS, SAMPLED, "master_base", columns=("closing",), is_seldom=True
+)
+"""How far the operator closes the jaw: 0 open, 1 closed."""
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand
 there. Silence lets go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is
@@ -399,6 +462,13 @@ PASSIVITY_TOPICS = (
     MASTER_ENERGY, SLAVE_ENERGY, PASSIVITY_SERVO_CP, NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY,
 )  # fmt: skip
 """Topics of a session with a stage ``passivity``, the last two with a network too."""
+IMPEDANCE_TOPICS = (SLAVE_SERVO_CF, NETWORK_SERVO_CF, IMPEDANCE_SERVO_CP)
+"""Topics of a session with a stage ``impedance``, the second with a network too."""
+JAW_TOPICS = (
+    HAND_JAW, SLAVE_JAW_SERVO_JP, NETWORK_JAW_SERVO_JP, SLAVE_JAW_SETPOINT_JS,
+    SLAVE_JAW_MEASURED_JS, SLAVE_JAW_GRIP, SLAVE_JAW_OBJECT_CP, SLAVE_JAW_BOARD,
+)  # fmt: skip
+"""Topics of a session with a jaw, the third with a network too."""
 ALL = (
     *STREAMS, HAND_BUTTONS, HAND_TREMOR,
     SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS,
@@ -406,7 +476,7 @@ ALL = (
 BY_NAME = {
     topic.name: topic
     for topic in (
-        *ALL, *NETWORK_TOPICS, *PASSIVITY_TOPICS, MASTER_FILTERED_CP, MASTER_FILTERED_OUT,
-        REMOTE_CENTRE_SERVO_CP, REMOTE_CENTRE,
+        *ALL, *NETWORK_TOPICS, *PASSIVITY_TOPICS, *IMPEDANCE_TOPICS, MASTER_FILTERED_CP,
+        MASTER_FILTERED_OUT, REMOTE_CENTRE_SERVO_CP, REMOTE_CENTRE, *JAW_TOPICS,
     )
 }  # fmt: skip

@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from functools import partial
 from types import FunctionType
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 import numba
 import numpy as np
@@ -34,6 +34,7 @@ from teleop_core.kernels.dependencies import Tokens, hexdigest
 __all__ = [
     "IS_COMPILED",
     "Kernel",
+    "apart",
     "bare",
     "bound",
     "inner",
@@ -127,7 +128,8 @@ def kernel_from_source(text: str, name: str, names: Mapping[str, object]) -> Any
     constants, is compiled once. Tracebacks show its lines.
 
     Args:
-        text: Python source that defines a function.
+        text: Python source that defines a function; it makes no arrays, but kernels that it calls
+            may.
         name: Name of that function.
         names: What the text refers to: kernels, constants, modules.
     """
@@ -216,9 +218,32 @@ def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callab
     """
     if isinstance(compiled, FunctionType) or not is_kernel(compiled):
         return partial(compiled, *arguments)
-    types = tuple(numba.typeof(bare(argument)) for argument in arguments)
     own = [_Memory(a) if isinstance(a, np.void) else a for a in arguments]
-    return partial(_compiler.entry(compiled, types), *own)
+    return partial(_compiler.entry(compiled, _types(arguments)), *own)
+
+
+def apart(compiled: Callable[..., R], *arguments: object) -> Callable[..., R]:
+    """Kernel as a value that other kernels call where it is, without its code in theirs.
+
+    A kernel that names another is compiled with a copy of it, which takes seconds where that is
+    large. This one is compiled once for its arguments, and its callers without it.
+
+    Args:
+        compiled: A kernel.
+        arguments: Such as it will be called with: their types count.
+
+    Returns:
+        The value to hand to a kernel, which calls it with arguments of these types.
+
+    Raises:
+        KernelError: The kernel cannot be compiled for these arguments.
+    """
+    code: Any = _compiler.Code(compiled, _types(arguments)) if IS_COMPILED else compiled
+    return cast("Callable[..., R]", code)
+
+
+def _types(arguments: tuple[object, ...]) -> tuple[Any, ...]:
+    return tuple(numba.typeof(bare(argument)) for argument in arguments)
 
 
 class _Memory:

@@ -262,6 +262,28 @@ def quaternion_products(a: Array, b: Array) -> Array:
     return np.stack(rows, axis=-1)
 
 
+def framed_wrenches(wrench: Array, pose: Array) -> tuple[Array, Array]:
+    """The same force on a tip in the two frames of CRTK's ``body`` and ``spatial``.
+
+    With the twist of its frame each has the power ``f·v + t·w`` of the other: with the body twist
+    that of the tip, with the spatial twist that of the point of the tool that is at the base.
+
+    Args:
+        wrench: Force [N] and torque about the tip [N·m] (6,), along the base.
+        pose: Of the tip in the base (7,).
+
+    Returns:
+        Along the tip's axes, torque about the tip; along the base's, torque about its origin.
+
+    Source:
+        Murray, Li and Sastry 1994, section 2.5.
+    """
+    turn = rotations_from_quaternions(pose[3:])
+    force, torque = wrench[:3], wrench[3:]
+    body = np.concatenate(((turn.T * force).sum(axis=1), (turn.T * torque).sum(axis=1)))
+    return body, np.concatenate((force, torque + np.cross(pose[:3], force)))
+
+
 def rotation_vectors(quaternions: Array) -> Array:
     """Turns since the first of a series of unit quaternions (N, 4), w, x, y, z.
 

@@ -1,4 +1,4 @@
-"""Node ``arm_bridge``: a real arm's controller in the place of ``slave_sim``."""
+"""Nodes ``arm_bridge`` and ``jaw_bridge``: real controllers in the place of simulated drives."""
 
 import re
 import time
@@ -7,17 +7,11 @@ from typing import Any
 
 from rclpy.serialization import deserialize_message
 
-from teleop_core.graph.topics import (
-    SLAVE_MEASURED_JS,
-    SLAVE_OPERATION,
-    SLAVE_SETPOINT_JS,
-    Kind,
-    Topic,
-)
+from teleop_core.graph.topics import SLAVE_OPERATION, Kind, Topic
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.slave.bridges import BRIDGES, Command
-from teleop_core.slave.bridges.arm_bridge import ArmBridgeParameters
+from teleop_core.slave.bridges.arm_bridge import BridgeParameters
 from teleop_core.slave.bridges.hearing import Sample
 
 _WAITING = 20  # messages of the arm that wait while the loop is late
@@ -27,11 +21,12 @@ _CALM_NS = 1_000_000_000  # the same words are logged again after this [ns]
 class ArmBridgeNode(TickingNode):
     """Sends the newest setpoint as the controller takes it, and passes on what the arm says.
 
-    ``slave/measured_js`` goes out for each sound sample of the arm, under the time at which that
-    was taken, and never otherwise: its silence makes the server hold.
+    What is measured goes out for each sound sample of the arm, under the time at which that
+    was taken, and never otherwise: its silence makes the server hold. None goes out before the
+    server is found.
     """
 
-    def setup(self, parameters: ArmBridgeParameters) -> None:
+    def setup(self, parameters: BridgeParameters) -> None:
         """Make the stage, open its topics and those of the arm."""
         super().setup(parameters)
         kind, p = BRIDGES.find(parameters.kind.kind), parameters
@@ -41,8 +36,10 @@ class ArmBridgeNode(TickingNode):
         self._make: Callable[[str], Any] = lambda name: message_type(name)()
         self._arm = Subscription(self, heard, heard.name, _WAITING)
         self._sender = self.open_publisher(told)
-        self._output = self.ports.output(SLAVE_MEASURED_JS)
+        self._setpoint = self.input(self.description.reads[0])
+        self._output = self.ports.output(self.description.writes[0])
         self._told, self._told_ns, self.commands = "", 0, 0
+        self._has_server = False
 
     def teardown(self) -> None:
         """Close what :meth:`setup` opened."""
@@ -64,6 +61,8 @@ class ArmBridgeNode(TickingNode):
         self._tell_trouble()
 
     def _listen(self) -> None:
+        if not self._has_server:  # one that is found late would go on without the arm
+            self._has_server = self._setpoint.publishers() > 0
         while (taken := self._arm.take()) is not None:
             message = deserialize_message(taken.data, self._arm.type)
             stamp = message.header.stamp
@@ -73,13 +72,12 @@ class ArmBridgeNode(TickingNode):
             sample = Sample(
                 message.name, message.position, message.velocity, message.effort, stamp_ns
             )
-            if self.stage.hear(sample, time.time_ns()):
+            if self.stage.hear(sample, time.time_ns()) and self._has_server:
                 self._output.send(stamp_ns)
 
     def _command(self, now_ns: int) -> Command | None:
-        setpoint, operation = self.input(SLAVE_SETPOINT_JS), self.input(SLAVE_OPERATION)
-        is_led = operation.stamp_ns is not None
-        found: Command | None = self.stage.command(now_ns, setpoint.age(), is_led)
+        is_led = self.input(SLAVE_OPERATION).stamp_ns is not None
+        found: Command | None = self.stage.command(now_ns, self._setpoint.age(), is_led)
         return found
 
     def _tell_trouble(self) -> None:

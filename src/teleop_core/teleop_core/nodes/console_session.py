@@ -2,7 +2,7 @@
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 from rich.console import Console
@@ -37,7 +37,7 @@ class _Lines:
 
 
 class ConsoleSession:
-    """A composed session in a domain of its own, to be used with ``with``.
+    """A session in a domain of its own, to be used with ``with``; composed if all nodes are ours.
 
     Its processes end with this one, however that comes about.
 
@@ -45,15 +45,19 @@ class ConsoleSession:
         configuration: What runs.
         out: Directory of the recording.
         say: Told what the session says, a line each, in a thread of its own.
+        without: Nodes that are not started, since others stand in their place.
 
     Attributes:
         domain: Its ROS domain.
     """
 
-    def __init__(self, configuration: Configuration, out: Path, say: Callable[[str], None]) -> None:
+    def __init__(
+        self, configuration: Configuration, out: Path, say: Callable[[str], None],
+        without: Collection[str] = (),
+    ) -> None:  # fmt: skip
         os.environ["ROS_DOMAIN_ID"] = environment()["ROS_DOMAIN_ID"]
         self.domain = int(os.environ["ROS_DOMAIN_ID"])
-        self._configuration, self._out = configuration, out
+        self._configuration, self._out, self._without = configuration, out, without
         self._console = Console(file=_Lines(say), width=200)  # type: ignore[arg-type]
         self._interrupt, self._error = Interrupt(), ""
         self._thread = threading.Thread(target=self._run, name="session")
@@ -68,8 +72,8 @@ class ConsoleSession:
     def _run(self) -> None:
         try:
             live(
-                self._configuration, self._out, self._console, is_composed=True,
-                interrupt=self._interrupt,
+                self._configuration, self._out, self._console,
+                is_composed=not self._without, without=self._without, interrupt=self._interrupt,
             )  # fmt: skip
         except TeleopError as error:
             if not self._interrupt.has_come:

@@ -12,10 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.bags.messages import Refusal, layout, read_joints
+from teleop_core.bags.messages import Refusal, layout, read_joints, read_values
 from teleop_core.base.errors import TeleopError
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, Kind, Topic
-from teleop_core.kernels.geometry import Array, pose_from_transform, transform_from_pose
+from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, Kind, Topic
+from teleop_core.kernels.geometry import (
+    Array,
+    framed_wrenches,
+    pose_from_transform,
+    transform_from_pose,
+)
 from teleop_core.nodes.crtk import (
     Condition,
     OperatingState,
@@ -32,6 +37,8 @@ _FRAME = SLAVE_MEASURED_CP.frame_id
 MEASURED_CV = Topic("slave/measured_cv", Kind.TWIST, frame_id=_FRAME)
 GOAL_JS = Topic("slave/goal_js", Kind.JOINTS, frame_id=_FRAME)
 GOAL_CP = Topic("slave/goal_cp", Kind.POSE, frame_id=_FRAME)
+BODY_CF = Topic("slave/body/measured_cf", Kind.WRENCH, frame_id="slave_tip")
+SPATIAL_CF = Topic("slave/spatial/measured_cf", Kind.WRENCH, frame_id=_FRAME)
 JACOBIAN = "slave/jacobian"
 _JOINTS, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
 _TWIST, _EMPTY = "geometry_msgs/msg/TwistStamped", "std_msgs/msg/Empty"
@@ -194,12 +201,14 @@ class Measured:
             topic: node.create_lifecycle_publisher(
                 message_type(topic.kind.ros_type), topic.name, profile(topic)
             )
-            for topic in (MEASURED_CV, GOAL_JS, GOAL_CP)
+            for topic in (MEASURED_CV, GOAL_JS, GOAL_CP, BODY_CF, SPATIAL_CF)
         }
         self._layouts = {t: layout(t.of_arm(node.arm), names) for t in self._publishers}
         self._jacobian = node.create_lifecycle_publisher(
             message_type(_MATRIX), JACOBIAN, profile(MEASURED_CV)
         )
+        self._force: Any = None  # newest message of it
+        self._forces: Any = None  # subscription, as long as somebody reads them in other frames
         self._timer = node.create_timer(_PERIOD, self._send)
         self._timer.cancel()
         self._look = node.create_timer(_LOOK, self._look_for_readers)
@@ -210,6 +219,7 @@ class Measured:
             self._node.destroy_timer(timer)
         for publisher in (*self._publishers.values(), self._jacobian):
             self._node.destroy_lifecycle_publisher(publisher)
+        self._listen(is_read=False)
 
     def _look_for_readers(self) -> None:
         is_read = any(p.get_subscription_count() for p in self._all())
@@ -217,6 +227,22 @@ class Measured:
             self._timer.reset()
         elif not is_read:
             self._timer.cancel()
+        readers = [self._publishers[t].get_subscription_count() for t in (BODY_CF, SPATIAL_CF)]
+        self._listen(is_read=any(readers))
+
+    def _listen(self, *, is_read: bool) -> None:
+        """Begin to take what the force sensor tells, or end it."""
+        if is_read and self._forces is None:
+            kind = message_type(SLAVE_MEASURED_CF.kind.ros_type)
+            self._forces = self._node.create_subscription(
+                kind, SLAVE_MEASURED_CF.name, self._take, streamed()
+            )
+        elif not is_read and self._forces is not None:
+            self._node.destroy_subscription(self._forces)
+            self._forces = self._force = None
+
+    def _take(self, message: Any) -> None:
+        self._force = message
 
     def _all(self) -> tuple[Any, ...]:
         return (*self._publishers.values(), self._jacobian)
@@ -228,6 +254,7 @@ class Measured:
         with self._node.lock:
             row = self._stage.signals
             now_ns, measured = int(row["now_ns"]), row["slave_measured_js"].copy()
+            tip = row["slave_measured_cp"].copy()
             goal = self._stage.motion.goal
         J = np.empty((6, n))
         robot.kernels.jacobian(measured[:n].copy(), robot.geometry_row, J)
@@ -235,9 +262,25 @@ class Measured:
         robot.kernels.fk(goal, robot.geometry_row, T)
         pose_from_transform(T, pose)
         values = {MEASURED_CV: J @ measured[n : 2 * n], GOAL_JS: goal, GOAL_CP: pose}
-        for topic, publisher in self._publishers.items():
-            publisher.publish(self._layouts[topic].encode_one(now_ns, values[topic]))
+        for topic, value in values.items():
+            self._publish(topic, now_ns, value)
         self._jacobian.publish(_matrix(J))
+        if self._force is not None:
+            self._send_force(tip)
+
+    def _send_force(self, pose: Array) -> None:
+        """Say the newest force once, under its stamp, in the frames of a tip at a pose (7,)."""
+        message, self._force = self._force, None
+        found = read_values(SLAVE_MEASURED_CF.kind, message)
+        if isinstance(found, Refusal):
+            return
+        stamp_ns, wrench = found
+        framed = framed_wrenches(wrench, pose)
+        for topic, value in zip((BODY_CF, SPATIAL_CF), framed, strict=True):
+            self._publish(topic, stamp_ns, value)
+
+    def _publish(self, topic: Topic, stamp_ns: int, values: Array) -> None:
+        self._publishers[topic].publish(self._layouts[topic].encode_one(stamp_ns, values))
 
 
 def _matrix(rows: Array) -> Any:

@@ -107,7 +107,7 @@ class DeviceHand:
             self._felt = share
 
     def _lose(self, text: str) -> None:
-        self._pilot.let_go()
+        self._pilot.lose()
         self._lost, self._device = text, None
         self._last = time.monotonic()
         self._log.error(text)

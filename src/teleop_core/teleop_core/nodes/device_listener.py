@@ -1,4 +1,4 @@
-"""Device listener: where a device says that its stylus is, for whoever looks before a session."""
+"""Device listener: where a device says that it is, for whoever looks before a session."""
 
 import time
 from typing import Any
@@ -16,14 +16,13 @@ from teleop_core.nodes.streams import Subscription, Waiter
 
 PATIENCE = 5.0
 """Time in which the topic must be found, and a message must come [s]."""
-_POSES = POSE_MESSAGES[:-1]
 
 
 class DeviceListener:
     """Listener to one device, with a middleware context of its own; to be used with ``with``.
 
     Args:
-        topic: Where the device says its poses.
+        topic: Where the device says its poses, or its joints.
         domain: ROS domain.
         patience: Time in which the topic must be found [s].
 
@@ -31,7 +30,7 @@ class DeviceListener:
         message: Type of the messages.
 
     Raises:
-        SessionError: There is no such topic, or none with poses; the text names those with poses.
+        SessionError: There is no such topic, or none of a device; the text names those of devices.
     """
 
     def __init__(self, topic: str, domain: int, patience: float = PATIENCE) -> None:
@@ -65,22 +64,36 @@ class DeviceListener:
         self._node.destroy_node()
         self._context.try_shutdown()
 
-    def place(self, patience: float = PATIENCE) -> Array:
+    def place(self) -> Array:
         """Where the stylus is now, (3,) in the device's unit.
 
         Raises:
             SessionError: No message came.
         """
-        assert self._subscription is not None
-        newest, end = self._newest(), time.monotonic() + patience
+        found: Array = pose_of(self._latest())[:3]
+        return found
+
+    def joints(self) -> dict[str, float]:
+        """Where the joints of a jointed device are now [rad or m], by their names.
+
+        Raises:
+            SessionError: No message came, or one without a position for each name.
+        """
+        message = self._latest()
+        if not message.name or len(message.name) != len(message.position):
+            raise SessionError(f"{self.topic} does not say one position for each name")
+        return dict(zip(message.name, message.position, strict=True))
+
+    def _latest(self) -> Any:
+        """Newest message; waits for the first one that comes from now on."""
+        newest, end = self._newest(), time.monotonic() + PATIENCE
         while (later := self._newest()) is not None or newest is None:
             newest = later if later is not None else newest
             if newest is None:
                 if time.monotonic() > end:
                     raise SessionError(f"{self.topic} is there, but silent: does the driver run?")
                 self._waiter.wait(0.1)
-        found: Array = pose_of(newest)[:3]
-        return found
+        return newest
 
     def _newest(self) -> Any:
         """Message that waits, if any; of those before it nothing is kept."""
@@ -92,15 +105,15 @@ class DeviceListener:
         end = time.monotonic() + patience
         while True:
             known = dict(self._node.get_topic_names_and_types())
-            found = [kind for kind in known.get(self.topic, ()) if kind in _POSES]
+            found = [kind for kind in known.get(self.topic, ()) if kind in POSE_MESSAGES]
             if found:
                 return found[0]
             if time.monotonic() > end:
                 break
             time.sleep(0.05)
-        others = sorted(name for name, kinds in known.items() if set(kinds) & set(_POSES))
+        others = sorted(name for name, kinds in known.items() if set(kinds) & set(POSE_MESSAGES))
         what = f"is {', '.join(known[self.topic])}" if self.topic in known else "is not there"
         raise SessionError(
-            f"{self.topic} {what} on ROS domain {domain}; topics with poses: "
+            f"{self.topic} {what} on ROS domain {domain}; topics of devices: "
             f"{', '.join(others) or 'none'}"
         )

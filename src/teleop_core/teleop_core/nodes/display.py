@@ -9,6 +9,9 @@ from dataclasses import replace
 from teleop_core.graph.topics import (
     MASTER_MEASURED_CF,
     MASTER_MEASURED_CP,
+    SLAVE_JAW_BOARD,
+    SLAVE_JAW_MEASURED_JS,
+    SLAVE_JAW_OBJECT_CP,
     SLAVE_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_MEASURED_JS,
@@ -21,7 +24,8 @@ from teleop_core.nodes.newest import Cadence, Newest
 
 SEEN = (
     MASTER_MEASURED_CP, MASTER_MEASURED_CF, SLAVE_SERVO_CP, SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS,
-    SLAVE_MEASURED_CP, SLAVE_MEASURED_CF,
+    SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP,
+    SLAVE_JAW_BOARD,
 )  # fmt: skip
 """Streams that are said again."""
 PERIOD_NS = 25_000_000

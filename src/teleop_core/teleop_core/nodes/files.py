@@ -12,6 +12,7 @@ import yaml
 
 from teleop_core.base.errors import TeleopError
 from teleop_core.base.parameters import build
+from teleop_core.base.plain_yaml import FullDumper
 from teleop_core.graph.graph import Graph, build_graph
 from teleop_core.graph.layers import SESSION, SessionParameters
 
@@ -54,17 +55,10 @@ def _read(path: Path) -> Any:
         raise TeleopError(f"{path}: is not YAML: {' '.join(str(error).split())}") from error
 
 
-class _Plain(yaml.SafeDumper):
-    """Writes equal parts in full: rcl cannot read references."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
 def _copy(content: dict[str, Any]) -> str:
     """Place of a copy for this process, in a file without a name: nothing can stay of it."""
     file = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
-    yaml.dump(content, file, Dumper=_Plain, allow_unicode=True, sort_keys=False)
+    yaml.dump(content, file, Dumper=FullDumper, allow_unicode=True, sort_keys=False)
     file.flush()
     _copies.append(file)  # it is there as long as it is open
     return f"/dev/fd/{file.fileno()}"

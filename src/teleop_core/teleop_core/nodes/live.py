@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import IO, Any
 import yaml
 from rich.console import Console
 
-from teleop_core.base.errors import RecordingError, SessionError
+from teleop_core.base.errors import ParameterError, RecordingError, SessionError, UnknownNameError
 from teleop_core.base.texts import printable
 from teleop_core.graph.graph import HAND, RECORDER_NAME, Graph
 from teleop_core.graph.layers import SESSION
@@ -47,17 +47,28 @@ Crew = dict[str, tuple[str, ...]]
 """Processes that are started together, each with its nodes."""
 
 
-def _crews(graph: Graph, *, is_composed: bool) -> tuple[Crew, ...]:
-    """Processes of a graph: the recorder before the others, or all in one."""
+def _crews(graph: Graph, *, is_composed: bool, without: Collection[str] = ()) -> tuple[Crew, ...]:
+    """Processes of a graph: the recorder before the others, or all in one.
+
+    Raises:
+        UnknownNameError: A node that is to be left out is not there.
+        ParameterError: It shares a process with others.
+    """
     names = tuple(member.name for member in graph.members)
+    for name in without:
+        if name not in names:
+            raise UnknownNameError("node of the session", name, names)
     if is_composed:
+        if without:
+            raise ParameterError("--without", ", ".join(without), "a process for each node")
         return ({SESSION_NODE: (*names, RECORDER_NAME)},)
-    return ({RECORDER_NAME: (RECORDER_NAME,)}, {name: (name,) for name in names})
+    own: Crew = {name: (name,) for name in names if name not in without}
+    return ({RECORDER_NAME: (RECORDER_NAME,)}, own)
 
 
 def live(
     configuration: Configuration, out: Path, console: Console, *, is_composed: bool = False,
-    interrupt: Interrupt | None = None,
+    without: Collection[str] = (), interrupt: Interrupt | None = None,
 ) -> None:  # fmt: skip
     """Run and record a session as ROS 2 nodes, for the configured duration or until Ctrl-C.
 
@@ -66,16 +77,21 @@ def live(
         out: Directory of the recording, made here.
         console: Where the progress is shown.
         is_composed: Whether all nodes share one process, in place of one each.
+        without: Nodes that are not started: others stand in their place, such as an arm bridge in
+            that of ``slave_sim``.
         interrupt: What ends it from another thread; None for signals alone.
 
     Raises:
         RecordingError: The directory exists.
+        UnknownNameError: A node that is to be left out is not there.
+        ParameterError: It shares a process with others.
         SessionError: The ROS domain has a session already; or a node did not start, died or
             hangs, and then the recording is closed nevertheless.
     """
     out = Path(out).absolute()
     if out.exists():
         raise RecordingError(out, "exists already; choose another --out")
+    crews = _crews(configuration.graph, is_composed=is_composed, without=without)
     env = environment()
     remove_leftovers()
     interrupt = interrupt or Interrupt()
@@ -90,7 +106,7 @@ def live(
         parameters.write(parameter_file(configuration, str(out)))
         parameters.flush()
         session = _Session(configuration, console, observer, parameters, env, interrupt, starter)
-        session.crews = _crews(configuration.graph, is_composed=is_composed)
+        session.crews = crews
         session.tell_where(out)
         for note in notes_of(configuration, transport=_TRANSPORT[is_composed]):
             session.say(f"note: {note}")
@@ -206,7 +222,8 @@ class _Session:
 
     def _await_operator(self) -> None:
         """Wait until the hand moves; it does after a while even if nothing follows it."""
-        operators = [m.name for m in self._graph.members if m.stage.name == HAND]
+        hands = [m.name for m in self._graph.members if m.stage.name == HAND]
+        operators = [name for name in hands if name in self._observer.statuses]
         while not all(self._observer.statuses[m].number("has_begun") for m in operators):
             self._observer.listen(0.1)
             self._check()
@@ -266,7 +283,8 @@ class _Session:
         refused = sum(status.number("refused") for status in statuses.values())
         parts = []
         for member in self._graph.members:
-            if member.stage.name == self._graph.chain()[-1][0]:
+            is_arm = member.stage.name == self._graph.chain()[-1][0]
+            if is_arm and member.name in statuses:
                 parts += self._slave_line(member.arm, statuses[member.name])
         parts.append(f"refused {refused:.0f}")
         warnings = [f"{n}: {s.message}" for n, s in statuses.items() if s.level >= WARNING]

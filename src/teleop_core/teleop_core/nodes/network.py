@@ -7,6 +7,7 @@ from teleop_core.chain.network.network import BACK, THERE
 from teleop_core.chain.network.parameters import NetworkParameters
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import (
+    NETWORK_JAW_SERVO_JP,
     NETWORK_MASTER_ENERGY,
     NETWORK_SERVO_CP,
     NETWORK_SETPOINT_CP,
@@ -15,7 +16,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.nodes.ticking import TickingNode
 
-_THERE = (NETWORK_SERVO_CP, NETWORK_MASTER_ENERGY)
+_THERE = (NETWORK_SERVO_CP, NETWORK_MASTER_ENERGY, NETWORK_JAW_SERVO_JP)
 
 
 class NetworkNode(TickingNode):

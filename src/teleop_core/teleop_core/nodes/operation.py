@@ -66,7 +66,9 @@ class StopInput:
     The first reader is looked at in every tick, the two others in every fourth. No press is lost:
     readers keep all messages, a missing message counts as a press
     (:class:`~teleop_core.slave.operation.presses.Presses`), and a :class:`StopButton` that was
-    pressed before it was found tells so.
+    pressed before it was found tells so. What is missing shows in the numbers of messages, and in
+    the account of the first reader, which hears all who send reliably: a process that stands still
+    as a button is found loses the first messages, and no number tells.
 
     Args:
         node: Node that owns it.
@@ -89,7 +91,7 @@ class StopInput:
                     found += self._presses.take(taken.sender, taken.number, is_pressed=is_pressed)
                 elif not self._presses.knows(taken.sender):
                     found.append(is_pressed)
-        return found
+        return [*self._presses.lose(self._takers[0].lost), *found]
 
     @property
     def lost(self) -> int:

@@ -11,13 +11,15 @@ from teleop_core.base.errors import TeleopError
 from teleop_core.base.own_parts import load_own_parts
 from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.making import make_node
-from teleop_core.nodes.naming import taken_names
 from teleop_core.nodes.process import run
 
 SESSION = "teleop_session"
 """Executable of a whole session in one process."""
 ANY = "stage"
 """Executable of any stage."""
+_FLAGS = ("-r", "--remap")
+_RULES = {"__ns": "__ns", "__node": "__node", "__name": "__node"}
+"""Rules for all nodes of a process; a rule for one node has its name and a colon before it."""
 
 
 def main() -> int:
@@ -51,6 +53,29 @@ def _start() -> int:
         return run(lambda: TeleopSession(names.get("__ns", "").strip("/")))
     stage = STAGES.find(name)
     return run(lambda: make_node(stage))
+
+
+def taken_names(arguments: list[str]) -> tuple[list[str], dict[str, str]]:
+    """Take the rules out that would name all nodes of a process alike.
+
+    The middleware applies ``__node:=arm``, as launch files give it, to every node of a process,
+    and ``__ns:=/lab`` in place of the namespaces of arms. A process of several nodes takes them
+    out, and puts the namespace before those of its nodes itself.
+
+    Returns:
+        The other arguments, and what was given: ``__ns``, ``__node``.
+    """
+    kept, names = list[str](), dict[str, str]()
+    is_ros = False
+    for word in arguments:
+        is_ros = (is_ros or word == "--ros-args") and word != "--"
+        rule, is_rule, value = word.partition(":=")
+        if is_ros and is_rule and rule in _RULES and kept[-1:] and kept[-1] in _FLAGS:
+            kept.pop()
+            names[_RULES[rule]] = value
+            continue
+        kept.append(word)
+    return kept, names
 
 
 def help_text(name: str) -> str:

@@ -20,6 +20,7 @@ entry-point group ``teleop_core.robots`` of an installed package, gives a robot 
 """
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from teleop_core.base.errors import ParameterError
@@ -34,7 +35,15 @@ from teleop_core.robots.kinematics import (
     IkStatus,
     Kernels,
 )
-from teleop_core.robots.parts import ROBOTS, Part, RobotPart, built, from_file, part_name
+from teleop_core.robots.parts import (
+    ARGUMENT,
+    ROBOTS,
+    Part,
+    RobotPart,
+    built,
+    from_file,
+    part_name,
+)
 from teleop_core.robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -106,12 +115,13 @@ def load_robot(name: str, **geometry: float | str) -> Robot:
     """Robot by name.
 
     Args:
-        name: One of :func:`list_robots`, or the path of a URDF, which ends in ``.urdf``, or of a
-            Denavit-Hartenberg table, which ends in ``.yaml`` or ``.yml``.
+        name: One of :func:`list_robots`, or the path of a URDF, which ends in ``.urdf`` or
+            ``.xacro``, or of a Denavit-Hartenberg table, which ends in ``.yaml`` or ``.yml``.
         **geometry: Lengths and angles in place of the published ones [m, rad], by the symbols of
             the robot's file; a robot may take named options too, such as ``heading="carried"``.
             A URDF takes ``tip="tool0"`` and ``task="x y z"``
-            (:func:`teleop_core.robots.from_urdf.load_urdf`). Tables and robots that were
+            (:func:`teleop_core.robots.from_urdf.load_urdf`), and a xacro its own arguments, as
+            ``**{"xacro.prefix": "left_"}``. Tables and robots that were
             registered ready-made take none.
 
     Returns:
@@ -131,8 +141,8 @@ def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
 
     Args:
         name: As for :func:`load_robot`.
-        settings: Lengths and angles [m, rad] such as ``L6=0.04``, or options such as
-            ``heading=carried``.
+        settings: Lengths and angles [m, rad] such as ``L6=0.04``, options such as
+            ``heading=carried``, or arguments of a xacro such as ``xacro.prefix=left_``.
 
     Returns:
         The robot.
@@ -140,13 +150,25 @@ def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
     Raises:
         ParameterError: A text without "="; and all errors of :func:`load_robot`.
     """
+    return load_robot(name, **geometry_of(settings))
+
+
+def geometry_of(settings: Iterable[str]) -> dict[str, float | str]:
+    """Geometry of :func:`load_robot` from texts ``symbol=value``; numbers become numbers.
+
+    Arguments of a xacro stay texts.
+
+    Raises:
+        ParameterError: A text without "=".
+    """
     geometry: dict[str, float | str] = {}
     for text in settings:
         symbol, equals, value = text.partition("=")
         if not equals:
             raise ParameterError("geometry", text, "symbol=value, such as L6=0.04")
-        try:
-            geometry[symbol.strip()] = float(value)
-        except ValueError:
-            geometry[symbol.strip()] = value.strip()
-    return load_robot(name, **geometry)
+        name = symbol.strip()
+        geometry[name] = value.strip()
+        if not name.startswith(ARGUMENT):
+            with suppress(ValueError):
+                geometry[name] = float(value)
+    return geometry

@@ -16,7 +16,7 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.dh_kernels import append_fixed, move_joint
+from teleop_core.robots.dh_kernels import append_fixed, jacobian, move_joint
 from teleop_core.robots.drives import Dynamics
 from teleop_core.robots.rigid_body import invert_positive
 
@@ -192,6 +192,30 @@ def inverse_dynamics(q: Array, dq: Array, ddq: Array, row: Array, effort: Array)
     _efforts(axes, bodies, dq, ddq, row, effort)
     for i in range(n):
         effort[i] += row[row.shape[0] - n + i] * ddq[i]
+
+
+@kernel
+def tip_efforts(q: Array, wrench: Array, row: Array, effort: Array) -> None:
+    """Write the efforts (n,) [N·m or N] that a wrench from outside on the tip gives the joints.
+
+    Under it the chain moves as :func:`inverse_dynamics` says with the drives' efforts and these.
+
+    Args:
+        q: Joint positions (n,) [rad or m].
+        wrench: Force [N], then torque [N·m], at the origin of the tip in the axes of the base (6,).
+        row: See :func:`chain_row`.
+        effort: Written.
+
+    Source:
+        Craig 2005, section 5.10 (the transposed Jacobian maps forces to efforts).
+    """
+    n = q.shape[0]
+    J = np.empty((6, n))
+    jacobian(q, row, J)
+    for i in range(n):
+        effort[i] = 0.0
+        for j in range(6):
+            effort[i] += J[j, i] * wrench[j]
 
 
 @kernel

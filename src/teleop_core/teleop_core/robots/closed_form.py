@@ -25,7 +25,7 @@ from teleop_core.robots.branches import (
     wrapped,
 )
 from teleop_core.robots.damped import ZERO, assign
-from teleop_core.robots.dh_kernels import descend, fk, is_hardly_moving
+from teleop_core.robots.dh_kernels import descend, descend_long, fk, is_hardly_moving
 from teleop_core.robots.kinematics import IkStatus, pose_residual
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the search that makes the best of a branch out of limits
@@ -230,7 +230,10 @@ def _best_of_rest(
         for i in range(n):
             start = found[k, i] if k >= 0 else (seed[i] if k == -1 else q[i])
             trial[i] = min(max(start, box[0, i]), box[1, i])
-        error = descend(T, box, geometry, _PATH_ROUNDS if is_path else _ROUNDS, trial)
+        if is_path:
+            error = descend(T, box, geometry, _PATH_ROUNDS, trial)
+        else:
+            error = descend_long(T, box, geometry, trial)
         if error < least:
             least = error
             assign(q, trial)

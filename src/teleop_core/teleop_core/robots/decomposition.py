@@ -39,7 +39,7 @@ class Solution:
 
 
 SEARCH = Solution(
-    text="search: damped least squares from the seed, then from 24 starts",
+    text="search: damped least squares from the seed, then from 24 starts or more",
     kernels=Kernels(
         fk=dh_kernels.fk,
         jacobian=dh_kernels.jacobian,

@@ -1,4 +1,4 @@
-"""Drives of a Denavit-Hartenberg table: what its ``drives`` section states, the rest assumed.
+"""Drives of a table or file: what it states of each joint, the rest assumed.
 
 What a joint does not state is assumed to be of the size of a small laboratory arm, and in
 proportion to its inertia, so that friction stays within what the simulation resolves.
@@ -6,10 +6,14 @@ proportion to its inertia, so that friction stays within what the simulation res
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from teleop_core.base import plain_yaml
+from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.robots.drives import ENTRIES, MAY_BE_ZERO, Drives
 
@@ -65,6 +69,19 @@ def least_inertia(kind: str, viscous: float, coulomb: float) -> float:
     return 1.001 * (viscous + coulomb / slow) / (_STIFFEST - rate)
 
 
+def read_drives(
+    path: Path, names: Sequence[str], kinds: Sequence[str]
+) -> tuple[dict[str, float], ...]:
+    """Stated entries [SI] of each joint, from a YAML file like the ``drives`` section of a table.
+
+    Raises:
+        RecordingError: The file cannot be read, or is not YAML.
+        TeleopError: As :func:`parse_drives`, but for friction that is too stiff.
+    """
+    with damage_told(path):
+        return _entries(plain_yaml.read(path), names, kinds, 1.0)
+
+
 def parse_drives(
     content: Any, names: Sequence[str], kinds: Sequence[str], unit: float
 ) -> tuple[dict[str, float], ...]:
@@ -80,6 +97,15 @@ def parse_drives(
         UnknownNameError: A joint or an entry that does not exist.
         ParameterError: A value that is not possible.
     """
+    stated = _entries(content, names, kinds, unit)
+    for name, kind, own in zip(names, kinds, stated, strict=True):
+        _refuse_stiff(f"drives {name}", assumed_drive(kind, own))
+    return stated
+
+
+def _entries(
+    content: Any, names: Sequence[str], kinds: Sequence[str], unit: float
+) -> tuple[dict[str, float], ...]:
     section = {} if content is None else content
     if not isinstance(section, Mapping):
         raise ParameterError("drives", section, "a mapping from joint names to their entries")
@@ -87,12 +113,12 @@ def parse_drives(
         if name not in names:
             raise UnknownNameError("drives joint", name, names)
     return tuple(
-        _joint(f"drives {name}", section.get(name, {}), unit if kind == "turn" else 1.0, kind)
+        _joint(f"drives {name}", section.get(name, {}), unit if kind == "turn" else 1.0)
         for name, kind in zip(names, kinds, strict=True)
     )
 
 
-def _joint(where: str, content: Any, unit: float, kind: str) -> dict[str, float]:
+def _joint(where: str, content: Any, unit: float) -> dict[str, float]:
     if not isinstance(content, Mapping):
         raise ParameterError(where, content, "a mapping of entries such as {speed_limit: 2.0}")
     stated: dict[str, float] = {}
@@ -101,7 +127,6 @@ def _joint(where: str, content: Any, unit: float, kind: str) -> dict[str, float]
             raise UnknownNameError(f"{where} entry", name, ENTRIES)
         number = _number(f"{where} {name}", name, value)
         stated[name] = number * (unit if name in _OF_POSITION else 1.0)
-    _refuse_stiff(where, assumed_drive(kind, stated))
     return stated
 
 
@@ -109,6 +134,9 @@ def _number(where: str, name: str, value: Any) -> float:
     is_least_zero, most = name in MAY_BE_ZERO, _FASTEST.get(name, math.inf)
     needed = "a finite number" + (" >= 0" if is_least_zero else " > 0")
     needed += f", <= {most:g}" if name in _FASTEST else ""
+    if isinstance(value, str):  # YAML 1.1 takes 1e-4, without a point, for a word
+        with suppress(ValueError):
+            value = float(value)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ParameterError(where, value, needed)
     if value < 0.0 or (value == 0.0 and not is_least_zero) or value > most:

@@ -21,7 +21,8 @@ from teleop_core.robots.kinematics import REACHED, IkStatus, is_askable, pose_re
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of one search
 _DAMPING, _HOPELESS = 1e-2, 1e10  # per squared error: at the start, and where no step helps
-_STARTS = 24  # further searches when the one from the seed fails
+_STARTS, _MOST_STARTS = 24, 120  # further searches when that from the seed fails, and all fail
+_CLOSE, _LONG_ROUNDS = 1e-8, 1000  # squared error in a flat valley, which takes longer to walk
 _ALL_STARTS = 200  # searches for all branches
 _SAME = 1e-6  # joint vectors this close are one [rad, m]
 _NEAR = 0.02  # pivot under which small moves need large joint moves
@@ -188,6 +189,18 @@ def descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> flo
 
 
 @kernel
+def descend_long(T: Array, box: Array, geometry: Array, q: Array) -> float:
+    """:func:`descend`, with more rounds where it ends close to the pose.
+
+    That happens beside singular postures, where the error falls into a flat and curved valley.
+    """
+    square = descend(T, box, geometry, _ROUNDS, q)
+    if ZERO < square < _CLOSE:
+        square = descend(T, box, geometry, _LONG_ROUNDS, q)
+    return square
+
+
+@kernel
 def _start(number: int, box: Array, q: Array) -> None:
     """Write the joint vector (n,) of one in an even sequence over a box (2, n).
 
@@ -213,11 +226,16 @@ def _distance(a: Array, b: Array) -> float:
 
 @inner
 def _search(T: Array, seed: Array, box: Array, geometry: Array, q: Array) -> None:
-    """Look from all over the box; replace ``q`` by the reached pose nearest to the seed."""
+    """Look from all over the box; replace ``q`` by the reached pose nearest to the seed.
+
+    Poses that few starts reach, beside singular postures and limits, are looked for longer.
+    """
     trial, nearest = np.empty(q.shape[0]), math.inf
-    for number in range(_STARTS):
+    for number in range(_MOST_STARTS):
+        if number >= _STARTS and nearest < math.inf:
+            break
         _start(number, box, trial)
-        if descend(T, box, geometry, _ROUNDS, trial) > ZERO:
+        if descend_long(T, box, geometry, trial) > ZERO:
             continue
         distance = _distance(trial, seed)
         if distance < nearest:
@@ -277,8 +295,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         box[0, i] = max(limits[0, i], near - limits[2, i])
         box[1, i] = min(limits[1, i], near + limits[2, i])
         q[i] = near
-    square = descend(T, box, geometry, _PATH_ROUNDS if is_path else _ROUNDS, q)
-    if square > ZERO and not is_path:
+    if is_path:
+        descend(T, box, geometry, _PATH_ROUNDS, q)
+    elif descend_long(T, box, geometry, q) > ZERO:
         _search(T, seed, box, geometry, q)
     return int(_status(q, T, box, geometry, residual))
 

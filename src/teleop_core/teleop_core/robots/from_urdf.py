@@ -5,9 +5,10 @@ between them that mimics another moves with it (:mod:`teleop_core.robots.followe
 are those of Denavit-Hartenberg chains (:mod:`teleop_core.robots.dh_kernels`), the dynamics those of
 rigid bodies (:mod:`teleop_core.robots.chain_dynamics`). Effort and velocity limits, damping and
 friction are the drives' where they stand in the file and are above zero. The inertia of a drive is
-that of the links at home; that of its motor is in no URDF. Whatever is left out is assumed as for
-tables (:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are read
-where they are drawn (:mod:`teleop_core.robots.bodies.looks`).
+that of the links at home; that of its motor is in no URDF. A file of drives may state it, and what
+else a URDF leaves out. Whatever is left out there too is assumed as for tables
+(:mod:`teleop_core.robots.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are read where
+they are drawn (:mod:`teleop_core.robots.bodies.looks`).
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -28,7 +29,7 @@ from teleop_core.kernels.portable import dot, length, product
 from teleop_core.robots.chain_dynamics import body_row, chain_dynamics, chain_row
 from teleop_core.robots.decomposition import SEARCH, solution_of
 from teleop_core.robots.dh_chain import DhJoint, chain_robot
-from teleop_core.robots.dh_drives import drives_of, least_inertia, parse_drives
+from teleop_core.robots.dh_drives import drives_of, least_inertia, parse_drives, read_drives
 from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
 from teleop_core.robots.followers import (
     Follower,
@@ -56,6 +57,7 @@ from teleop_core.robots.urdf_tree import (
     turn_of_z,
 )
 from teleop_core.robots.visuals import visuals_of
+from teleop_core.robots.xacro_files import xml_of
 
 MODELS = ("independent", "links")
 """How the arm of a file may move: see :func:`load_urdf`."""
@@ -65,18 +67,28 @@ _POWERS = {"viscous": 2, "coulomb": 1}  # of a factor, by which friction of a fo
 
 
 def load_urdf(
-    path: Path | str, *, tip: str = "", task: str = "", dynamics: str = "independent"
+    path: Path | str,
+    arguments: Mapping[str, str] | None = None,
+    *,
+    tip: str = "",
+    task: str = "",
+    dynamics: str = "independent",
+    drives: str = "",
 ) -> Robot:
     """Robot whose joints are those between the root of a URDF and a tip.
 
     Args:
-        path: The file. Of xacro, write one first: ``xacro arm.xacro > arm.urdf``.
+        path: The file; one that ends in ``.xacro`` is expanded by the package ``xacro``.
+        arguments: Texts for the ``<xacro:arg>`` of a xacro, by their names.
         tip: Link whose frame is the tip; empty for the only link without a child.
         task: Directions that the arm is to control, of :data:`DIRECTIONS`, with blanks or commas
             between them; empty for all. An arm of fewer than six joints controls fewer.
         dynamics: Of :data:`MODELS`. independent: axes that do not act on each other, gravity
             balanced. links: the bodies of the file, which weigh and act on each other; the
             controller feeds their gravity forward.
+        drives: YAML file of what the drives of the joints are, by their names, in the entries of
+            :class:`~teleop_core.robots.drives.Drives`; it stands above the URDF. Inertia is that
+            of the motor, to which that of the links is added.
 
     Returns:
         The robot, its base the root link, with inverse kinematics in closed form if it is of a
@@ -87,11 +99,13 @@ def load_urdf(
         RecordingError: The file cannot be read, or is not XML.
         ParameterError: An element that is missing or not possible; the message names it. With
             dynamics of links also a joint beside the way to the tip that moves with one on it.
-        UnknownNameError: A tip, direction, dynamics, link or type of joint that does not exist.
+        UnknownNameError: A tip, direction, dynamics, link, type of joint, argument of a xacro, or
+            joint or entry of the drives that does not exist.
+        TeleopError: The package ``xacro`` is needed and not installed.
     """
     if dynamics not in MODELS:
         raise UnknownNameError("dynamics", dynamics, MODELS)
-    root = root_of(Path(path))
+    root = root_of(Path(path), xml_of(Path(path), arguments or {}))
     links = elements_of(root, "link")
     joints = [
         joint_of(name, element, links) for name, element in elements_of(root, "joint").items()
@@ -115,7 +129,7 @@ def load_urdf(
     bodies, inertia = _bodies(moving, base, links, joints, may_be_any), np.zeros((n, n))
     chain_numbers = chain_row(kinds, fixed, bodies, np.zeros(len(moving)))
     follower_inertia(home, dynamics_row(followers, chain_numbers, np.zeros(n)), inertia)
-    drives = _drives(trains, np.diag(inertia).tolist())
+    table = _drives(trains, np.diag(inertia).tolist(), str(drives))
     solution = solution_of(kinds, fixed, reach, _task(task)) if followers.is_plain else SEARCH
     robot = chain_robot(
         name=root.get("name") or Path(path).stem,
@@ -124,7 +138,7 @@ def load_urdf(
         fixed=fixed,
         reach=reach,
         task=_task(task),
-        drives=drives,
+        drives=table,
         solution=solution,
         followers=None if followers.is_plain else followers,
     )
@@ -134,13 +148,13 @@ def load_urdf(
     robot = replace(robot, visuals=visuals, start=None)
     if dynamics == "independent":
         return robot
-    motors = np.maximum(drives.inertia - np.diag(inertia), 0.0)
+    motors = np.maximum(table.inertia - np.diag(inertia), 0.0)
     if followers.is_plain:
         model = chain_dynamics(chain_row(kinds, fixed, bodies, motors))
     else:
         _refuse_beside(leaders, moving, joints)
         model = follower_dynamics(dynamics_row(followers, chain_numbers, motors), n)
-    _refuse_weak(leaders, drives, home, model)
+    _refuse_weak(leaders, table, home, model)
     return replace(robot, dynamics=model, start=None)
 
 
@@ -248,10 +262,12 @@ def _frames(chain: list[UrdfJoint]) -> tuple[list[Array], list[float]]:
     return [*fixed, last], kinds
 
 
-def _drives(trains: list[list[_Geared]], inertias: list[float]) -> Drives:
+def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Drives:
     """Drives of the leaders, which bear friction and keep speed limits of what follows them."""
     kinds, stated = [KINDS[train[0].joint.kind] for train in trains], {}
-    for train, kind, inertia in zip(trains, kinds, inertias, strict=True):
+    names = [train[0].joint.name for train in trains]
+    given = read_drives(Path(file).expanduser(), names, kinds) if file else [{}] * len(trains)
+    for train, kind, inertia, drive in zip(trains, kinds, inertias, given, strict=True):
         own: dict[str, float] = {}
         for geared in train:
             factor = abs(geared.factor)
@@ -262,12 +278,16 @@ def _drives(trains: list[list[_Geared]], inertias: list[float]) -> Drives:
                     own[entry] = own.get(entry, 0.0) + value * math.pow(factor, _POWERS[entry])
                 elif geared is train[0]:
                     own[entry] = value
+        own |= drive
         least = least_inertia(kind, own.get("viscous", 0.0), own.get("coulomb", 0.0))
-        if max(inertia, least) > _NO_INERTIA:
+        if "inertia" in drive:
+            own["inertia"] = inertia + drive["inertia"]
+        elif max(inertia, least) > _NO_INERTIA:
             own["inertia"] = max(inertia, least)
         stated[train[0].joint.name] = own
-    drives = drives_of(kinds, parse_drives(stated, list(stated), kinds, 1.0))
-    assumed = tuple(name for name in ENTRIES if name in ("inertia", *drives.assumed))
+    drives = drives_of(kinds, parse_drives(stated, names, kinds, 1.0))
+    motors = ("inertia",) * any("inertia" not in drive for drive in given)
+    assumed = tuple(name for name in ENTRIES if name in (*motors, *drives.assumed))
     return replace(drives, assumed=assumed)
 
 

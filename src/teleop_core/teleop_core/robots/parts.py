@@ -17,6 +17,11 @@ _BUILT_IN = (
     "three_finger_hand", "puma560", "scara", "planar_3r", "five_axis",
 )  # fmt: skip
 _TABLE_ENDINGS = (".yaml", ".yml")
+_FILE_ENDINGS = (".urdf", ".xacro", *_TABLE_ENDINGS)
+DESCRIPTION = "_description"
+"""How names of the package ``robot_descriptions`` end."""
+ARGUMENT = "xacro."
+"""What stands before the name of an argument of a xacro in a robot's geometry."""
 # Of a failure of somebody else's kernel, which may be pages long.
 _MOST_CHARACTERS = 200
 
@@ -56,19 +61,38 @@ def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Ro
 
 
 def from_file(path: str, geometry: Mapping[str, float | str]) -> Robot | None:
-    """Robot of a URDF or of a Denavit-Hartenberg table; None for what is no name of a file."""
-    if path.endswith(".urdf"):
-        from teleop_core.robots.from_urdf import load_urdf
-
-        return built(path, partial(load_urdf, Path(path).expanduser()), geometry)
-    if path.endswith(".xacro"):
-        needed = "a .urdf; `xacro arm.xacro > arm.urdf` writes it"
-        raise ParameterError("robot", path, needed)
-    if not path.endswith(_TABLE_ENDINGS):
+    """Robot of a URDF, a description or a Denavit-Hartenberg table; None of other names."""
+    found = file_of(path)
+    if found is None:
         return None
-    from teleop_core.robots.dh import load_table
+    file, arguments = found
+    if file.suffix in _TABLE_ENDINGS:
+        from teleop_core.robots.dh import load_table
 
-    return built(path, load_table(Path(path).expanduser()), geometry)
+        return built(path, load_table(file), geometry)
+    from teleop_core.robots.from_urdf import load_urdf
+
+    options = {name: v for name, v in geometry.items() if not name.startswith(ARGUMENT)}
+    return built(path, partial(load_urdf, file, arguments | arguments_of(geometry)), options)
+
+
+def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
+    """File of a robot's name, and arguments that come with it for a xacro; None of other names.
+
+    Raises:
+        TeleopError: As :func:`~teleop_core.robots.descriptions.description_file`.
+    """
+    if name.endswith(DESCRIPTION) and name not in ROBOTS.names():
+        from teleop_core.robots.descriptions import description_file
+
+        return description_file(name)
+    return (Path(name).expanduser(), {}) if name.endswith(_FILE_ENDINGS) else None
+
+
+def arguments_of(geometry: Mapping[str, float | str]) -> dict[str, str]:
+    """Arguments of a xacro that a robot's geometry holds, by their names."""
+    given = {n: str(v) for n, v in geometry.items() if n.startswith(ARGUMENT)}
+    return {name.removeprefix(ARGUMENT): value for name, value in given.items()}
 
 
 def _refuse_unknown(make: Callable[..., Robot], geometry: Mapping[str, float | str]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels import pointer, raise_pending
 from teleop_core.kernels.geometry import Array, checked_array, is_rigid
+from teleop_core.kernels.portable import product
 from teleop_core.robots import forward_kinematics, kinematics
 from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
 from teleop_core.robots.hardware import Hardware
@@ -309,6 +310,33 @@ class Robot:
             forward_kinematics.closed_poses(self, joints)
         out = np.empty((6, self.n))
         self.kernels.jacobian(joints, self._row, out)
+        return out
+
+    def forward_dynamics(
+        self, q: object, dq: object, effort: object, wrench: object = None
+    ) -> Array:
+        """Joint accelerations (n,) [rad/s² or m/s²] under efforts, and a wrench on the tip.
+
+        Args:
+            q: Joint vector (n,) [rad, m].
+            dq: Joint speeds (n,) [rad/s or m/s].
+            effort: Of the drives, less friction (n,) [N·m or N].
+            wrench: From outside, at the origin of the tip in base axes (6,): force [N], then
+                torque [N·m]; None for none.
+
+        Raises:
+            ShapeError: Another shape.
+            ParameterError: NaN or infinity, or a robot without drives and dynamics.
+            ClosureError: No assembly has these joints.
+        """
+        if self.dynamics is None:
+            raise ParameterError("dynamics", None, f"that of a slave: {self.name} has no drives")
+        given = {"q": q, "dq": dq, "effort": effort}
+        place, speed, net = (read_only(n, row, (self.n,)).copy() for n, row in given.items())
+        if wrench is not None:  # the transposed Jacobian maps it to efforts (Craig 2005, 5.10)
+            net += product(self.jacobian(q).T, read_only("wrench", wrench, (6,)))
+        out = np.empty(self.n)
+        self.dynamics.acceleration(place, speed, net, self.dynamics.parameters.copy(), out)
         return out
 
     def ik(self, T: object, seed: object = None) -> IkOne:

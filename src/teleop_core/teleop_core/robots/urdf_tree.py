@@ -45,19 +45,34 @@ class _NoDoctype(Xml.TreeBuilder):
         raise ParameterError("<!DOCTYPE>", name, "left out: a URDF declares no entities")
 
 
-def root_of(path: Path) -> Xml.Element:
+def root_of(path: Path, data: bytes) -> Xml.Element:
     """Root of a URDF.
 
+    Args:
+        path: The file, for what is told of it.
+        data: Its XML.
+
     Raises:
-        RecordingError: It cannot be read, or is not XML.
+        RecordingError: It is not XML.
         ParameterError: It is another file, or declares a type of document.
     """
     with damage_told(path):
-        builder = Xml.XMLParser(target=_NoDoctype())
-        builder.feed(path.read_bytes())
-        root: Xml.Element = builder.close()
+        root = tree_of(data)
     if root.tag != "robot":
         raise ParameterError(str(path), f"<{root.tag}>", "a <robot>")
+    return root
+
+
+def tree_of(data: bytes) -> Xml.Element:
+    """Root of an XML file.
+
+    Raises:
+        ParseError: It is not XML.
+        ParameterError: It declares a type of document.
+    """
+    builder = Xml.XMLParser(target=_NoDoctype())
+    builder.feed(data)
+    root: Xml.Element = builder.close()
     return root
 
 
@@ -122,11 +137,11 @@ def joints_by_child(joints: list[UrdfJoint]) -> dict[str, UrdfJoint]:
 
 def root_link(links: Links, by_child: Mapping[str, UrdfJoint]) -> str:
     """The one link that nothing carries; refuses circles and several."""
+    for link in links:
+        chain_to(link, by_child)
     roots = [name for name in links if name not in by_child]
     if len(roots) != 1:
         raise ParameterError("links that are no child", roots, "one, the base")
-    for link in links:
-        chain_to(link, by_child)
     return roots[0]
 
 

@@ -1,10 +1,13 @@
 """Visuals: what the links of an arm look like, as its file says, and where the meshes are."""
 
+import hashlib
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
+from xml.etree import ElementTree as Xml
 
 import numpy as np
 
@@ -17,6 +20,7 @@ from teleop_core.robots.urdf_tree import (
     chain_to,
     numbers_of,
     origin_of,
+    tree_of,
     turn_of_z,
 )
 
@@ -56,11 +60,11 @@ class Visual:
 
 
 def mesh_file(name: str, urdf: Path) -> Path:
-    """File of a mesh that a URDF names.
+    """File of a mesh that a URDF names; :func:`kept_mesh` comes first.
 
     ``package://NAME/REST`` is looked for in folders called NAME beside and above that of the URDF,
-    below these folders themselves, and in the packages of ``AMENT_PREFIX_PATH`` and
-    ``ROS_PACKAGE_PATH``. Any other name starts from the folder of the URDF.
+    in the packages of ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``, and without NAME in the
+    folders above. Any other name starts from the folder of the URDF.
 
     Raises:
         ParameterError: It is nowhere there, is no mesh, or leads elsewhere: out of the package, or
@@ -77,20 +81,68 @@ def mesh_file(name: str, urdf: Path) -> Path:
     raise ParameterError("mesh", name, f"a file in a package, or near {urdf}")
 
 
+def kept_mesh(name: str, urdf: Path) -> Path:
+    """Where the copy of a URDF out of a recording has a mesh, whatever name it gives it."""
+    file = hashlib.sha256(name.encode()).hexdigest()[:16] + Path(name).suffix
+    return urdf.parent / "kept_meshes" / file
+
+
+def meshes_of(text: str, urdf: Path) -> dict[str, Path]:
+    """Files of the meshes that the visuals of a URDF name, by these names.
+
+    Args:
+        text: Its XML; what is none names no meshes.
+        urdf: The file, for what starts from its folder.
+
+    Returns:
+        Those that :func:`mesh_file` finds.
+    """
+    found: dict[str, Path] = {}
+    with suppress(Xml.ParseError, ParameterError):
+        for element in tree_of(text.encode()).iterfind("link/visual/geometry/mesh"):
+            name = element.get("filename", "")
+            with suppress(ParameterError, OSError):
+                found[name] = mesh_file(name, urdf)
+    return found
+
+
+def package_folder(name: str, urdf: Path) -> Path:
+    """Folder of a package, looked for as :func:`mesh_file` does.
+
+    Raises:
+        ParameterError: It is nowhere there, or is no plain name.
+    """
+    if name not in {"", ".", ".."} and name == Path(name).name:
+        for _, place in _packages(name, urdf.resolve().parent):
+            if place.is_dir():
+                return place
+    needed = f"a folder near {urdf}, or below AMENT_PREFIX_PATH or ROS_PACKAGE_PATH"
+    raise ParameterError("package", name, needed)
+
+
 def _candidates(name: str, folder: Path) -> Iterator[tuple[Path, Path]]:
     """Where a mesh may be, each with the folder that it must be below."""
-    above = [each for each in (folder, *folder.parents)[: _UP + 1] if each != each.parent]
+    above = _above(folder)
+    kept = kept_mesh(name, folder / "urdf")
+    yield kept.parent, kept
     if not name.startswith(_PACKAGE):
         yield above[-1], folder / name.removeprefix("file://")
         return
     package, _, rest = name.removeprefix(_PACKAGE).partition("/")
-    for each in above:
-        yield each, each / package / rest
-        yield each, each / rest
-    for prefix in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
-        yield Path(prefix) / "share" / package, Path(prefix) / "share" / package / rest
-    for place in filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)):
-        yield Path(place) / package, Path(place) / package / rest
+    yield from ((root, place / rest) for root, place in _packages(package, folder))
+    yield from ((each, each / rest) for each in above)
+
+
+def _packages(name: str, folder: Path) -> Iterator[tuple[Path, Path]]:
+    """Where a package may be, each with the folder that its files must be below."""
+    yield from ((each, each / name) for each in _above(folder))
+    for variable, below in (("AMENT_PREFIX_PATH", "share"), ("ROS_PACKAGE_PATH", "")):
+        for place in filter(None, os.environ.get(variable, "").split(os.pathsep)):
+            yield Path(place) / below / name, Path(place) / below / name
+
+
+def _above(folder: Path) -> list[Path]:
+    return [each for each in (folder, *folder.parents)[: _UP + 1] if each != each.parent]
 
 
 def visuals_of(

@@ -7,7 +7,7 @@ loaded from disk by every later session of the same graph.
 """
 
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from teleop_core.graph.graph import Graph, Link, Member
 from teleop_core.graph.signals import add, copy, topic_fields
 from teleop_core.graph.stage import Runner
 from teleop_core.kernels import (
+    apart,
     bound,
     is_kernel,
     kernel_from_source,
@@ -93,17 +94,15 @@ class Tick:
         self._size = size if self._is_whole else 1
         self._clock = records(_CLOCK)[0]
         self._samples, self._rows = records(dtype, self._size), records(dtype, self._size)
-        kernels = {name: value for name, value in text.objects.items() if is_kernel(value)}
-        given = [name for name in text.objects if name not in kernels]
-        arguments = tuple(text.objects[name] for name in given)
-        known = {**kernels, "copy": copy, "add": add}
-        sources = [_source(given, part) for part in text.parts if isinstance(part, list)]
+        given = tuple(text.objects.values())
+        known = {"copy": copy, "add": add}
+        sources = [_source(text.objects, part) for part in text.parts if isinstance(part, list)]
         self.source = "\n\n".join(sources)
         made = iter(sources)
         self._calls: list[Callable[[], object]] = [
             bound(
                 kernel_from_source(next(made), "tick", known),
-                arguments, self._clock, dt, self._samples, self._rows,
+                given, self._clock, dt, self._samples, self._rows,
             )
             if isinstance(part, list) else part
             for part in text.parts
@@ -153,7 +152,7 @@ def raised_by(error: Exception) -> PartError:
     return PartError("part", trace.name, f"{text}({Path(trace.filename).name}:{trace.lineno})")
 
 
-def _source(given: Sequence[str], lines: Sequence[str]) -> str:
+def _source(given: Iterable[str], lines: Sequence[str]) -> str:
     """Source of one segment: a loop over the rows."""
     head = [
         "def tick(given, clock, dt, samples, rows):",
@@ -196,7 +195,7 @@ def compose(
         text.objects |= {f"r{number}": runner.signals, f"a{number}": runner.arguments}
         is_compiled = is_kernel(runner.kernel)
         if is_compiled:
-            text.objects[f"k{number}"] = runner.kernel
+            text.objects[f"k{number}"] = apart(runner.kernel, *runner.arguments, runner.signals, dt)
         for link in graph.links_of(member):
             _say_link(text, link, places, runners, played, dt, rings)
         text.say(f"r{number}.now_ns = now_ns")

@@ -7,8 +7,10 @@ from typing import Any
 
 import yaml
 
-from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
 from teleop_core.base.parameters import Value, build, specs, values_of
+from teleop_core.chain.architectures import ARCHITECTURES
+from teleop_core.chain.architectures.impedance import IMPEDANCE
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.chain.passivity.slave_side import PASSIVITY
 from teleop_core.graph.graph import DEVICE, HAND, RECORDER_NAME, Graph, Member, build_graph
@@ -55,6 +57,7 @@ class Configuration:
             for name, values in layer.items():
                 merged.setdefault(name, {}).update(values)
         session = build(SessionParameters, merged.get(SESSION, {}), f"{SESSION}.")
+        _check_order(session.stages)
         graph = build_graph(session.arms, session.stages, session.delays)
         _check_names(merged, graph)
         groups: dict[str, Any] = {SESSION: session}
@@ -67,7 +70,7 @@ class Configuration:
         )
         for arm in graph.namespaces:
             _check_robots(graph, groups, arm)
-            _check_passivity(graph, groups, arm)
+            _check_sides(graph, groups, arm)
         return Configuration(groups, scenario, graph)
 
     def group(self, stage: str, arm: str = "") -> Any:
@@ -155,20 +158,47 @@ def _check_robots(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
             raise ParameterError(name, tuple(values), "the same in " + " and ".join(named))
 
 
-def _check_passivity(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
-    """Make sure that a kind of passivity that works from both sides has both.
+def _check_sides(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
+    """Make sure that what works from both sides has both, and that both agree.
 
     Raises:
-        ParameterError: The slave's side is not there.
+        ParameterError: The slave's side is not there, or does what another kind does.
     """
-    if PASSIVITY.name in (stage.name for stage in graph.stages):
-        return
+    names = [stage.name for stage in graph.stages]
     for stage in graph.stages:
         group = groups[Member(stage, arm).name]
-        kind = group.reflection.passivity.kind if hasattr(group, "reflection") else ""
-        if kind and PASSIVITIES.find(kind).needs_slave:
+        if not hasattr(group, "reflection"):
+            continue
+        passivity, law = group.reflection.passivity.kind, group.reflection.architecture.kind
+        is_whole = PASSIVITIES.find(passivity).needs_slave
+        if is_whole and PASSIVITY.name not in names:
             needed = f"a session with the stage {PASSIVITY.name}: teleop.stages=[{PASSIVITY.name}]"
-            raise ParameterError("reflection.passivity", kind, needed)
+            raise ParameterError("reflection.passivity", passivity, needed)
+        if is_whole and IMPEDANCE.name in names:
+            kinds = [PASSIVITIES.find(name) for name in PASSIVITIES]
+            others = ", ".join(kind.name for kind in kinds if not kind.needs_slave)
+            needed = f"one of {others} with the stage {IMPEDANCE.name}, for it leads the tip itself"
+            raise ParameterError("reflection.passivity", passivity, needed)
+        if ARCHITECTURES.find(law).needs_impedance and IMPEDANCE.name not in names:
+            parts = [ARCHITECTURES.find(name) for name in ARCHITECTURES]
+            others = ", ".join(part.name for part in parts if not part.needs_impedance)
+            stages = f"teleop.stages=[{IMPEDANCE.name}]"
+            needed = f"in a session with the stage {IMPEDANCE.name}, {stages}, or one of {others}"
+            raise ParameterError("reflection.architecture", law, needed)
+
+
+def _check_order(stages: Iterable[str]) -> None:
+    """Make sure that the slave yields on its own side, and passivity counts how it does.
+
+    Raises:
+        PartError: The stages are named in another order.
+    """
+    sides = ["network", IMPEDANCE.name, PASSIVITY.name]
+    order = [name for name in stages if name in sides]
+    wanted = sorted(order, key=sides.index)
+    if IMPEDANCE.name in order and order != wanted:
+        text = f"named in the order teleop.stages=[{', '.join(wanted)}], not {', '.join(order)}"
+        raise PartError("stage", IMPEDANCE.name, text)
 
 
 def _plain(value: Value) -> object:

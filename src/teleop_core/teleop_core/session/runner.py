@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.arms import ARMS_KEY
-from teleop_core.bags.kept_files import mesh_texts, recorded_files, robot_texts
+from teleop_core.bags.kept_files import KeptFiles, recorded_files, recorded_geometry
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
@@ -140,7 +140,7 @@ def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
 def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     """Configuration and scenario that a recording was made with; empty ones for foreign bags.
 
-    Files of a robot, a mesh and a field of heights are as they were then, see
+    Files of a robot, its drives, a mesh and a field of heights are as they were then, see
     :mod:`teleop_core.bags.kept_files`.
 
     Raises:
@@ -150,11 +150,15 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     layer = parse_text(text, f"{bag.path}: configuration") if text else {}
     if arms and not text:  # an import of several hands
         layer = {SESSION: {"arms": tuple(arms)}}
-    files = recorded_files(bag.metadata)
-    for values in layer.values():
+    owners = {name: name.rpartition("/")[0] for name in layer}
+    found = {arm: recorded_files(bag.metadata, arm) for arm in set(owners.values())}
+    for name, values in layer.items():
+        files = found[owners[name]]
         for key in ("robot", "world.mesh.file", "world.height_field.file"):
-            if (name := values.get(key)) in files:
-                values[key] = files[str(name)]
+            if (file := values.get(key)) in files:
+                values[key] = files[str(file)]
+        if isinstance(geometry := values.get("geometry"), tuple | list):
+            values["geometry"] = recorded_geometry(map(str, geometry), files)
     _begin_at_home(layer)
     return layer, bag.metadata.get("scenario", "")
 
@@ -225,18 +229,20 @@ def describe(configuration: Configuration) -> dict[str, str]:
     """Names and texts stored with a recording, so that it can be repeated."""
     from teleop_core import __version__
 
-    graph = configuration.graph
+    graph, files = configuration.graph, KeptFiles()
+    prefixes = {arm: f"{arm}/" if arm else "" for arm in graph.namespaces}
     about = {"version": __version__, "scenario": configuration.scenario}
     if graph.arms != ("",):
         about["arms"] = " ".join(graph.arms)
-    for arm in graph.namespaces:
-        prefix = f"{arm}/" if arm else ""
-        about |= {f"{prefix}{n}": str(configuration.value(n, arm)) for n in ("robot", "seed")}
-        about |= robot_texts(about[f"{prefix}robot"], prefix)
+    for arm, prefix in prefixes.items():  # before what only is looked at
         world = configuration.value("world", arm)
         if world is not None and world.kind.kind in {"mesh", "height_field"}:
-            about |= mesh_texts(world.kind.parameters.file, prefix)
-    return about | {"configuration": configuration.text()}
+            files.add_mesh(world.kind.parameters.file, prefix)
+    for arm, prefix in prefixes.items():
+        about |= {f"{prefix}{n}": str(configuration.value(n, arm)) for n in ("robot", "seed")}
+        geometry = configuration.value("geometry", arm) or ()
+        files.add_robot(about[f"{prefix}robot"], geometry, prefix)
+    return about | files.texts() | {"configuration": configuration.text()}
 
 
 class NewSamples:
@@ -249,6 +255,7 @@ class NewSamples:
     def __init__(self) -> None:
         self._last: dict[str, int] = {}
         self._values: dict[str, Array] = {}
+        self._periods: dict[str, int] = {}
 
     def of(
         self, topic: Topic, block: Any, log_ns: NDArray[np.int64]
@@ -270,7 +277,11 @@ class NewSamples:
         before = self._values.get(topic.name, np.full((1, values.shape[1]), np.nan))
         self._values[topic.name] = values[-1:].copy()
         changes = (np.concatenate((before, values[:-1])) != values).any(axis=1)
-        due: NDArray[np.bool_] = changes | (stamps % SELDOM_NS == 0)
+        # Stamps of a session that was live are no whole periods.
+        periods = stamps // SELDOM_NS
+        last = self._periods.get(topic.name, int(periods[0]))
+        self._periods[topic.name] = int(periods[-1])
+        due: NDArray[np.bool_] = changes | (np.diff(periods, prepend=last) != 0)
         return due
 
 

@@ -28,7 +28,7 @@ class Arm(NamedTuple):
 
     tip_fk: Any  # of the links as they were made
     jacobian: Any  # of the same
-    distance: Any  # of the object that the tip can touch
+    distance: Any  # of the object that the tool can touch
     acceleration: Any
     gravity: Any
     control: Any
@@ -49,7 +49,8 @@ class Arm(NamedTuple):
     tip: Array  # true joint positions (n,), behind the transmission
     T: Array
     shape: Array  # numbers of the object
-    offset: Array  # rooms for what the tip feels: (3,), (3,) and (6, n)
+    contacts: Any  # ContactState of each point of the tool (N,)
+    offset: Array  # rooms for what the tool feels: (3,), (3,) and (6, n)
     normal: Array
     J: Array
     noises: Array  # of the force sensor in the coming ticks (N, 6)

@@ -12,8 +12,8 @@ from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import PerJoint
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.rigid_body import invert_positive, write_model
-from teleop_core.slave.friction import bend, friction
-from teleop_core.slave.joints import JointNumbers, JointState
+from teleop_core.slave.friction import FrictionState, bend, friction
+from teleop_core.slave.joints import JointNumbers
 from teleop_core.slave.world.contact import add_push
 
 _DAMPING = 0.02  # assumed: of a gear on its spring, share of critical with the motor alone
@@ -27,7 +27,7 @@ class ElasticNumbers(JointNumbers):
     motor_inertia: PerJoint  # [kg·m² or kg]
 
 
-class ElasticState(JointState):
+class ElasticState(FrictionState):
     """Fields of a state record with the links behind them."""
 
     link: PerJoint  # [rad or m]
@@ -66,6 +66,7 @@ def _derivative(
     dynamics: Array,
     p: ElasticNumbers,
     s: ElasticState,
+    contacts: Any,
     effort: Array,
     start: Array,
     place: Array,
@@ -82,8 +83,7 @@ def _derivative(
             net[i] = p.gear_stiffness[i] * (place[0, i] - place[1, i])
             net[i] += p.gear_damping[i] * (speed[0, i] - speed[1, i])
             found[0, i] = (own - net[i]) / p.motor_inertia[i]
-    if s.is_near:
-        add_push(p, s, place[1], speed[1], net)
+    add_push(p, contacts, place[1], speed[1], net)
     _accelerate_links(acceleration, dynamics, p, place[1], speed[1], net, found[1])
     for i in range(n):
         if p.gear_stiffness[i] == 0.0:
@@ -96,6 +96,7 @@ def integrate_elastic(
     dynamics: Array,
     p: ElasticNumbers,
     s: ElasticState,
+    contacts: Any,
     steps: int,
     effort: Array,
     q: Array,
@@ -109,6 +110,7 @@ def integrate_elastic(
         dynamics: Its parameter row.
         p: Parameters.
         s: State; written.
+        contacts: :class:`~teleop_core.slave.world.contact.ContactState` of each point (N,).
         steps: Number of equal Runge-Kutta steps, >= 1.
         effort: Drive effort (n,) [N·m or N].
         q: Motor positions behind their gears (n,) [rad or m]; written.
@@ -135,8 +137,9 @@ def integrate_elastic(
                     at[side, i] = place[side, i] + share * going[last, side, i]
                     going[stage, side, i] = speed[side, i] + share * push[last, side, i]
             _derivative(
-                acceleration, dynamics, p, s, effort, start, at, going[stage], net, push[stage]
-            )
+                acceleration, dynamics, p, s, contacts, effort, start, at, going[stage], net,
+                push[stage],
+            )  # fmt: skip
         _sum_up(place, going, h)
         _sum_up(speed, push, h)
         for i in range(n):

@@ -7,15 +7,11 @@ import numpy as np
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.friction import FrictionNumbers, FrictionState, bend, friction
-from teleop_core.slave.world.contact import ContactState, WorldNumbers, add_push
+from teleop_core.slave.world.contact import WorldNumbers, add_push
 
 
 class JointNumbers(FrictionNumbers, WorldNumbers):
     """Fields of a parameter record with what acts on moving joints."""
-
-
-class JointState(FrictionState, ContactState):
-    """Fields of a state record with the same."""
 
 
 @inner
@@ -23,7 +19,8 @@ def _derivative(
     acceleration: Any,
     dynamics: Array,
     p: JointNumbers,
-    s: JointState,
+    s: FrictionState,
+    contacts: Any,
     effort: Array,
     start: Array,
     q: Array,
@@ -34,8 +31,7 @@ def _derivative(
     """Write accelerations (n,) under the drive effort less friction, at ``q`` come from start."""
     for i in range(q.shape[0]):
         net[i] = effort[i] - friction(p, s, i, q[i] - start[i], dq[i])
-    if s.is_near:
-        add_push(p, s, q, dq, net)
+    add_push(p, contacts, q, dq, net)
     acceleration(q, dq, net, dynamics, ddq)
 
 
@@ -44,7 +40,8 @@ def integrate(
     acceleration: Any,
     dynamics: Array,
     p: JointNumbers,
-    s: JointState,
+    s: FrictionState,
+    contacts: Any,
     steps: int,
     effort: Array,
     q: Array,
@@ -58,6 +55,7 @@ def integrate(
         dynamics: Its parameter row.
         p: Parameters.
         s: State; written.
+        contacts: :class:`~teleop_core.slave.world.contact.ContactState` of each point (N,).
         steps: Number of equal Runge-Kutta steps, >= 1.
         effort: Drive effort (n,) [N·m or N].
         q: Joint positions (n,) [rad or m]; written.
@@ -71,7 +69,7 @@ def integrate(
     for _ in range(steps):
         for i in range(n):
             start[i] = q[i]
-        _derivative(acceleration, dynamics, p, s, effort, start, q, dq, net, k[0])
+        _derivative(acceleration, dynamics, p, s, contacts, effort, start, q, dq, net, k[0])
         for stage in range(1, 4):
             # Positions of the stages follow from the speeds of the stages before.
             share = h if stage == 3 else 0.5 * h
@@ -80,7 +78,10 @@ def integrate(
                 position[i] = q[i] + share * slope
             for i in range(n):
                 speed[i] = dq[i] + share * k[stage - 1, i]
-            _derivative(acceleration, dynamics, p, s, effort, start, position, speed, net, k[stage])
+            _derivative(
+                acceleration, dynamics, p, s, contacts, effort, start, position, speed, net,
+                k[stage],
+            )  # fmt: skip
         for i in range(n):
             # Sum of the four stage speeds, written with the accelerations they came from.
             q[i] += h * dq[i] + h * h / 6.0 * (k[0, i] + k[1, i] + k[2, i])

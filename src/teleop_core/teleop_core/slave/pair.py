@@ -5,7 +5,7 @@ from typing import Any
 
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
-from teleop_core.kernels import kernel
+from teleop_core.kernels import apart, kernel
 from teleop_core.slave.commands import SlaveRow
 from teleop_core.slave.simulation import simulation_step
 from teleop_core.slave.slave import SLAVE, Slave, SlaveParameters
@@ -25,17 +25,18 @@ class ArmParameters(SlaveParameters, SlaveSimParameters):
 
 
 @kernel
-def arm_step(server: Any, simulated: Any, row: SlaveRow, dt: float) -> None:
+def arm_step(steps: Any, server: Any, simulated: Any, row: SlaveRow, dt: float) -> None:
     """One tick of both on one row of signals.
 
     Args:
+        steps: The kernels of both, as :func:`~teleop_core.kernels.apart` gives them.
         server: Arguments of :func:`~teleop_core.slave.step.slave_step`.
         simulated: Arguments of :func:`~teleop_core.slave.simulation.simulation_step`.
         row: Signals of both; what is measured is of the last tick for the server.
         dt: Tick [s].
     """
-    slave_step(server[0], server[1], server[2], row, dt)
-    simulation_step(simulated[0], simulated[1], simulated[2], row, dt)
+    steps[0](server[0], server[1], server[2], row, dt)
+    steps[1](simulated[0], simulated[1], simulated[2], row, dt)
     row.slave_measured_js_ns = row.now_ns
 
 
@@ -61,7 +62,12 @@ class SimulatedArm(RunningStage):
         super().__init__(_PAIR, self.robot.n, dt)
         for stage in (self.server, self.simulated):
             stage.signals = self.signals
-        self.kernel, self.arguments = arm_step, (self.server.arguments, self.simulated.arguments)
+        server, simulated = self.server.arguments, self.simulated.arguments
+        steps = (
+            apart(slave_step, *server, self.signals, dt),
+            apart(simulation_step, *simulated, self.signals, dt),
+        )
+        self.kernel, self.arguments = arm_step, (steps, server, simulated)
         self._begin = self.signals.copy()
         self.reset()
 

@@ -92,11 +92,11 @@ def _see_joints(p: SimulationNumbers, s: SimulationState, arm: Arm) -> None:
 
 @inner
 def _touch(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row) -> None:
-    """Let the tip feel the object, at the links that move it."""
+    """Let the tool feel the object, at the links that move it."""
     if p.has_gears:
-        touch(p, s, arm, s.link, s.link_speed, row.slave_true_cf)
+        touch(p, arm.contacts, arm, s.link, s.link_speed, row.slave_true_cf)
     else:
-        touch(p, s, arm, arm.q, arm.dq, row.slave_true_cf)
+        touch(p, arm.contacts, arm, arm.q, arm.dq, row.slave_true_cf)
 
 
 @inner
@@ -118,10 +118,14 @@ def _move_on(p: SimulationNumbers, s: SimulationState, arm: Arm, braked: bool, d
             s.link_speed[i] = arm.dq[i]
     elif p.has_gears:
         integrate_elastic(
-            arm.acceleration, arm.dynamics, p, s, p.steps, arm.effort, arm.q, arm.dq, dt
-        )
+            arm.acceleration, arm.dynamics, p, s, arm.contacts, p.steps, arm.effort, arm.q, arm.dq,
+            dt,
+        )  # fmt: skip
     else:
-        integrate(arm.acceleration, arm.dynamics, p, s, p.steps, arm.effort, arm.q, arm.dq, dt)
+        integrate(
+            arm.acceleration, arm.dynamics, p, s, arm.contacts, p.steps, arm.effort, arm.q, arm.dq,
+            dt,
+        )  # fmt: skip
 
 
 @kernel

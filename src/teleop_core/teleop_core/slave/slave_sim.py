@@ -19,7 +19,7 @@ from teleop_core.graph.topics import (
     SLAVE_TRUE_CP,
 )
 from teleop_core.kernels import pointer
-from teleop_core.kernels.fields import fields_of, record
+from teleop_core.kernels.fields import fields_of, record, record_array
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import dh_kernels, load_robot_set
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
@@ -37,6 +37,7 @@ from teleop_core.slave.stability import Loop, check_friction, check_stable, loop
 from teleop_core.slave.transmission import LONGEST_DELAY
 from teleop_core.slave.world import WORLD_OBJECTS
 from teleop_core.slave.world.button import ButtonNumbers
+from teleop_core.slave.world.contact import ContactState
 from teleop_core.slave.world.parameters import WorldParameters
 from teleop_core.slave.world.puncture import PunctureNumbers
 
@@ -130,7 +131,9 @@ class SlaveSim(RunningStage):
             q=np.zeros(n), dq=np.zeros(n), effort=np.zeros(n), setpoint=np.zeros(n),
             measured=np.zeros(n), feedforward=np.zeros(self._law.feedforward(n)), limit=np.zeros(n),
             joints=np.zeros(n), tip=np.zeros(n), T=np.zeros((4, 4)),
-            shape=parameters.world.shape.copy(), offset=np.zeros(3), normal=np.zeros(3),
+            shape=parameters.world.shape.copy(),
+            contacts=record_array(ContactState, parameters.world.tool_points, n),
+            offset=np.zeros(3), normal=np.zeros(3),
             J=np.zeros((6, n)), noises=self._noise.rows,
         )  # fmt: skip
         self.kernel, self.arguments = simulation_step, (self.parameters, self.state, self.arm)
@@ -149,6 +152,7 @@ class SlaveSim(RunningStage):
         """Stand at joints (n,), at rest and in balance."""
         s, arm = self.state, self.arm
         assign(s, 0)
+        assign(arm.contacts, 0)
         self._noise.reset()
         step = self.parameters["encoder_step"]
         s["measured"], s["speed"] = np.round(home / step) * step, 0.0
@@ -174,17 +178,18 @@ class SlaveSim(RunningStage):
     @property
     def punctures(self) -> int:
         """How often the tip has punctured the object so far."""
-        return int(self.state["punctures"])
+        return int(self.arm.contacts[0]["punctures"])
 
     @property
     def presses(self) -> int:
         """How often the tip has pressed a button down to its stop so far."""
-        return int(self.state["presses"])
+        return int(self.arm.contacts[0]["presses"])
 
     @property
     def depth(self) -> float:
         """How deep the tip was in the channel of its last puncture a tick ago [m]; 0 outside."""
-        return max(-float(self.state["gap"]), 0.0) if self.state["is_open"] else 0.0
+        tip = self.arm.contacts[0]
+        return max(-float(tip["gap"]), 0.0) if tip["is_open"] else 0.0
 
     def prepare(self, ticks: int) -> None:
         """Draw the noise of the force sensor for the next ticks."""
@@ -253,6 +258,7 @@ class SlaveSim(RunningStage):
         p["has_world"] = world.kind.kind != "empty"
         if p["has_world"]:
             p["world_center"] = world.place or world.below(self._tip_at_start())
+        p["tool_length"], p["tool_radius"] = world.tool_length, world.tool_radius
         p["world_stiffness"], p["world_damping"] = made_of.stiffness, made_of.damping
         p["world_friction"] = made_of.friction
         for name, *_ in fields_of(PunctureNumbers):
@@ -262,25 +268,25 @@ class SlaveSim(RunningStage):
         self.arm.shape[:] = world.shape
 
     def _tip_at_start(self) -> Array:
-        """Where the tip (3,) is at the robot's start [m].
+        """Pose (4, 4) of the tip at the robot's start.
 
         Raises:
             ParameterError: Its direct kinematics finds no way to close the loops there.
         """
         try:
-            return self.robot.fk(self.robot.start)[:3, 3]
+            return self.robot.fk(self.robot.start)
         except ClosureError as error:
             text = f"given for {self.robot.name}, whose tip is not known where it starts"
             raise ParameterError("world.place", (), text) from error
 
     def _check_world(self, world: WorldParameters) -> None:
-        """Make sure that the tip begins outside.
+        """Make sure that the tool begins outside.
 
         Raises:
             ParameterError: It begins inside the object.
         """
-        center, home = self.parameters["world_center"], self.robot.fk(self.robot.home)[:3, 3]
-        inside = -world.distance(home, center) if self.parameters["has_world"] else 0.0
+        center, tool = self.parameters["world_center"], world.tool(self.robot.fk(self.robot.home))
+        inside = -world.distance(tool, center) if self.parameters["has_world"] else 0.0
         if inside > 0.0:
             text = f"outside of the tip at home, which is {1e3 * inside:.1f} mm inside the object"
             raise ParameterError("world.place", tuple(center.tolist()), text)

@@ -84,10 +84,12 @@ class Loop(NamedTuple):
     def copied(self) -> "Loop":
         """The same arm apart, in free air, for a loop is judged there."""
         p, s, row = (_copy(record) for record in (self.p, self.s, self.row))
-        p["has_world"] = s["is_near"] = 0
+        p["has_world"] = 0
         p["is_ideal"], p["has_noise"], p["is_estimated"] = 1, 0, 0
         parts = (np.array(part) if isinstance(part, np.ndarray) else part for part in self.arm)
-        return Loop(p, s, Arm(*parts), row, self.dt)
+        arm = Arm(*parts)
+        arm.contacts["is_near"] = 0
+        return Loop(p, s, arm, row, self.dt)
 
     def step(self) -> Callable[[], None]:
         """What makes a tick of it."""

@@ -60,12 +60,18 @@ def _is_still(s: SlaveState) -> bool:
 
 
 @inner
-def _begin_where_it_is(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow) -> None:
-    """Let the setpoint of an arm that is not at home begin where it is; it homes from there."""
+def _is_near(p: SlaveNumbers, s: SlaveState) -> bool:
+    """Whether the arm stands at its setpoint."""
     off = 0
     for i in range(s.setpoint.shape[0]):
         off += not abs(s.measured[i] - s.setpoint[i]) <= p.near[i]
-    if off == 0:
+    return off == 0
+
+
+@inner
+def _begin_where_it_is(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow) -> None:
+    """Let the setpoint of an arm that is not at home begin where it is; it homes from there."""
+    if _is_near(p, s):
         return
     for i in range(s.setpoint.shape[0]):
         s.setpoint[i] = min(max(s.measured[i], p.lower[i]), p.upper[i])
@@ -86,6 +92,7 @@ def _take_measured(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow)
     stamp_ns, n = row.slave_measured_js_ns, s.setpoint.shape[0]
     if stamp_ns == s.sampled_ns:
         return
+    is_lost = row.now_ns - s.heard_of_ns > p.silence_ns
     before_ns, s.sampled_ns, s.heard_of_ns = s.sampled_ns, stamp_ns, row.now_ns
     for i in range(n):
         arm.joints[i] = s.measured[i] = row.slave_measured_js[i]
@@ -96,6 +103,8 @@ def _take_measured(p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow)
     if before_ns == 0:
         _begin_where_it_is(p, s, arm, row)
         return
+    if is_lost:  # it may have been moved, or have heard of no setpoint
+        s.must_join = 1
     if is_braked(p, s):
         for i in range(n):
             s.full_ns[i] = 0
@@ -112,6 +121,8 @@ def _go_on(
     p: SlaveNumbers, s: SlaveState, arm: ArmModel, row: SlaveRow, before: Array, dt: float
 ) -> None:
     """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
+    if s.state != _FAULT:
+        s.must_join = 0
     if s.state == _ENABLED and s.is_busy and not s.must_plan:
         advance_move(s)
     elif s.state == _ENABLED and s.is_busy:  # a way to a goal begins at rest
@@ -121,8 +132,9 @@ def _go_on(
     elif row.command_status != _BLIND and follows(p, s, row.now_ns):
         advance_on_way(p, s)
         advance_setpoint(p, s, before, dt)
-    elif is_braked(p, s):
+    elif is_braked(p, s) or s.must_join:
         come_to_rest(p, s, WITH_ARM, dt)
+        s.must_join = s.must_join and not (_is_near(p, s) or _is_still(s))
     else:
         come_to_rest(p, s, AT_ONCE if s.state == _FAULT else AT_LIMITS, dt)
 

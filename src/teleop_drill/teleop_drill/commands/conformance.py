@@ -27,8 +27,7 @@ _QUESTION = "move {}? one joint by 0.01 rad, its tip by 3 mm, each back again; p
 def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "test a CRTK arm, row by row: topics, stamps, states, small motions"
-    parser = command(commands, "conformance", _run, text)
-    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser = command(commands, "conformance", _run, text, _EPILOG)
     parser.add_argument("namespace", help="where its topics are, such as slave, or /PSM1")
     choice = parser.add_mutually_exclusive_group()
     choice.add_argument("--read-only", action="store_true", help="command nothing")

@@ -21,6 +21,7 @@ without a name all faults are injected, which takes minutes:
   teleop drill --short                     five faults, less than a minute
   teleop drill --composed --json drill.json
   teleop drill --drives "python examples/foreign_slave.py"    drives of your own
+  teleop drill --drives "arm_bridge --ros-args --params-file arm.yaml" --arm "./controller"
   teleop drill --set real_time.priority=50  on a machine that others keep busy
 it starts sessions of its own, simulated, on a ROS domain of their own, kills and stops processes of
 these sessions alone, and keeps the machine's cores busy for seconds. Exit code 0: all as expected.
@@ -30,8 +31,7 @@ these sessions alone, and keeps the machine's cores busy for seconds. Exit code 
 def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "break a running session in all known ways, and measure what the arm does"
-    parser = command(commands, "drill", _run, text)
-    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser = command(commands, "drill", _run, text, _EPILOG)
     parser.add_argument("names", nargs="*", metavar="NAME", help="faults (default: all)")
     parser.add_argument("--composed", action="store_true", help="all nodes in one process")
     parser.add_argument("--short", action="store_true", help="the most telling five faults")
@@ -43,13 +43,17 @@ def add(commands: Any) -> None:
         help="command that starts drives in place of the simulated ones",
     )  # fmt: skip
     parser.add_argument(
+        "--arm", metavar="COMMAND", type=shlex.split, default=(),
+        help="command that starts what these lead; nothing is done to it",
+    )  # fmt: skip
+    parser.add_argument(
         "--out", type=Path, metavar="DIR", help="keep the recordings here; must not exist"
     )
     setting_arguments(parser)
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from teleop_core.evaluation.command import check_place
+    from teleop_core.evaluation.command import check_places
     from teleop_drill.drill import SHORT, chosen
 
     names = (*arguments.names, *(SHORT if arguments.short else ()))
@@ -60,9 +64,9 @@ def _run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.drives and arguments.composed:
         raise ParameterError("--drives", shlex.join(arguments.drives), "without --composed")
-    for file in (arguments.json, arguments.markdown):
-        if file is not None:
-            check_place(file)
+    if arguments.arm and not arguments.drives:
+        raise ParameterError("--arm", shlex.join(arguments.arm), "with --drives, which lead it")
+    check_places(arguments.json, arguments.markdown)
     if arguments.out is not None and arguments.out.exists():
         raise RecordingError(arguments.out, "exists already; choose another --out")
     outcomes = _outcomes(exercises, arguments)
@@ -84,7 +88,7 @@ def _outcomes(exercises: "tuple[Exercise, ...]", arguments: argparse.Namespace) 
             exercises, folder,
             lambda line: console.print(line, highlight=False, markup=False, soft_wrap=True),
             is_composed=arguments.composed, files=arguments.config, texts=arguments.settings,
-            drives=arguments.drives,
+            drives=arguments.drives, arm=arguments.arm,
         )  # fmt: skip
 
 

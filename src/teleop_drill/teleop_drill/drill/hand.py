@@ -21,6 +21,7 @@ RADIUS, ROUND = 0.02, 2.0
 SPEED = 2.0 * math.pi * RADIUS / ROUND
 """Speed of the stylus [m/s]."""
 _EASE = 1.0  # it sets in within this time [s]
+_SEED = 1  # of what is lost or scattered at random
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +64,9 @@ def silent(_: Sample) -> list[Sample]:
     return []
 
 
-def lossy(share: float, seed: int = 1) -> Distortion:
+def lossy(share: float) -> Distortion:
     """Lose a share of all samples, at random."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(_SEED)
     return lambda sample: [sample] if rng.random() >= share else []
 
 
@@ -138,9 +139,9 @@ def filled(number: float) -> Distortion:
     return moved(change)
 
 
-def scattered(size: float, seed: int = 1) -> Distortion:
+def scattered(size: float) -> Distortion:
     """Send places anywhere in a cube of this width [m] around the right one."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(_SEED)
 
     def change(pose: Array) -> Array:
         pose[:3] += rng.uniform(-0.5 * size, 0.5 * size, 3)

@@ -17,6 +17,9 @@ JUST_BEFORE_NS = 11_000_000
 """Before a moment, time in which the present speed is measured [ns]."""
 _SHORT = 10  # samples of which the present speed is taken
 _ROUNDING = 1e-12  # of a step [rad or m]
+_ENOUGH = 41  # samples from which it is told whether an arm follows
+_MOVING = 0.3  # share of all ticks in which a setpoint moves that goes round
+_FOLLOWED = 0.1  # share of the setpoint's way; noise of encoders is far less, a lag is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +101,26 @@ def travel(places: Trace, since_ns: int, until_ns: int) -> float:
     if not len(before) or not len(after):
         return float("nan")
     return float(np.max(np.linalg.norm(after.values[:, :3] - before.values[-1, :3], axis=1)))
+
+
+def follows(setpoints: Array, measured: Array, speed_limit: Array) -> bool:
+    """Whether an arm goes where its setpoints go; both stand for some time before now.
+
+    Setpoints alone prove nothing: drives that do not listen leave the arm where it is.
+
+    Args:
+        setpoints: Newest setpoints, shape (m, n) [rad or m].
+        measured: Newest measured joints of as long a time or longer, shape (k, n) [rad or m].
+        speed_limit: Rated speeds, by which joints are compared, shape (n,) [rad/s or m/s].
+    """
+    if len(setpoints) < _ENOUGH or len(measured) < _ENOUGH:
+        return False
+    if np.mean(np.any(np.diff(setpoints, axis=0) != 0.0, axis=1)) <= _MOVING:
+        return False
+    asked, went = (
+        float(np.linalg.norm(np.ptp(rows, axis=0) / speed_limit)) for rows in (setpoints, measured)
+    )
+    return went > _FOLLOWED * asked
 
 
 def tip_speed(places: Trace) -> float:

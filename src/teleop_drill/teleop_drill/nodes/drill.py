@@ -4,7 +4,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from teleop_drill.drill.outcome import Outcome
 from teleop_drill.drill.recordings import Counted, Recorded, judge_recording
 from teleop_drill.nodes.drill_evidence import help_on, note_state, recover, seen_of
 from teleop_drill.nodes.drill_rig import LiveRig
-from teleop_drill.nodes.drill_session import DrillSession
+from teleop_drill.nodes.drill_session import ARM, SIMULATOR, DrillSession
 
 _BEFORE = 0.2  # motion that is seen before a fault [s]
 _FOLLOWS = 90.0  # until it follows after the start [s]
@@ -47,6 +47,7 @@ def drill(
     files: Sequence[Path] = (),
     texts: Sequence[str] = (),
     drives: Sequence[str] = (),
+    arm: Sequence[str] = (),
 ) -> list[Outcome]:
     """Do exercises in sessions of their own, on a ROS domain of their own.
 
@@ -59,11 +60,14 @@ def drill(
         texts: Parameters ``key=value`` over all files.
         drives: Command of drives that the slave leads in place of the simulated ones, with its
             arguments; exercises that break the simulator are left out.
+        arm: Command of what the drives lead, such as the controller of a real arm. It is started
+            before them, and nothing is done to it.
 
     Raises:
         TeleopError: A parameter is wrong, or a session cannot be started.
     """
     sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for its turn
+    foreign = {SIMULATOR: drives, ARM: arm}
     outcomes: list[Outcome] = []
     for master in Master:
         own = [o for o in exercises if o.master is master and not (drives and o.breaks_simulator)]
@@ -71,7 +75,7 @@ def drill(
             place = folder / master.name.lower()
             place.mkdir(parents=True)
             made = _configuration(master, files, texts)
-            part = _Drill(master, made, place, say, is_composed=is_composed, drives=drives)
+            part = _Drill(master, made, place, say, is_composed=is_composed, foreign=foreign)
             outcomes += part.run(own)
             if part.is_over:
                 break
@@ -84,9 +88,9 @@ class _Drill:
 
     def __init__(
         self, master: Master, configuration: Configuration, folder: Path, say: Say, *,
-        is_composed: bool, drives: Sequence[str],
+        is_composed: bool, foreign: Mapping[str, Sequence[str]],
     ) -> None:  # fmt: skip
-        self._drives = drives
+        self._foreign = foreign
         self._master, self._folder, self._say = master, folder, say
         self._is_composed, self._configuration = is_composed, configuration
         self._numbers, self._scheduling = Numbers.of(configuration), Scheduling()
@@ -146,7 +150,7 @@ class _Drill:
             folder.mkdir()
             self._rig = LiveRig(
                 self._configuration, self._numbers.robot, folder, _environment(self._master),
-                is_composed=self._is_composed, master=self._master, drives=self._drives,
+                is_composed=self._is_composed, master=self._master, foreign=self._foreign,
             )  # fmt: skip
             way = "one process" if self._is_composed else "a process for each node"
             self._say(f"starts a session: {way}, the hand is that of {_who(self._master)}")

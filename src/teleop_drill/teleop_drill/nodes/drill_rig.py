@@ -3,7 +3,7 @@
 import re
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import layout
 from teleop_core.graph.layers import SESSION
-from teleop_core.graph.topics import SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
+from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.operation import STOP_TOPIC
@@ -29,7 +29,7 @@ from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
 from teleop_core.slave.operation import State
 from teleop_core.slave.operation.states import COMMANDS
-from teleop_drill.drill import inside
+from teleop_drill.drill import inside, measure
 from teleop_drill.drill.exercise import Master
 from teleop_drill.drill.hand import Distortion
 from teleop_drill.nodes.drill_session import DrillSession
@@ -55,21 +55,23 @@ class LiveRig:
         env: Environment of the processes, with their ROS domain.
         is_composed: Whether all nodes share one process.
         master: Who moves the hand.
-        drives: Command of drives in place of the simulated ones.
+        foreign: Commands of processes that are none of ours, by name.
     """
 
     def __init__(
         self, configuration: Configuration, robot: Robot, folder: Path, env: dict[str, str], *,
-        is_composed: bool, master: Master, drives: Sequence[str] = (),
+        is_composed: bool, master: Master, foreign: Mapping[str, Sequence[str]],
     ) -> None:  # fmt: skip
+        assert robot.drives is not None
         self.is_composed, self._robot = is_composed, robot
+        self._speed_limit = np.array(robot.drives.speed_limit)
         domain = int(env["ROS_DOMAIN_ID"])
         self._control = inside.Control.make(folder / "control")
         env = env | {inside.VARIABLE: str(folder / "control")}
         self.observer = Observer(domain)
         self.session = DrillSession(
             configuration, folder, env, self.observer, is_composed=is_composed, master=master,
-            drives=drives,
+            foreign=foreign,
         )  # fmt: skip
         self._context = Context()
         self._context.init(args=[], domain_id=domain)
@@ -171,22 +173,29 @@ class LiveRig:
         return reports[-1][1] if reports else {}
 
     def is_following(self) -> bool:
-        """Whether the slave is at work, enabled and homed, and its setpoint moves."""
+        """Whether the slave is at work, enabled and homed, and its arm goes where it leads it."""
         operation = self.operation()
         if not operation or operation["state"] != State.ENABLED or operation["is_busy"]:
             return False
         if self.tap.age(SLAVE_SETPOINT_JS) > _FRESH or not self.session.is_running("slave"):
             return False
-        rows = self.tap.recent(SLAVE_SETPOINT_JS, 60)
-        moves = np.any(np.diff(rows, axis=0) != 0.0, axis=1)
-        return bool(len(moves) >= 40 and np.mean(moves) > 0.3)
+        return measure.follows(*self._recent_joints(), self._speed_limit)
+
+    def _recent_joints(self) -> tuple[Array, Array]:
+        """The newest setpoints, and the newest places of the joints [rad or m]."""
+        topics, n = (SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS), self._robot.n
+        wanted, measured = (self.tap.recent(topic, 60)[:, :n] for topic in topics)
+        return wanted, measured
 
     def complaints(self) -> str:
         """What nodes complain of, in one line."""
         age = self.tap.age(SLAVE_SETPOINT_JS)
         told = [f"{n}: {s.message}" for n, s in self.observer.statuses.items()]
-        moves = np.any(np.diff(self.tap.recent(SLAVE_SETPOINT_JS, 60), axis=0) != 0.0, axis=1)
-        seen = f"newest setpoint {age:.2f} s old, {np.sum(moves)} of the last {len(moves)} moved"
+        moved, went = (
+            int(np.sum(np.any(np.diff(rows, axis=0) != 0.0, axis=1)))
+            for rows in self._recent_joints()
+        )
+        seen = f"newest setpoint {age:.2f} s old, {moved} of the last 60 moved, the arm in {went}"
         return "; ".join((f"{seen}; {self.operation()}", *told))
 
     # -- processes -------------------------------------------------------------------------------

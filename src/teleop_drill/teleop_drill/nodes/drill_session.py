@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
@@ -25,7 +25,11 @@ from teleop_core.session.configuration import Configuration
 from teleop_drill.drill.exercise import Master
 
 _NEVER_NS = 2**62
-_HAND, _MASTER, _SIMULATOR = "operator", "haptic_master", "slave_sim"
+_HAND, _MASTER = "operator", "haptic_master"
+SIMULATOR = "slave_sim"
+"""Node in whose place drives stand."""
+ARM = "arm"
+"""Process that the drives lead; it is started first, and nothing is done to it."""
 _BUSY = "while True: pass"
 _BYSTANDER = "from teleop_drill.nodes.drill_tap import stand_by; stand_by()"
 _MIDDLEWARE = ("FASTRTPS_", "FASTDDS_", "ROS_AUTOMATIC", "ROS_LOCALHOST", "ROS_STATIC")
@@ -41,7 +45,8 @@ class DrillSession:
         observer: Who hears what nodes say of themselves.
         is_composed: Whether all nodes share one process.
         master: Who moves the hand.
-        drives: Command of the drives that the slave leads in place of the simulated ones.
+        foreign: Commands of processes that are none of ours, by name: of drives in the place of
+            the simulator, and of the arm that these lead.
 
     Attributes:
         recordings: Recordings so far, the present one last.
@@ -49,11 +54,12 @@ class DrillSession:
 
     def __init__(
         self, configuration: Configuration, folder: Path, env: dict[str, str], observer: Observer,
-        *, is_composed: bool, master: Master, drives: Sequence[str] = (),
+        *, is_composed: bool, master: Master, foreign: Mapping[str, Sequence[str]],
     ) -> None:  # fmt: skip
         self._configuration, self._folder, self._env = configuration, folder, env
         self._observer, self._is_composed = observer, is_composed
-        self._has_device, self._drives = master is Master.DEVICE, tuple(drives)
+        self._has_device = master is Master.DEVICE
+        self._foreign = {name: command for name, command in foreign.items() if command}
         self._starter = Starter("" if is_composed else configuration.text(), env)
         self._children: dict[str, Child] = {}
         self._files: list[IO[str]] = []
@@ -78,12 +84,13 @@ class DrillSession:
                 if not self.is_running(process):
                     waiting += nodes
                     self._launch(process)
-            self._await([name for name in waiting if not self._is_foreign(name)])
+            self._await([name for name in waiting if name not in self._foreign])
 
     def _crews(self) -> tuple[dict[str, list[str]], ...]:
         if self._is_composed:
             return ({SESSION_NODE: [RECORDER_NAME, *self._nodes]},)
-        return ({RECORDER_NAME: [RECORDER_NAME]}, {name: [name] for name in self._nodes})
+        first = [RECORDER_NAME, *([ARM] if ARM in self._foreign else [])]
+        return ({name: [name] for name in first}, {name: [name] for name in self._nodes})
 
     def _launch(self, process: str) -> None:
         if process in {RECORDER_NAME, SESSION_NODE}:
@@ -96,11 +103,8 @@ class DrillSession:
         self._files.append(file)
         if process in self._children:
             self._children[process].end()
-        command = self._drives if self._is_foreign(process) else ()
+        command = self._foreign.get(process, ())
         self._children[process] = Child(process, file, self._env, self._starter, command)
-
-    def _is_foreign(self, process: str) -> bool:
-        return bool(self._drives) and process == _SIMULATOR
 
     def _parameters(self) -> str:
         text = parameter_file(self._configuration, str(self.recordings[-1]))

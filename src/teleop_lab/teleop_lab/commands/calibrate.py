@@ -32,8 +32,7 @@ _OF_SIMULATION = ("poses", "noise", "errors", "choose", "seed")
 def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "find joint offsets and link errors of an arm from measured places of its tip"
-    parser = command(commands, "calibrate", _run, text)
-    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser = command(commands, "calibrate", _run, text, _EPILOG)
     parser.add_argument("--robot", default="rcrt1", help="a chain of links (default: rcrt1)")
     geometry_argument(parser)
     parser.add_argument(
@@ -82,12 +81,10 @@ def _add_simulation(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from teleop_core.evaluation.command import check_place
+    from teleop_core.evaluation.command import check_places
     from teleop_core.robots import load_robot_set
 
-    for file in (arguments.json, arguments.out):
-        if file is not None:
-            check_place(file)
+    check_places(arguments.json, arguments.out)
     robot = load_robot_set(arguments.robot, arguments.geometry)
     calibration = (
         _simulated(robot, arguments) if arguments.data is None else _real(robot, arguments)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 _EPILOG = """\
-without a name the experiments are listed; `all` runs every one, in four to six minutes:
+without a name the experiments are listed; `all` runs every one, in five to seven minutes:
   teleop experiment resolution                          a table: published, predicted, difference
   teleop experiment master_slave gravity --seed 5       other hands; sessions both need run once
   teleop experiment all --html experiments.html         one page with the source's figures
@@ -28,8 +28,7 @@ a mark says whether prediction and publication agree, ✓, or not, ✗, not whet
 def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "repeat what the sources did, and print predicted beside published figures"
-    parser = command(commands, "experiment", _run, text)
-    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser = command(commands, "experiment", _run, text, _EPILOG)
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help="experiments, or `all`; none: they are listed"
     )
@@ -39,19 +38,17 @@ def add(commands: Any) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from teleop_core.evaluation.command import check_place
+    from teleop_core.evaluation.command import check_places
     from teleop_lab.experiments import EXPERIMENTS, list_experiments
 
-    files = [file for file in (arguments.json, arguments.html) if file is not None]
-    if not arguments.names and not files:
+    if not arguments.names and arguments.json is None and arguments.html is None:
         for name, title in list_experiments().items():
             print(f"{name:16} {title}")
         return 0
     for name in arguments.names:
         if name != ALL and name not in EXPERIMENTS.names():
             raise UnknownNameError("experiment", name, (*EXPERIMENTS.names(), ALL))
-    for file in files:
-        check_place(file)
+    check_places(arguments.json, arguments.html)
     is_all = not arguments.names or ALL in arguments.names
     outcomes = _outcomes(() if is_all else tuple(arguments.names), arguments.seed)
     # Files come first: who reads the tables may have seen enough before their end.

@@ -22,8 +22,7 @@ what can be free: coulomb.<joint>, bias.<joint>, weight.<symbol>; `wander` follo
 def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "fit friction, bias and weights of the hardware plant to where a machine came to rest"
-    parser = command(commands, "fit", _run, text)
-    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser = command(commands, "fit", _run, text, _EPILOG)
     parser.add_argument(
         "table", nargs="?", type=Path, help="CSV of rests (default: the published ones)"
     )
@@ -47,12 +46,10 @@ def add(commands: Any) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.commands.progress import shown_progress
-    from teleop_core.evaluation.command import check_place
+    from teleop_core.evaluation.command import check_places
     from teleop_lab.fitting import fit_plant
 
-    for file in (arguments.json, arguments.out):
-        if file is not None:
-            check_place(file)
+    check_places(arguments.json, arguments.out)
     with shown_progress("fitting") as progress:
         found = fit_plant(
             arguments.table, robot=arguments.robot, free=arguments.free, files=arguments.config,

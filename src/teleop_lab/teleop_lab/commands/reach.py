@@ -21,8 +21,7 @@ reach the goal with the largest gains. Take them as they are printed, or as a fi
 def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "say how much of a hand's motion a slave can follow, and propose where to put it"
-    parser = command(commands, "reach", _run, text)
-    parser.epilog, parser.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter
+    parser = command(commands, "reach", _run, text, _EPILOG)
     parser.add_argument(
         "sources", nargs="+", metavar="BAG|SCENARIO",
         help="recording, ours or of others, or one of `teleop scenarios`",
@@ -46,11 +45,11 @@ def add(commands: Any) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from teleop_core.evaluation.command import check_places
+
     if arguments.out is not None and len(arguments.sources) > 1:
         raise TeleopError("--out takes the proposal of one recording; give one, or leave it out")
-    for file in (arguments.html, arguments.out):
-        if file is not None and not file.parent.is_dir():
-            raise TeleopError(f"{file}: the directory {file.parent} does not exist; make it first")
+    check_places(arguments.html, arguments.out)
     if not 0.0 < arguments.share <= 100.0:
         raise TeleopError(f"--share {arguments.share:g} must be above 0 and at most 100 percent")
     found = [_reach(source, arguments) for source in arguments.sources]

@@ -73,6 +73,8 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "stability": f"{_PLACE}.stability:STABILITY",
         "zwidth": f"{_PLACE}.zwidth:ZWIDTH",
         "transparency": f"{_PLACE}.transparency:TRANSPARENCY",
+        "drift": f"{_PLACE}.drift:DRIFT",
+        "puncture": f"{_PLACE}.puncture:PUNCTURE",
         "mma_frames": f"{_PLACE}.mma_frames:MMA_FRAMES",
         "mma_balance": f"{_PLACE}.mma_spring:MMA_BALANCE",
         "hybrid": f"{_PLACE}.hybrid:HYBRID",

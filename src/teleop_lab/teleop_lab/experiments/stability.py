@@ -12,6 +12,7 @@ from teleop_lab.experiments.drawing import PUBLISHED, axis, joined, line
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.one_axis import Grip, exact_boundary, found_boundary
 from teleop_lab.experiments.outcome import Findings, Row, percent
+from teleop_lab.experiments.transmission import CHANNELS, Way
 
 GRIPS: Mapping[str, Grip] = {
     "loose": Grip(0.25, 100.0, 5.0),
@@ -23,8 +24,6 @@ DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2)
 """By which the force comes later [s]."""
 SOFTEST, STIFFEST = 20.0, 50_000.0
 """Objects that are tried [N/m]: softer than tissue, and steel."""
-Way = tuple[str, str]
-"""Architecture and passivity."""
 _WAYS: tuple[Way, ...] = (
     ("position_force", "none"), ("position_force", "tank"), ("position_position", "none"),
     ("position_force", "tdpa"),
@@ -43,18 +42,19 @@ _APPARENT_MASS = DeviceParameters().apparent_mass
 
 def _settings(grip: Grip, delay: float, stiffness: float, way: Way) -> Settings:
     architecture, passivity = way
-    ports = ("passivity",) if passivity in _TWO_PORTS else ()
+    channels, ports = CHANNELS[architecture], ("passivity",) if passivity in _TWO_PORTS else ()
     late = [f"slave/measured_{kind}@motion_scaling={delay + 1e-3}" for kind in ("cf", "cp")]
     late += [f"slave/energy@motion_scaling={delay + 1e-3}" for _ in ports]
     return {
         "world.material": "own", "world.stiffness": stiffness, "world.damping": 0.0,
         "world.friction_coefficient": 0.0, "reflection.max_force": 10.0, "feedback_timeout": 1.0,
-        "reflection.architecture": architecture, "reflection.passivity": passivity,
+        "reflection.architecture": channels.architecture or architecture,
+        "reflection.passivity": passivity,
         "hand.mass": grip.mass - _APPARENT_MASS, "hand.stiffness": grip.stiffness,
         "hand.damping": grip.damping,
         # An arm that is pressed into steel goes on: one that its fault stops would look calm.
         "operation.reported": ("effort",),
-        "delays": tuple(late), "stages": ports,
+        "delays": tuple(late), "stages": (*channels.stages, *ports),
     }  # fmt: skip
 
 

@@ -5,7 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from teleop_core.chain.architectures.four_channel import FourChannelParameters
+from teleop_core.chain.architectures.impedance import ImpedanceParameters
 from teleop_core.chain.architectures.position_position import PositionPositionParameters
+from teleop_core.chain.architectures.three_channel import ThreeChannelParameters
 from teleop_core.graph.signals import DT
 from teleop_core.kernels.geometry import Array
 from teleop_lab.experiments.bench import Bench, Settings
@@ -17,12 +20,48 @@ WORLDS = (AIR, "tissue", "silicone")
 _BACK = 2.0 * DT  # a force waits for a tick before the network and for one before the mapping
 _SECONDS = 24.0  # the arm gets ready, the hand approaches, one period swings in
 _MIDDLE = (0.0, -0.014, 0.02)  # of the hand's way [m], 3 mm within the object of palpation
-_STIFFNESS = PositionPositionParameters().stiffness
+_TICK: Complex = np.exp(-DT * S)
 
 Way = tuple[str, str]
-"""Architecture and passivity."""
+"""Architecture, or ``impedance``, and passivity."""
 Job = tuple[Way, float, str]
 """Way, round trip [s] and world."""
+
+
+class Channels(NamedTuple):
+    """What goes through a chain, beside the hand's place.
+
+    Attributes:
+        force: Force at the hand over the one on the tip.
+        stiffness: Force at the hand over how far the tip is behind [N/m].
+        hand: Force that leads the slave over the hand's.
+        yields: Whether the slave has its stage ``impedance``.
+        architecture: What a session calls it; empty for its own name.
+    """
+
+    force: float = 0.0
+    stiffness: float = 0.0
+    hand: float = 0.0
+    yields: bool = False
+    architecture: str = ""
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Stages of a session beside those of every chain."""
+        return ("impedance",) if self.yields else ()
+
+
+_THREE, _FOUR = ThreeChannelParameters(), FourChannelParameters()
+CHANNELS = {
+    "unilateral": Channels(),
+    "position_force": Channels(1.0),
+    "position_position": Channels(0.0, PositionPositionParameters().stiffness),
+    "impedance": Channels(1.0, yields=True, architecture="position_force"),
+    "three_channel": Channels(_THREE.force_gain, _THREE.stiffness, yields=True),
+    "four_channel": Channels(_FOUR.force_gain, _FOUR.stiffness, _FOUR.hand_gain, yields=True),
+}
+"""What ways are made of, with default parameters; ``impedance`` is a slave that yields, before a
+hand that feels its force."""
 
 
 class Cell(NamedTuple):
@@ -52,6 +91,15 @@ def _motion(times: Array) -> Array:
     return place
 
 
+def far_settings(round_trip: float) -> Settings:
+    """Parameters of a network with a round trip [s], half of it each way, and of a calm hand."""
+    return {
+        "network.there.least_delay": 0.5 * round_trip,
+        "network.back.least_delay": 0.5 * round_trip,
+        "feedback_timeout": 1.0, "reach_force.is_on": False, "gimbal_noise": 0.0,
+    }  # fmt: skip
+
+
 def settings(way: Way, round_trip: float, world: str) -> Settings:
     """Parameters of a session in which hand and device are firm and without faults.
 
@@ -61,14 +109,14 @@ def settings(way: Way, round_trip: float, world: str) -> Settings:
         world: One of :data:`WORLDS`, or another material.
     """
     architecture, passivity = way
+    channels = CHANNELS[architecture]
     touched = {"world": "empty"} if world == AIR else {"world.material": world}
     return {
-        "stages": ("network", "passivity"), **touched, "coarse_gain": 1.0,
-        "reflection.architecture": architecture, "reflection.passivity": passivity,
-        "network.there.least_delay": 0.5 * round_trip,
-        "network.back.least_delay": 0.5 * round_trip,
-        "reflection.max_force": 10.0, "feedback_timeout": 1.0, "reach_force.is_on": False,
-        "tremor_amplitude": 0.0, "gimbal_noise": 0.0, "device.friction": 0.0,
+        "stages": ("network", *channels.stages, "passivity"),
+        **far_settings(round_trip), **touched, "coarse_gain": 1.0,
+        "reflection.architecture": channels.architecture or architecture,
+        "reflection.passivity": passivity,
+        "reflection.max_force": 10.0, "tremor_amplitude": 0.0, "device.friction": 0.0,
         "device.position_resolution": 0.0, "device.stiffness": (1e6,) * 3,
         "device.peak_force": 50.0, "device.continuous_force": 50.0, "device.apparent_mass": 0.01,
         "hand.mass": 0.01, "hand.stiffness": 5000.0, "hand.damping": 40.0,
@@ -101,20 +149,36 @@ def measure_cells(
 def predicted_hybrid(arm: Complex, architecture: str, round_trip: float) -> Complex:
     """Hybrid matrix (L, 2, 2) of an architecture without passivity, of how the arm moves alone.
 
+    The arm follows its command with T and gives way with Y. Its command is the hand's place, and
+    the stage's admittance A of the hand's force less that on the tip; lags of the way are in both::
+
+        v_tip  = T (v_hand + s A (g f_hand - f_tip)) - Y f_tip
+        f_hand = k f_tip + K/s (v_hand - v_tip)
+
     Args:
-        arm: Hybrid matrix without a round trip, of which the arm's row is taken.
-        architecture: ``position_force``, or ``position_position`` with its default spring.
+        arm: Hybrid matrix of position-force without a round trip, of which the arm's row is taken.
+        architecture: One of :data:`CHANNELS`.
         round_trip: Half of it each way [s].
 
     Source:
-        Lawrence 1993, both architectures; position-position without its damper.
+        Lawrence 1993, general four-channel architecture, for a slave that is an admittance as in
+        Hashtrudi-Zaad and Salcudean 2001; without the dampers of position channels.
     """
     there, back = np.exp(-0.5 * round_trip * S), np.exp(-(0.5 * round_trip + _BACK) * S)
-    matrix = np.zeros_like(arm)
-    matrix[:, 1, 0], matrix[:, 1, 1] = arm[:, 1, 0] * there, arm[:, 1, 1]
-    if architecture == "position_force":
-        matrix[:, 0, 1] = back
-    else:
-        matrix[:, 0, 0] = _STIFFNESS / S * (1.0 + matrix[:, 1, 0] * back)
-        matrix[:, 0, 1] = _STIFFNESS / S * back * matrix[:, 1, 1]
+    channels, follows = CHANNELS[architecture], -arm[:, 1, 0]
+    spring = channels.stiffness / S
+    yields = follows * S * _admittance() if channels.yields else 0.0 * S
+    by_hand = there * yields * channels.hand
+    loop = 1.0 + by_hand * spring * back
+    matrix = np.empty_like(arm)
+    matrix[:, 1, 0] = -(follows * there + by_hand * spring) / loop
+    matrix[:, 1, 1] = (arm[:, 1, 1] + yields * _TICK - by_hand * channels.force * back) / loop
+    matrix[:, 0, 0] = spring * (1.0 + matrix[:, 1, 0] * back)
+    matrix[:, 0, 1] = back * (channels.force + spring * matrix[:, 1, 1])
     return matrix
+
+
+def _admittance() -> Complex:
+    """Way over force (L,) [m/N] of the stage ``impedance``, in steps backwards in time."""
+    own, rate = ImpedanceParameters(), (1.0 - _TICK) / DT
+    return 1.0 / ((own.mass * rate + own.damping) * rate + own.stiffness)

@@ -33,8 +33,10 @@ WAYS = (
     ("position_force", "none"), ("position_force", "tank"), ("position_force", "tdpa"),
     ("position_force", "wave"),
     ("position_position", "none"), ("position_position", "tank"), ("position_position", "tdpa"),
+    ("impedance", "none"), ("three_channel", "none"), ("four_channel", "none"),
 )  # fmt: skip
-"""Architectures and passivities. With ``wave`` the architecture says nothing."""
+"""Architectures and passivities. With ``wave`` the architecture says nothing; ``impedance`` is
+position-force before a slave that yields."""
 ROUND_TRIPS = (0.0, 0.02, 0.1, 0.2)
 """Half of it each way [s]."""
 LAG = Lag(0.05, 1e-4, 20)
@@ -44,9 +46,10 @@ STRAY = 0.3
 _AT = int(np.abs(LINES - 1.0).argmin())
 _WITHIN, _NEAR = percent(5.0), absolute(0.05)
 _FORCE, _POSITION = ("position_force", "none"), ("position_position", "none")
+_FOUR = ("four_channel", "none")
 Cells = Mapping[tuple[Way, float], Cell]
 _LATE_COLORS = (FIRST, SECOND, THIRD, FIXTURE)
-_COLORS = {_FORCE: FIRST, _POSITION: SECOND, ("position_force", "wave"): MEASURED}
+_COLORS = {_FORCE: FIRST, _POSITION: SECOND, ("position_force", "wave"): MEASURED, _FOUR: THIRD}
 
 
 @dataclass(frozen=True)
@@ -170,8 +173,8 @@ _NOTES = (
     "Published: computed by the equations of the sources, which were not read again; no number "
     "that a source measured is here. Of the known two-port it is the exact hybrid matrix. Of the "
     "chain without passivity it is made of the arm's row, as position_force without a round trip "
-    "showed it, of the delays of the network, and of 2 ms for two readers; for that way at 0 ms "
-    "the tip's numbers are no test.",
+    "showed it, of the channels and the slave's admittance, of the delays of the network, and of "
+    "2 ms for two readers; for position_force at 0 ms the tip's numbers are no test.",
     "Excited is the place of a firm hand: 20 lines from 0.1 to 30 Hz of 0.15 mm each, odd "
     "multiples of 0.1 Hz, over one period of 10 s, around a point 3 mm deep in the object of "
     "palpation. Gain of motion and force is 1. Ports: push of the master and place of the device, "

@@ -1,7 +1,6 @@
 """Rests: where the slave comes to rest when it is moved to joint targets again and again."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +20,7 @@ _FINE = 1e-4  # of an encoder step
 
 @kernel
 def _drive(
-    server: Any, simulated: Any, row: SlaveRow, way: Array, begin_ns: int, dt: float
+    steps: Any, server: Any, simulated: Any, row: SlaveRow, way: Array, begin_ns: int, dt: float
 ) -> None:
     """Command a way (N, n), a joint vector a tick, from the tick after ``begin_ns`` on."""
     for k in range(way.shape[0]):
@@ -29,7 +28,7 @@ def _drive(
         row.slave_servo_jp_ns = row.now_ns
         for i in range(way.shape[1]):
             row.slave_servo_jp[i] = way[k, i]
-        arm_step(server, simulated, row, dt)
+        arm_step(steps, server, simulated, row, dt)
 
 
 class Mover:
@@ -77,8 +76,9 @@ class Mover:
         time = shortest_move_time(self.goal, goal, self._limit)
         count = math.ceil((time + self._settle) / slave.dt)
         way = cubic_move(self.goal, goal, time, slave.dt * np.arange(1.0, count + 1.0))[0]
-        server, simulated = slave.arguments
-        _drive(server, simulated, slave.signals, np.ascontiguousarray(way), self._now_ns, slave.dt)
+        way = np.ascontiguousarray(way)
+        steps, server, simulated = slave.arguments
+        _drive(steps, server, simulated, slave.signals, way, self._now_ns, slave.dt)
         self._now_ns += count * TICK_NS
         self.goal = goal
         return np.array(slave.signals["slave_measured_js"][: len(goal)])
@@ -93,7 +93,6 @@ def rest_positions(
     targets: Array,
     runs: int,
     faults: Hardware | None = None,
-    progress: Callable[[float], None] = lambda share: None,
     *,
     is_smooth: bool = False,
 ) -> Array:
@@ -106,7 +105,6 @@ def rest_positions(
         targets: Joint targets; what lies outside the limits is taken to them.
         runs: Moves to each.
         faults: The arm's faults in place of its own.
-        progress: Hears the share that is done.
         is_smooth: Whether encoders and drives have no steps.
     """
     mover = Mover(parameters, faults, is_smooth=is_smooth)
@@ -117,5 +115,4 @@ def rest_positions(
         for run in range(runs):
             rests[k, run] = mover.move(target)
             mover.move(home)
-            progress((k * runs + run + 1) / (len(targets) * runs))
     return rests

@@ -19,7 +19,7 @@ from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
 from teleop_core.graph.signals import DT, assign, copy
 from teleop_core.graph.topics import SLAVE_REACH, Limit
-from teleop_core.kernels import bound, kernel_from_source, raise_pending, records
+from teleop_core.kernels import apart, bound, kernel_from_source, raise_pending, records
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_lab.planning.asked import AskedPath
 from teleop_lab.planning.placement import Placement
@@ -28,7 +28,7 @@ _COLUMN = {name: column for column, name in enumerate(SLAVE_REACH.columns)}
 # Larger than any speed limit [rad/s or m/s].
 _ANY_SPEED = 1e6
 _SOURCE = """\
-def walk(scaling, solving, s, r, fk, geometry, T, q, switch, samples, answers, dt):
+def walk(scale, solve, scaling, solving, s, r, fk, geometry, T, q, switch, samples, answers, dt):
     for i in range(samples.shape[0]):
         sample, answer = samples[i], answers[i]
         copy(sample.pose, s.master_measured_cp)
@@ -136,12 +136,11 @@ class Walker:
             scaling="".join(f"scaling[{i}], " for i in range(len(scaling.arguments))),
             solving="".join(f"solving[{i}], " for i in range(len(solving.arguments))),
         )
-        known = {
-            "scale": scaling.kernel, "solve": solving.kernel, "copy": copy,
-            "pose_from_transform": pose_from_transform,
-        }  # fmt: skip
+        known = {"copy": copy, "pose_from_transform": pose_from_transform}
         return bound(
             kernel_from_source(source, "walk", known),
+            apart(scaling.kernel, *scaling.arguments, scaling.signals, DT),
+            apart(solving.kernel, *solving.arguments, solving.signals, DT),
             scaling.arguments, solving.arguments, scaling.signals, solving.signals,
             robot.fk_pointer, robot.geometry_row, np.zeros((4, 4)), np.zeros(robot.n),
             self._switch, self._samples, self._answers, DT,

@@ -33,6 +33,11 @@ def unscaled(parameters: object) -> float:
     return 1.0
 
 
+def unled(parameters: object) -> float:
+    """Zero: the hand's force does not lead the slave."""
+    return 0.0
+
+
 @dataclass(frozen=True)
 class Architecture:
     """A kind of architecture: what comes back to the hand.
@@ -51,6 +56,9 @@ class Architecture:
             parameters in their order.
         force_scale: ``force_scale(parameters)`` gives the force at the hand over the one on the
             tip that it answers, above 0, by which energies of hand and slave are compared.
+        lead_gain: ``lead_gain(parameters)`` gives the force that leads the slave's tip over what
+            the hand bears of the push [N/N], for the stage ``impedance``.
+        needs_impedance: Whether it works with a stage ``impedance`` alone.
     """
 
     name: str
@@ -58,6 +66,8 @@ class Architecture:
     push: Callable[[Array, Array, Array, Array, float, Array], None]
     numbers: Callable[[Any], Array] | None = None
     force_scale: Callable[[Any], float] = unscaled
+    lead_gain: Callable[[Any], float] = unled
+    needs_impedance: bool = False
 
     @cached_property
     def push_pointer(self) -> Any:
@@ -93,6 +103,8 @@ ARCHITECTURES: Registry[Architecture] = Registry(
         "unilateral": "teleop_core.chain.architectures.unilateral:UNILATERAL",
         "position_force": "teleop_core.chain.architectures.position_force:POSITION_FORCE",
         "position_position": "teleop_core.chain.architectures.position_position:POSITION_POSITION",
+        "three_channel": "teleop_core.chain.architectures.three_channel:THREE_CHANNEL",
+        "four_channel": "teleop_core.chain.architectures.four_channel:FOUR_CHANNEL",
     },
     part_check("architecture", Architecture, "push"),
     _try,

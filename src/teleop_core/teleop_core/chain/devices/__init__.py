@@ -21,12 +21,14 @@ class Reading(NamedTuple):
         is_held: Whether the person wants to move the stylus.
         fixture: Whether the fixture button is pressed.
         mode: Whether the mode button is pressed.
+        jaw: How far the jaw is closed, 0 open to 1 closed; None of a device that leads none.
     """
 
     rates: Array
     is_held: bool = False
     fixture: bool = False
     mode: bool = False
+    jaw: float | None = None
 
 
 NOTHING = Reading(np.zeros(6))

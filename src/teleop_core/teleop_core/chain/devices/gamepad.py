@@ -32,6 +32,10 @@ class GamepadParameters(PilotParameters):
     rumble: float = parameter(
         1.0, lower=0.0, upper=1.0, fixed=True, doc="rumble at the device's peak force; 0: none"
     )
+    triggers: str = parameter(
+        "roll", choices=("roll", "jaw"), fixed=True,
+        doc="what they do: they roll the stylus, or the right one closes the jaw and nothing rolls",
+    )  # fmt: skip
 
 
 class Sdl:
@@ -66,18 +70,20 @@ class Gamepad:
     """A gamepad that is open; see :class:`teleop_core.chain.devices.Device`.
 
     The left stick moves the stylus to the sides and away, the right one up, and turns it about the
-    vertical; the triggers roll it, the cross tips it. It moves while a shoulder button is held.
-    The lower button of the right hand (A) is the fixture, the right one (B) the mode.
+    vertical; the triggers roll it, or the right one closes the jaw; the cross tips it. It moves
+    while a shoulder button is held. The lower button of the right hand (A) is the fixture, the
+    right one (B) the mode.
 
     Args:
         wanted: Part of its name; empty: the first.
+        leads_jaw: Whether the right trigger closes the jaw.
 
     Raises:
         SessionError: There is none; the text says what was found.
     """
 
-    def __init__(self, wanted: str = "") -> None:
-        self._sdl = Sdl()
+    def __init__(self, wanted: str = "", *, leads_jaw: bool = False) -> None:
+        self._sdl, self._leads_jaw = Sdl(), leads_jaw
         found = list(self._sdl.names())
         for number, name, is_known in found:
             if is_known and wanted.lower() in name.lower():
@@ -94,13 +100,14 @@ class Gamepad:
         if not self._own.attached():
             raise SessionError(f"gamepad {self.name} is gone")
         pad, axis, button = self._sdl.pygame, self._axis, self._button
+        right, left = map(axis, (pad.CONTROLLER_AXIS_TRIGGERRIGHT, pad.CONTROLLER_AXIS_TRIGGERLEFT))
         rates = np.array([
             axis(pad.CONTROLLER_AXIS_LEFTX),
             -axis(pad.CONTROLLER_AXIS_RIGHTY),  # pushed away is negative
             axis(pad.CONTROLLER_AXIS_LEFTY),
             button(pad.CONTROLLER_BUTTON_DPAD_DOWN) - button(pad.CONTROLLER_BUTTON_DPAD_UP),
             -axis(pad.CONTROLLER_AXIS_RIGHTX),
-            axis(pad.CONTROLLER_AXIS_TRIGGERLEFT) - axis(pad.CONTROLLER_AXIS_TRIGGERRIGHT),
+            0.0 if self._leads_jaw else left - right,
         ])  # fmt: skip
         shoulders = pad.CONTROLLER_BUTTON_LEFTSHOULDER, pad.CONTROLLER_BUTTON_RIGHTSHOULDER
         return Reading(
@@ -108,6 +115,7 @@ class Gamepad:
             any(map(button, shoulders)),
             button(pad.CONTROLLER_BUTTON_A),
             button(pad.CONTROLLER_BUTTON_B),
+            right if self._leads_jaw else None,
         )
 
     def _axis(self, number: int) -> float:
@@ -130,7 +138,7 @@ class Gamepad:
 
 def open_gamepad(parameters: GamepadParameters) -> Gamepad:
     """The gamepad that is wanted; raises as :class:`Gamepad`."""
-    return Gamepad(parameters.device)
+    return Gamepad(parameters.device, leads_jaw=parameters.triggers == "jaw")
 
 
 GAMEPAD = Operator(

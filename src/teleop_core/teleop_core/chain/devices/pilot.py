@@ -10,6 +10,7 @@ from teleop_core.chain.operators.remote import RemoteHand
 from teleop_core.kernels.geometry import Array, turn_by
 from teleop_core.kernels.portable import length
 
+_NEAR = 0.02  # share of the jaw's way: a trigger that is as far pressed as before
 _LONGEST = 0.05  # a reader that slept longer has lost time, not made way [s]
 
 
@@ -51,11 +52,12 @@ class Pilot:
     def __init__(self, hand: RemoteHand, parameters: PilotParameters) -> None:
         self._hand, self._parameters = hand, parameters
         self._pose: Array | None = None
-        self._has_buttons = (False, False)
+        self._has_buttons, self._leads_jaw = (False, False), True
 
     def step(self, reading: Reading, dt: float) -> None:
         """Take what the device says, ``dt`` [s] after the last time."""
         self._press(reading)
+        self._close(reading)
         if not reading.is_held:
             self.let_go()
             return
@@ -75,6 +77,23 @@ class Pilot:
         if self._pose is not None:
             self._hand.let_go()
             self._pose = None
+
+    def lose(self) -> None:
+        """Let go of the stylus, and leave the jaw as it is: the device is gone."""
+        self.let_go()
+        self._leads_jaw = False
+
+    def _close(self, reading: Reading) -> None:
+        """Close the jaw as far as the device says.
+
+        One that came back says that nothing is pressed. It leads the jaw again once it was closed
+        as far as it is.
+        """
+        if reading.jaw is None:
+            return
+        self._leads_jaw = self._leads_jaw or reading.jaw >= self._hand.closing - _NEAR
+        if self._leads_jaw:
+            self._hand.close(reading.jaw)
 
     def _press(self, reading: Reading) -> None:
         pressed = reading.fixture, reading.mode

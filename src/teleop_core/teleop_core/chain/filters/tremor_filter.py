@@ -6,13 +6,15 @@ itself too: a push that is late gives back more energy than it took.
 """
 
 import math
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from teleop_core.base.parameters import Choice, choice, parameter
 from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
-from teleop_core.chain.filters.parameters import TremorFilterParameters
 from teleop_core.chain.mapping.plausibility import (
+    HandLimits,
     PlausibilityNumbers,
     PlausibilityState,
     is_plausible,
@@ -28,6 +30,18 @@ from teleop_core.kernels.geometry import Array
 
 _FADE = 0.2
 """Time constant with which the difference between old and new parameters goes away [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TremorFilterParameters:
+    """Parameters of :class:`RunningTremorFilter`."""
+
+    kind: Choice = choice(TREMOR_FILTERS, "band_stop", doc="how tremor is taken out")
+    longest_pause: float = parameter(
+        0.3, unit="s", lower=0.002, upper=5.0,
+        doc="after a longer pause of the master the filter begins anew at the reading",
+    )  # fmt: skip
+    plausible: HandLimits = field(default_factory=HandLimits)
 
 
 class FilterState(PlausibilityState):

@@ -46,6 +46,7 @@ from teleop_core.chain.mapping.reflection import (
     Law,
     ReflectionNumbers,
     ReflectionState,
+    lead_by_force,
     make_law,
     reflect,
 )
@@ -71,6 +72,7 @@ from teleop_core.graph.topics import (
     SLAVE_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_REACH,
+    SLAVE_SERVO_CF,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
@@ -271,6 +273,7 @@ def _refuse(
         row.master_servo_cf[i] = 0.0
     for i in range(3):
         s.push[i], s.pushed_at[i] = 0.0, stylus[i]
+    lead_by_force(p, s, row)
     if not (is_doubtful or (is_following and s.is_engaged)):
         copy(row.slave_setpoint_cp, s.command)
     copy(s.command, row.slave_servo_cp)
@@ -347,6 +350,7 @@ def motion_scaling_step(
     _wall(p, s, fixture, period, stylus, row.master_servo_cf)
     _push_back(p, s, row.master_servo_cf)
     reflect(p, s, law, is_following, period, stylus, row)
+    lead_by_force(p, s, row)
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
     _report(p, s, gain, is_following, row)
@@ -444,6 +448,7 @@ class MotionScaling(RunningStage):
         passivity = PASSIVITIES.find(reflection.passivity.kind)
         p["law"] = PASSIVITIES.names().index(passivity.name)
         p["force_scale"] = part.force_scale(chosen.parameters)
+        p["lead_gain"] = part.lead_gain(chosen.parameters)
         numbers = part.numbers_of(chosen.parameters)
         kept = passivity.numbers_of(reflection.passivity.parameters)
         law = self._law
@@ -501,10 +506,10 @@ MOTION_SCALING = Stage(
         MASTER_FILTERED_OUT,
         SLAVE_ENERGY,
     ),
-    writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE, MASTER_ENERGY),
+    writes=(SLAVE_SERVO_CP, MASTER_SERVO_CF, TELEOP_STATE, MASTER_ENERGY, SLAVE_SERVO_CF),
     late=(SLAVE_SETPOINT_CP, SLAVE_REACH, SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_ENERGY),
     optional=(MASTER_FILTERED_OUT, SLAVE_ENERGY),
-    on_demand=(MASTER_ENERGY,),
+    on_demand=(MASTER_ENERGY, SLAVE_SERVO_CF),
     trigger=MASTER_MEASURED_CP,
     needs=(SLAVE_SETPOINT_CP,),
     make=MotionScaling,

@@ -36,6 +36,7 @@ class ReflectionNumbers(FollowingNumbers):
     reflected_most: float  # [N]
     law: float  # kind of passivity
     force_scale: float  # force at the hand over that on the tip
+    lead_gain: float  # force that leads the slave over that of the hand
     gain: Annotated[Array, 2]  # motion of the slave over the hand's: coarse, fine
     axis: Annotated[Integers, 3]  # axes of master and slave
     sign: Vector3
@@ -137,6 +138,16 @@ def reflect(
     _make_passive(p, s, law, period, row)
     for i in range(3):
         row.master_servo_cf[i] += s.push[i]
+
+
+@inner
+def lead_by_force(p: ReflectionNumbers, s: ReflectionState, row: Row) -> None:
+    """Write slave_servo_cf: what the hand bears of the push that answers the slave.
+
+    A device that can be moved freely gives the hand's force on so; it has no sensor of it.
+    """
+    for i in range(3):
+        row.slave_servo_cf[i] = -p.lead_gain * p.sign[i] * s.push[p.axis[i]]
 
 
 @inner

@@ -18,6 +18,7 @@ from teleop_core.graph.signals import DT, STATE, assign
 from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
     HAND_BUTTONS,
+    HAND_JAW,
     HAND_SERVO_CP,
     HAND_TREMOR,
     MASTER_MEASURED_CF,
@@ -100,8 +101,8 @@ def operator_step(
         s: State record; written.
         wanted: What is wanted, now and in the coming ticks, record by record: ``wanted`` (3,) [m]
             in the master's base, ``attitude`` of the stylus, quaternion (4,), ``buttons`` (3,):
-            clutch, fixture, mode, and ``tremor`` (3,) [m], which the tip makes whatever friction
-            and force are.
+            clutch, fixture, mode, ``tremor`` (3,) [m], which the tip makes whatever friction and
+            force are, and how far the ``jaw`` is closed.
         noises: Standard normal numbers of the coming ticks (N, 6), of which x, y, z shake the hand.
         row: Signals.
         dt: Tick [s].
@@ -115,6 +116,7 @@ def operator_step(
         row.hand_servo_cp[i] = now.wanted[i] + tremor[i]
         row.hand_tremor[i] = now.tremor[i]
         row.hand_buttons[i] = now.buttons[i]
+    row.hand_jaw[0] = now.jaw
     for i in range(4):
         row.hand_servo_cp[3 + i] = now.attitude[i]
 
@@ -155,16 +157,16 @@ class RunningOperator(RunningStage):
         setting = Setting(fixed, phases, fixed.seed, seen)
         self._motion = self._asked(self._operator.make, fixed.kind.parameters, setting)
         buttons = fixed.buttons
-        has_presses = bool(buttons.clutch or buttons.fixture or buttons.mode)
+        has_presses = bool(buttons.clutch or buttons.fixture or buttons.mode or buttons.jaw)
         self._person = None if has_presses else self.hand
         self._tick, self._end, self._end_of_noise = 0, 1, 0
         assign(self.state, 0)
         now, rest = self._wanted[0], rest_pose()
         self._rest = rest[3:]
         now["wanted"], now["attitude"], now["buttons"] = rest[:3], rest[3:], 0.0
-        now["tremor"] = 0.0
+        now["tremor"] = now["jaw"] = 0.0
         row[HAND_SERVO_CP.field], row[MASTER_MEASURED_CP.field] = rest, rest
-        row[HAND_BUTTONS.field] = row[HAND_TREMOR.field] = 0.0
+        row[HAND_BUTTONS.field] = row[HAND_TREMOR.field] = row[HAND_JAW.field] = 0.0
 
     def retune(self, parameters: OperatorParameters) -> None:
         """Take new tremor and patience from the next tick on; the motion goes on."""
@@ -223,10 +225,12 @@ class RunningOperator(RunningStage):
         _turn_all(self._rest, np.ascontiguousarray(moves[:, 3:6]), attitudes)
         drawn["attitude"] = attitudes
         drawn["buttons"] = np.maximum(self._pressed(times), moves[:, 6:9])
-        drawn["tremor"] = moves[:, 9:]
+        drawn["tremor"] = moves[:, 9:12]
+        closed = _held(self._fixed.buttons.jaw, times)
+        drawn["jaw"] = np.maximum(closed, np.clip(moves[:, 12], 0.0, 1.0))
 
     def _moves(self, times: Array) -> Array:
-        """Motion, buttons and tremor (N, 12) of the operator.
+        """Motion, buttons, tremor and jaw (N, 13) of the operator.
 
         Raises:
             PartError: What he answers has another shape, or is not finite.
@@ -236,15 +240,13 @@ class RunningOperator(RunningStage):
         if moves.dtype.kind not in "fiub":
             raise PartError("operator", name, f"one who answers numbers, not {moves.dtype}")
         moves = moves.astype(np.float64)
-        if moves.shape not in {(len(times), columns) for columns in (3, 6, 9, 12)}:
+        if moves.shape not in {(len(times), columns) for columns in (3, 6, 9, 12, 13)}:
             text = f"one who answers (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
             raise PartError("operator", name, text)
         if not np.isfinite(moves).all():
             bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]
             raise PartError("operator", name, f"one who answers finite numbers; at {bad:g} s not")
-        if moves.shape[1] == 12:
-            return moves
-        return np.pad(moves, ((0, 0), (0, 12 - moves.shape[1])))
+        return np.pad(moves, ((0, 0), (0, 13 - moves.shape[1])))
 
     def _asked(self, question: Callable[..., Any], *arguments: Any) -> Any:
         """What the operator answers.
@@ -265,11 +267,16 @@ class RunningOperator(RunningStage):
     def _pressed(self, times: Array) -> Array:
         buttons = self._fixed.buttons
         pressed = np.zeros((len(times), 3))
-        pressed[:, 0] = np.searchsorted(buttons.clutch, times, side="right") % 2
+        pressed[:, 0] = _held(buttons.clutch, times)
         for column, presses in ((1, buttons.fixture), (2, buttons.mode)):
             for start in presses:
                 pressed[(times >= start) & (times < start + PRESS_TIME), column] = 1.0
         return pressed
+
+
+def _held(presses: tuple[float, ...], times: Array) -> Array:
+    """Whether a button is held at times (N,) [s], by when it is pressed and released in turn."""
+    return (np.searchsorted(presses, times, side="right") % 2).astype(np.float64)
 
 
 @kernel
@@ -283,8 +290,9 @@ OPERATOR = Stage(
     "operator",
     OperatorParameters,
     reads=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE),
-    writes=(HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR),
+    writes=(HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR, HAND_JAW),
     late=(SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF, TELEOP_STATE),
+    on_demand=(HAND_JAW,),
     make=RunningOperator,
     node="teleop_core.nodes.operator:OperatorNode",
 )

@@ -16,7 +16,7 @@ from typing import Annotated
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.network.link import LinkState
 from teleop_core.kernels import inner
-from teleop_core.kernels.fields import Fields, Vector3
+from teleop_core.kernels.fields import Fields
 from teleop_core.kernels.geometry import Array
 
 
@@ -35,7 +35,7 @@ class DeadbandState(LinkState):
     """Fields of a state record with what the last packets told."""
 
     told_pose: Annotated[Array, 2, 7]  # of each direction
-    told_force: Vector3  # of the last one back [N]
+    told_force: Annotated[Array, 2, 3]  # [N]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +84,7 @@ def take_deadband(p: DeadbandNumbers, parameters: DeadbandParameters, dt: float)
 def is_worth_telling(
     p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, force: Array
 ) -> bool:
-    """Whether a packet of direction ``k`` shall go with this pose (7,) and force (3,) or (0,).
+    """Whether a packet of direction ``k`` shall go with this pose (7,) and force (3,).
 
     Args:
         p: Parameters.
@@ -95,7 +95,7 @@ def is_worth_telling(
     """
     if p.has_deadband == 0 or s.sent[k] == 0 or s.tick - s.sent_tick[k] >= p.longest_ticks:
         return True
-    return _has_moved(p, s.told_pose[k], pose) or _has_changed(p, s.told_force, force)
+    return _has_moved(p, s.told_pose[k], pose) or _has_changed(p, s.told_force[k], force)
 
 
 @inner
@@ -104,7 +104,7 @@ def remember_told(s: DeadbandState, k: int, pose: Array, force: Array) -> None:
     for i in range(7):
         s.told_pose[k, i] = pose[i]
     for i in range(force.shape[0]):
-        s.told_force[i] = force[i]
+        s.told_force[k, i] = force[i]
 
 
 @inner

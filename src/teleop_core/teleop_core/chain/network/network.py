@@ -23,8 +23,10 @@ from teleop_core.chain.network.link import (
     make_way,
     may_send,
     send_packet,
+    serve_line,
     take_packet,
 )
+from teleop_core.chain.network.packet_size import message_sizes
 from teleop_core.chain.network.parameters import NetworkParameters, WayParameters
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign
@@ -32,21 +34,26 @@ from teleop_core.graph.stage import RunningStage, Stage
 from teleop_core.graph.topics import (
     ENERGY,
     MASTER_ENERGY,
+    NETWORK_JAW_SERVO_JP,
     NETWORK_MASTER_ENERGY,
     NETWORK_MEASURED_CF,
     NETWORK_MEASURED_CP,
     NETWORK_REACH,
+    NETWORK_SERVO_CF,
     NETWORK_SERVO_CP,
     NETWORK_SETPOINT_CP,
     NETWORK_SLAVE_ENERGY,
     NETWORK_STATE,
     NO_COMMAND_NS,
     SLAVE_ENERGY,
+    SLAVE_JAW_SERVO_JP,
     SLAVE_MEASURED_CF,
     SLAVE_MEASURED_CP,
     SLAVE_REACH,
+    SLAVE_SERVO_CF,
     SLAVE_SERVO_CP,
     SLAVE_SETPOINT_CP,
+    Topic,
 )
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Vector3, record
@@ -61,19 +68,29 @@ _SETPOINT, _POSE, _FORCE, _REACH = 0, 7, 14, 20
 _ENERGY = _REACH + len(SLAVE_REACH.columns)
 """Places in a packet from the slave: setpoint, measured pose, force, reach, energies."""
 _ENERGY_THERE = 7  # place of the energies in a packet to the slave, behind the command
-_WIDTHS = (_ENERGY_THERE + len(ENERGY), _ENERGY + len(ENERGY))
+_JAW_THERE = _ENERGY_THERE + len(ENERGY)
+_FORCE_THERE = _JAW_THERE + 1
+_WIDTHS = (_FORCE_THERE + 6, _ENERGY + len(ENERGY))
+_CARRIED = (
+    (SLAVE_SERVO_CP, MASTER_ENERGY, SLAVE_JAW_SERVO_JP, SLAVE_SERVO_CF),
+    (SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH, SLAVE_ENERGY),
+)
+"""Topics of a packet to the slave, and of one from it, in the order of their stamps."""
 
 
 class NetworkNumbers(LinkNumbers, DeadbandNumbers):
     """Parameter record of the network."""
 
     is_incremental: int
+    clock_offset_ns: int
+    clock_drift: float
 
 
 class NetworkState(DeadbandState):
     """State record of the network."""
 
     sent_ns: int
+    first_ns: int  # time of the first tick
     base: Vector3  # from where increments count [m]
 
 
@@ -90,22 +107,41 @@ def _unpack(packet: Array, at: int, row_values: Array) -> None:
 
 
 @inner
+def _clock_ahead(p: NetworkNumbers, s: NetworkState, time_ns: int) -> int:
+    """By how much the slave's clock is ahead of ours [ns] at a time [ns] of ours."""
+    return p.clock_offset_ns + int(p.clock_drift * (time_ns - s.first_ns))
+
+
+@inner
+def _as_stamped_there(p: NetworkNumbers, s: NetworkState, stamp_ns: int) -> int:
+    """Stamp that the slave's clock gives what was sampled at a time [ns] of ours."""
+    if stamp_ns <= NO_COMMAND_NS:
+        return stamp_ns
+    # A stamp of 0 or less says that there is no sample.
+    return max(stamp_ns + _clock_ahead(p, s, stamp_ns), NO_COMMAND_NS)
+
+
+@inner
 def _send_there(p: NetworkNumbers, s: NetworkState, there: Way, row: Row, dt: float) -> None:
     """Send the command if it is a new one, and its sender has heard where the slave is."""
     is_new = row.slave_servo_cp_ns not in (0, s.sent_ns)
     if not (is_new and s.newest[BACK] > 0 and may_send(p, s, THERE)):
         return
-    none = row.slave_measured_cf[:0]
-    if not is_worth_telling(p, s, THERE, row.slave_servo_cp, none):
+    force = row.slave_servo_cf[:3]
+    moves_jaw = row.slave_jaw_servo_jp[0] != there.packet[_JAW_THERE]
+    if not (moves_jaw or is_worth_telling(p, s, THERE, row.slave_servo_cp, force)):
         return
     for i in range(3):
         if s.sent_ns != 0:
             there.moved[0, i] = row.slave_servo_cp[i] - s.told_pose[THERE, i]
-    remember_told(s, THERE, row.slave_servo_cp, none)
+    remember_told(s, THERE, row.slave_servo_cp, force)
     s.sent_ns = row.slave_servo_cp_ns
     _pack(row.slave_servo_cp, there.packet, 0)
     _pack(row.master_energy, there.packet, _ENERGY_THERE)
+    _pack(row.slave_jaw_servo_jp, there.packet, _JAW_THERE)
+    _pack(row.slave_servo_cf, there.packet, _FORCE_THERE)
     there.packet_ns[0], there.packet_ns[1] = row.slave_servo_cp_ns, row.master_energy_ns
+    there.packet_ns[2], there.packet_ns[3] = row.slave_jaw_servo_jp_ns, row.slave_servo_cf_ns
     send_packet(p, s, there, THERE, dt)
 
 
@@ -123,9 +159,11 @@ def _send_back(p: NetworkNumbers, s: NetworkState, back: Way, row: Row, dt: floa
     _pack(row.slave_measured_cf, back.packet, _FORCE)
     _pack(row.slave_reach, back.packet, _REACH)
     _pack(row.slave_energy, back.packet, _ENERGY)
-    back.packet_ns[0], back.packet_ns[1] = row.slave_setpoint_cp_ns, row.slave_measured_cp_ns
-    back.packet_ns[2], back.packet_ns[3] = row.slave_measured_cf_ns, row.slave_reach_ns
-    back.packet_ns[4] = row.slave_energy_ns
+    # Setpoint and reach have the stamp of a command, of our clock; the rest is of the slave's.
+    back.packet_ns[0], back.packet_ns[3] = row.slave_setpoint_cp_ns, row.slave_reach_ns
+    back.packet_ns[1] = _as_stamped_there(p, s, row.slave_measured_cp_ns)
+    back.packet_ns[2] = _as_stamped_there(p, s, row.slave_measured_cf_ns)
+    back.packet_ns[4] = _as_stamped_there(p, s, row.slave_energy_ns)
     send_packet(p, s, back, BACK, dt)
 
 
@@ -136,7 +174,10 @@ def _take_there(p: NetworkNumbers, s: NetworkState, there: Way, row: Row) -> Non
     if s.arrived[THERE]:
         _unpack(there.came, 0, row.network_servo_cp)
         _unpack(there.came, _ENERGY_THERE, row.network_master_energy)
+        _unpack(there.came, _JAW_THERE, row.network_jaw_servo_jp)
+        _unpack(there.came, _FORCE_THERE, row.network_servo_cf)
         row.network_servo_cp_ns, row.network_master_energy_ns = there.came_ns[0], there.came_ns[1]
+        row.network_jaw_servo_jp_ns, row.network_servo_cf_ns = there.came_ns[2], there.came_ns[3]
     if p.is_incremental == 0:
         return
     setpoint_ns = row.slave_setpoint_cp_ns
@@ -179,6 +220,10 @@ def network_step(
         dt: Tick [s].
     """
     s.tick += 1
+    if s.first_ns == 0:
+        s.first_ns = row.now_ns
+    serve_line(p, s, there, THERE, dt)
+    serve_line(p, s, back, BACK, dt)
     _send_there(p, s, there, row, dt)
     _send_back(p, s, back, row, dt)
     _take_there(p, s, there, row)
@@ -189,6 +234,7 @@ def network_step(
         for k in range(2):
             state[3 * k], state[3 * k + 1] = s.sent[k], s.lost[k]
             state[3 * k + 2] = s.sent[k] - s.newest[k]
+        state[6] = 1e-9 * _clock_ahead(p, s, row.now_ns)
 
 
 class NetworkLink(RunningStage):
@@ -204,7 +250,7 @@ class NetworkLink(RunningStage):
         self.kernel, self._seed, self.ahead = network_step, parameters.seed, BLOCK
         self._ways = [
             self._made(width, topics, given)
-            for width, topics, given in zip(_WIDTHS, (2, 5), parameters.ways, strict=True)
+            for width, topics, given in zip(_WIDTHS, _CARRIED, parameters.ways, strict=True)
         ]
         self.arguments = (self.parameters, self.state, *self._ways)
         self._begin = self.signals.copy()
@@ -212,9 +258,10 @@ class NetworkLink(RunningStage):
         self.reset()
 
     @staticmethod
-    def _made(width: int, topics: int, given: WayParameters) -> Way:
+    def _made(width: int, topics: tuple[Topic, ...], given: WayParameters) -> Way:
         kind = NETWORKS.find(given.kind.kind)
-        return make_way(width, topics, kind.draw_pointer, kind.numbers_of(given.kind.parameters))
+        numbers = kind.numbers_of(given.kind.parameters)
+        return make_way(width, message_sizes(topics), kind.draw_pointer, numbers)
 
     def reset(self) -> None:
         """Nothing is on the way, and the random numbers of the seed begin anew."""
@@ -229,11 +276,15 @@ class NetworkLink(RunningStage):
         """Take another network from the next packet on; what is on its way arrives as it would."""
         p = self.parameters
         p["is_incremental"] = parameters.commands == "incremental"
+        p["clock_offset_ns"] = round(1e9 * parameters.clock_offset)
+        p["clock_drift"] = 1e-6 * parameters.clock_drift
         take_deadband(p, parameters.deadband, self.dt)
         for k, given in enumerate(parameters.ways):
             p["least_delay"][k], p["loss"][k] = given.least_delay, given.loss
             p["keeps_order"][k] = given.packet_order == "kept"
             p["every"][k] = max(1, math.floor(1.0 / (given.packet_rate * self.dt) + 0.5))
+            p["byte_ticks"][k] = 8.0 / (given.bandwidth * self.dt) if given.bandwidth else 0.0
+            p["queue"][k] = given.queue
             self._take_kind(k, given)
 
     def _take_kind(self, k: int, given: WayParameters) -> None:
@@ -269,7 +320,7 @@ class NetworkLink(RunningStage):
 
 _TAKEN = (
     SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH,
-    MASTER_ENERGY, SLAVE_ENERGY,
+    MASTER_ENERGY, SLAVE_ENERGY, SLAVE_JAW_SERVO_JP, SLAVE_SERVO_CF,
 )  # fmt: skip
 NETWORK = Stage(
     "network",
@@ -277,13 +328,19 @@ NETWORK = Stage(
     reads=_TAKEN,
     writes=(
         NETWORK_SERVO_CP, NETWORK_SETPOINT_CP, NETWORK_MEASURED_CP, NETWORK_MEASURED_CF,
-        NETWORK_REACH, NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY, NETWORK_STATE,
+        NETWORK_REACH, NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY, NETWORK_JAW_SERVO_JP,
+        NETWORK_SERVO_CF, NETWORK_STATE,
     ),
     late=(SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH, SLAVE_ENERGY),
-    optional=(MASTER_ENERGY, SLAVE_ENERGY),
+    optional=(MASTER_ENERGY, SLAVE_ENERGY, SLAVE_JAW_SERVO_JP, SLAVE_SERVO_CF),
     replaces=_TAKEN,
-    spares=("slave/measured_cf@passivity", "slave/measured_cp@passivity"),
-    on_demand=(NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY),
+    spares=(
+        "slave/measured_cf@passivity", "slave/measured_cp@passivity",
+        "slave/measured_cf@impedance", "slave/setpoint_cp@impedance",
+    ),
+    on_demand=(
+        NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY, NETWORK_JAW_SERVO_JP, NETWORK_SERVO_CF,
+    ),
     make=NetworkLink,
     node="teleop_core.nodes.network:NetworkNode",
 )  # fmt: skip

@@ -7,6 +7,7 @@ from typing import Any
 from teleop_core.base.parameters import Choice, build, choice, parameter
 from teleop_core.chain.network import NETWORKS
 from teleop_core.chain.network.deadband import DeadbandParameters
+from teleop_core.chain.network.link import QUEUE
 
 _QOS = "UVA-DSA telesurgery QoS analysis 2026"
 
@@ -76,6 +77,16 @@ class WayParameters:
     packet_rate: float = parameter(
         1000.0, unit="Hz", lower=1.0, upper=1e6, doc="packets sent in a second, at most"
     )
+    bandwidth: float = parameter(
+        0.0, unit="bit/s", lower=0.0, upper=1e12,
+        doc="bits that the line carries in a second; packets wait while it is busy; 0: no bound",
+    )  # fmt: skip
+    queue: int = parameter(
+        100, lower=1, upper=QUEUE,
+        doc="packets that wait for the line at most; one more costs the oldest of them, or where "
+        "order is kept itself",
+        source="assumed",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +103,14 @@ class NetworkParameters:
         "absolute", choices=("absolute", "incremental"),
         doc="what a packet to the slave says: where the tip shall be, or by how much it moves, so "
         "that a lost packet is lost motion",
+    )  # fmt: skip
+    clock_offset: float = parameter(
+        0.0, unit="s", lower=-3600.0, upper=3600.0,
+        doc="by how much the slave's clock is ahead of the master's at the start",
+    )  # fmt: skip
+    clock_drift: float = parameter(
+        0.0, unit="ppm", lower=-1000.0, upper=1000.0,
+        doc="by how much the slave's clock is faster than the master's",
     )  # fmt: skip
     deadband: DeadbandParameters = field(default_factory=DeadbandParameters)
     there: WayParameters = field(default_factory=WayParameters)

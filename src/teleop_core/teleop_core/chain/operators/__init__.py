@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 __all__ = ["OPERATORS", "Motion", "Operator", "Seen", "Setting", "following", "register_operator"]
 
 Motion = Callable[[Array], Array]
-"""Times (N,) since the start [s] to rows (N, 3), (N, 6), (N, 9) or (N, 12).
+"""Times (N,) since the start [s] to rows (N, 3), (N, 6), (N, 9), (N, 12) or (N, 13).
 
 Columns: position x, y, z [m] and rotation vector [rad] relative to the start, in the master's base;
 then the buttons clutch, fixture, mode (1 pressed); then tremor x, y, z [m], by which the tip is
-off whatever the device's friction is. What is left out is zero.
+off whatever the device's friction is; then how far the jaw is closed, from 0 to 1. What is left out
+is zero.
 """
 
 

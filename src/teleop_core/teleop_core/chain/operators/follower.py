@@ -25,6 +25,7 @@ class Wanted(Fields):
     attitude: Quaternion
     buttons: Vector3  # clutch, fixture, mode: 1 pressed
     tremor: Vector3  # [m]
+    jaw: float  # 0 open, 1 closed
 
 
 class Bounds(Fields):

@@ -25,11 +25,15 @@ class ButtonParameters:
         (), unit="s", lower=0.0, fixed=True, doc="presses: each toggles coarse and fine"
     )
 
+    jaw: tuple[float, ...] = parameter(
+        (), unit="s", lower=0.0, fixed=True, doc="jaw: close, open, close, open, …"
+    )
+
     def __post_init__(self) -> None:
-        if len(self.clutch) % 2 or list(self.clutch) != sorted(self.clutch):
-            raise ParameterError(
-                "operator.buttons.clutch", self.clutch, "rising pairs of press, release"
-            )
+        for name, pairs in (("clutch", self.clutch), ("jaw", self.jaw)):
+            if len(pairs) % 2 or list(pairs) != sorted(pairs):
+                needed = "rising pairs of press, release"
+                raise ParameterError(f"operator.buttons.{name}", pairs, needed)
         for name, presses in (("fixture", self.fixture), ("mode", self.mode)):
             if any(b - a < PRESS_TIME + 0.01 for a, b in pairwise(sorted(presses))):
                 raise ParameterError(f"operator.buttons.{name}", presses, "at least 0.11 s apart")

@@ -98,6 +98,7 @@ class RemoteHand:
 
     Attributes:
         room: Corners low and high (3,) [m] of the box that the stylus stays in.
+        closing: How far the hand closes the jaw, 0 open to 1 closed; silence leaves it as it is.
         refused: Number of poses that were not used.
     """
 
@@ -121,7 +122,7 @@ class RemoteHand:
         self._is_held = False
         self._down = dict.fromkeys(BUTTONS, False)
         self._buttons = {name: _Button() for name in BUTTONS[1:]}
-        self.refused = 0
+        self.refused, self.closing = 0, 0.0
 
     # -- what the person wants, in any thread ----------------------------------------------------
 
@@ -173,6 +174,11 @@ class RemoteHand:
             self._buttons[name].presses += 1
         self._down[name] = is_pressed
 
+    def close(self, share: float) -> None:
+        """Close the jaw so far: 0 open to 1 closed; what is beyond is cut, NaN changes nothing."""
+        if not math.isnan(share):
+            self.closing = min(max(share, 0.0), 1.0)
+
     def tap(self, name: str) -> None:
         """Press and release a button; raises as :meth:`press`."""
         self.press(name)
@@ -202,15 +208,15 @@ class RemoteHand:
             times: Times (N,) [s], a tick apart from each other, later than those of the last call.
 
         Returns:
-            Rows (N, 12): place and turn relative to the start, buttons, no tremor.
+            Rows (N, 13): place and turn relative to the start, buttons, no tremor, and the jaw.
         """
-        rows = np.zeros((len(times), 12))
+        rows = np.zeros((len(times), 13))
         tick = float(times[1] - times[0]) if len(times) > 1 else 0.0
         for first in range(0, len(times), MOST):
             part = rows[first : first + MOST]
             drawn = self.draw(float(times[first]), tick, len(part))
             part[:, :3] = drawn["wanted"] - self._start[:3]
-            part[:, 6:9] = drawn["buttons"]
+            part[:, 6:9], part[:, 12] = drawn["buttons"], drawn["jaw"]
             for row, wanted in zip(part, drawn, strict=True):
                 turn_within(self._start[3:], wanted["attitude"], row[3:6])
         return rows
@@ -242,7 +248,9 @@ class RemoteHand:
         if pressed != self._shown:
             self._follower.press(pressed)
             self._shown = pressed
-        return self._follower.go_on(first, tick, count)
+        rows = self._follower.go_on(first, tick, count)
+        rows["jaw"] = self.closing
+        return rows
 
     def _listen(self, now: float) -> None:
         """Take what is wanted now."""

@@ -102,17 +102,20 @@ def tdpa_slave(
 
     Source:
         Ryu, Artigas and Preusche 2010, an admittance that takes from the command; Coelho, Ott,
-        Singh, Lizarralde and Kondak 2019 for drift that is made up for while energy is left.
+        Singh, Lizarralde and Kondak 2019 for drift that is made up for while energy is left. That
+        drift goes away in the air by the way on which the command comes back is ours.
     """
     drift = port[DRIFT : DRIFT + 3]
     port[MARGIN] += flow[0] + flow[1] - flow[2]
     memory[0] += flow[0] + flow[1]
+    met = 0.0
     if norm(force) <= numbers[2]:
         port[MARGIN] = memory[0] = 0.0
+        met = met_way(command, last, drift)
     told = port[TOLD]
     tell(port, 0.0)
     memory[0] -= port[TOLD] - told
-    make_up(numbers, drift, period)
+    make_up(numbers, drift, met, period)
     for i in range(3):
         command[i] -= drift[i]
     pay_command(numbers, memory, force, last, port, command, period)
@@ -150,15 +153,29 @@ def norm(force: Array) -> float:
 
 
 @inner
-def make_up(numbers: Array, drift: Array, period: float) -> None:
-    """Let drift (3,) [m] fade, no faster than it may."""
+def met_way(command: Array, last: Array, drift: Array) -> float:
+    """Way [m] on which the command (7,), as it came, went back towards the one given before.
+
+    Drift that goes away by it moves nothing: the command that is given waits until it is met.
+    """
+    size, way = norm(drift), 0.0
+    if size == 0.0:
+        return 0.0
+    for i in range(3):
+        way -= drift[i] * (command[i] - last[i] - drift[i]) / size
+    return max(way, 0.0)
+
+
+@inner
+def make_up(numbers: Array, drift: Array, met: float, period: float) -> None:
+    """Let drift (3,) [m] fade, no faster than it may, and by the way ``met`` [m] besides."""
     square = 0.0
     for i in range(3):
         square += drift[i] * drift[i]
     size = math.sqrt(square)
     if size == 0.0:
         return
-    step = min(size * period / (numbers[0] + period), numbers[1] * period)
+    step = min(met + min(size * period / (numbers[0] + period), numbers[1] * period), size)
     for i in range(3):
         drift[i] *= 1.0 - step / size
 

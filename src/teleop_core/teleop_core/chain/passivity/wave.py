@@ -180,7 +180,7 @@ def wave_slave(
     _tell(memory, port, 0.0, period)
     memory[0] -= port[TOLD] - told
     if is_free:
-        make_up(numbers, port[DRIFT : DRIFT + 3], period)
+        make_up(numbers, port[DRIFT : DRIFT + 3], 0.0, period)
     for i in range(3):
         command[i] -= port[DRIFT + i]
     pay_command(numbers, memory, force, last, port, command, period)

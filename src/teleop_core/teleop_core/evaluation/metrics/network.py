@@ -1,4 +1,8 @@
-"""Network: how old what arrives is at its reader, and how much never does."""
+"""Network: how old what arrives is at its reader, and how much never does.
+
+What the slave samples has stamps of its own clock. They are turned back into the master's by what
+``network/state`` says of the two, which is right within drift times delay.
+"""
 
 from dataclasses import dataclass
 
@@ -8,6 +12,7 @@ from teleop_core.evaluation.accumulators import Distribution, Integers
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure, line, time_axis
 from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.pairing import latest
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
@@ -76,6 +81,16 @@ class _Ages:
         return WayScore(1e-6 * self.sum_ns / self.count, self.ages.delay().p99, lost, rate)
 
 
+def _clock_ahead_ns(window: Window, logs: Integers) -> Integers:
+    """By how much the slave's clock was ahead at these times (N,) [ns]; 0 where nobody says."""
+    told, column = window.around(NETWORK_STATE), NETWORK_STATE.columns.index("clock_ahead")
+    if not len(told) or told.values.shape[1] <= column:
+        return np.zeros_like(logs)
+    at = np.maximum(latest(logs, told.log_ns), 0)
+    ahead: Integers = np.round(1e9 * told.values[at, column]).astype(np.int64)
+    return ahead
+
+
 class NetworkMetric(Metric):
     """Ages and losses of the network between both sides."""
 
@@ -104,6 +119,8 @@ class NetworkMetric(Metric):
             logs, stamps = logs[has_come], stamps[has_come]
             if not len(logs):
                 continue
+            if topic is NETWORK_MEASURED_CP:
+                stamps = stamps - _clock_ahead_ns(window, logs)
             until_ns = min(window.until_ns, self._end_ns)
             found = ages.add(logs, stamps, max(window.after_ns, int(logs[0])), until_ns)
             shown = (1e-6 * found[:, np.newaxis]).astype(np.float64)

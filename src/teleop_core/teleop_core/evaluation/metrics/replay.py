@@ -1,11 +1,7 @@
 """Replay: the joints at some moments a second, for a page that plays them; drawn only."""
 
-from contextlib import suppress
-
 import numpy as np
 
-from teleop_core.bags.kept_files import recorded_files
-from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.metric import Metric
@@ -16,8 +12,6 @@ from teleop_core.evaluation.replay_figure import replay_figure
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_MEASURED_JS
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot_set
-from teleop_core.robots.robot import Robot
 
 RATE = 25.0
 """Moments that are kept of a second."""
@@ -65,7 +59,7 @@ class ReplayMetric(Metric):
 
     def figures(self) -> list[Figure]:
         """The robot as it moved; nothing if that is not known."""
-        robot = self._robot()
+        robot = self._context.load_robot()
         if robot is None or self._joints is None or not set(robot.joint_names) <= set(self._names):
             return []
         order = [self._names.index(name) for name in robot.joint_names]
@@ -80,13 +74,3 @@ class ReplayMetric(Metric):
             self._path.measured(), outlines_of(self._context),
         )  # fmt: skip
         return [figure]
-
-    def _robot(self) -> Robot | None:
-        """What moved; None if the recording does not say, or it is not installed."""
-        if self._context.robot is None:
-            return None
-        with suppress(TeleopError, OSError):
-            files = recorded_files(self._context.bag.metadata)
-            robot = files.get(self._context.robot, self._context.robot)
-            return load_robot_set(robot, self._context.origin.geometry)
-        return None

@@ -16,7 +16,6 @@ from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF, SLAVE_TRUE_CP
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots import load_robot_set
 from teleop_core.slave.world.button import ButtonParameters, count_presses
 from teleop_core.slave.world.parameters import WorldParameters
 
@@ -41,6 +40,23 @@ class TouchScore:
     )
 
 
+def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | None:
+    """The world of a recording, and the middle (3,) [m] of the object in it.
+
+    Args:
+        context: Of the recording.
+        kind: Parameter group of the object.
+
+    Returns:
+        None where the object is another, or a part of it or its robot are not there any more.
+    """
+    with suppress(TeleopError):
+        world = build(WorldParameters, dict(context.origin.world))
+        if isinstance(world.kind.parameters, kind) and (robot := context.load_robot()) is not None:
+            return world, np.array(world.place or world.below(robot.fk(robot.start)))
+    return None
+
+
 class _Presses:
     """Counts presses of a button by where the tip truly was.
 
@@ -51,19 +67,16 @@ class _Presses:
     def __init__(self, context: Context) -> None:
         self.count: int | None = None
         self._is_pressed = False
-        with suppress(TeleopError):  # of a robot or an object that is not there any more
-            world = build(WorldParameters, dict(context.origin.world))
-            if isinstance(world.kind.parameters, ButtonParameters) and context.robot:
-                robot = load_robot_set(context.robot, context.origin.geometry)
-                center = world.place or world.below(robot.fk(robot.start)[:3, 3])
-                self._world, self._button = world, world.kind.parameters
-                self._center, self.count = np.array(center), 0
-                context.read((SLAVE_TRUE_CP,))
+        found = object_of(context, ButtonParameters)
+        if found is not None:
+            self._world, self._center = found
+            self._button, self.count = self._world.kind.parameters, 0
+            context.read((SLAVE_TRUE_CP,))
 
     def add(self, places: Array) -> None:
         """Take places (N, 3) [m] of the tip; only where a button is known."""
         assert self.count is not None
-        depth = np.array([-self._world.distance(place, self._center) for place in places])
+        depth = np.array([-self._world.distance(place[None], self._center) for place in places])
         new, self._is_pressed = count_presses(depth, self._button, is_pressed=self._is_pressed)
         self.count += new
 

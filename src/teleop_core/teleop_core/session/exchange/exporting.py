@@ -12,7 +12,7 @@ import pyarrow.csv as pc
 import pyarrow.parquet as pq
 
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
-from teleop_core.graph.topics import BY_NAME
+from teleop_core.graph.topics import BY_NAME, Kind
 from teleop_core.session.exchange.joining import Joined, Streams
 from teleop_core.session.recording import Recording, open_recording
 
@@ -34,6 +34,8 @@ def unit_of(topic: str, column: str) -> str:
     known = next((t for n, t in BY_NAME.items() if topic == n or topic.endswith(f"/{n}")), None)
     if known is not None and known.columns:
         return _of_number(column)
+    if known is not None and known.kind is Kind.JAW:
+        return {"velocity": "rad/s", "effort": "Nm"}.get(column, "rad")
     if known is None or not known.kind.has_joints:
         return _BY_COLUMN.get(column, "")
     last = column.rpartition(".")[2]
@@ -46,7 +48,9 @@ def _of_number(column: str) -> str:
         return "m"
     if column == "position_residual" or column in {"cut_x", "cut_y", "cut_z"}:
         return "m"
-    return "rad" if column == "rotation_residual" or column.startswith("cut_r") else ""
+    if column in {"rotation_residual", "jaw"} or column.startswith("cut_r"):
+        return "rad"
+    return {"force": "N", "slid": "m"}.get(column, "")
 
 
 FORMATS = ("csv", "parquet", "lerobot")

@@ -14,13 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from teleop_core.bags.reader import Bag
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.rest import REST_TILT
 from teleop_core.chain.operators.shapes import minimum_jerk
-from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.portable import arctangent, length
 from teleop_core.session.exchange.master_bag import as_master_bag
@@ -54,6 +55,8 @@ class Samples(NamedTuple):
             do not jump.
         pressed_at: Times (K,) [s] at which buttons change.
         pressed: Clutch, fixture, mode from then on (K, 3).
+        closed_at: Times (M,) [s] at which the hand closes the jaw farther or less far.
+        closed: How far from then on (M, 1), 0 open to 1 closed.
     """
 
     at: Array
@@ -61,6 +64,8 @@ class Samples(NamedTuple):
     turns: Array
     pressed_at: Array
     pressed: Array
+    closed_at: Array
+    closed: Array
 
 
 def _bag(parameters: object, setting: Setting) -> Motion:
@@ -149,13 +154,17 @@ def _read(path: Path, options: ImportOptions | None, changed_ns: int) -> Samples
     stamps, values = series.stamp_ns[new], series.values[new]
     start_ns, first = int(stamps[0]), values[0, 3:] * (1.0, -1.0, -1.0, -1.0)
     turns = continuous(products(values[:, 3:], first), np.array([1.0, 0.0, 0.0, 0.0]))
-    pressed_at: Array = np.zeros(0)
-    pressed: Array = np.zeros((0, 3))
-    if MASTER_BUTTONS.name in bag.topics and bag.topics[MASTER_BUTTONS.name].count:
-        buttons = bag.read(MASTER_BUTTONS)
-        pressed_at, pressed = (buttons.stamp_ns - start_ns) * np.float64(1e-9), buttons.values
     at: Array = (stamps - start_ns) * np.float64(1e-9)
-    return Samples(at, values[:, :3] - values[0, :3], turns, pressed_at, pressed)
+    pressed, closed = _changes(bag, MASTER_BUTTONS, start_ns), _changes(bag, HAND_JAW, start_ns)
+    return Samples(at, values[:, :3] - values[0, :3], turns, *pressed, *closed)
+
+
+def _changes(bag: Bag, topic: Topic, start_ns: int) -> tuple[Array, Array]:
+    """Times (K,) [s] since a stamp [ns], and values (K, width) of a topic; none without it."""
+    if topic.name not in bag.topics or not bag.topics[topic.name].count:
+        return np.zeros(0), np.zeros((0, topic.width(0)))
+    series = bag.read(topic)
+    return (series.stamp_ns - start_ns) * np.float64(1e-9), series.values
 
 
 def _motion(path: Path, options: ImportOptions | None, setting: Setting) -> Motion:
@@ -173,7 +182,10 @@ def _motion(path: Path, options: ImportOptions | None, setting: Setting) -> Moti
         if approach:
             share = minimum_jerk(times / approach)[:, None]
             moves += share * center
-        return np.column_stack((moves, _in_axes_of(rest, turns), held(samples, moved)))
+        pressed = held(samples.pressed_at, samples.pressed, moved)
+        closed = held(samples.closed_at, samples.closed, moved)
+        own = _in_axes_of(rest, turns)
+        return np.column_stack((moves, own, pressed, np.zeros_like(moves), closed))
 
     return motion
 
@@ -201,10 +213,16 @@ def between(samples: Samples, times: Array, longest: float) -> tuple[Array, Arra
     return moves, turns / length(turns)[:, None]
 
 
-def held(samples: Samples, times: Array) -> Array:
-    """Buttons (N, 3): each as it was pressed last; released before the first sample."""
-    pressed = np.vstack((np.zeros(3), samples.pressed))
-    return np.asarray(pressed[np.searchsorted(samples.pressed_at, times, side="right")])
+def held(changed_at: Array, values: Array, times: Array) -> Array:
+    """Values (N, width) at times (N,) [s]: each as it became last; zero before the first.
+
+    Args:
+        changed_at: Times (K,) of the changes [s].
+        values: From then on (K, width).
+        times: Times [s].
+    """
+    known = np.vstack((np.zeros(values.shape[1]), values))
+    return np.asarray(known[np.searchsorted(changed_at, times, side="right")])
 
 
 def _in_axes_of(rest: Array, turns: Array) -> Array:

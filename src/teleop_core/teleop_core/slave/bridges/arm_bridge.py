@@ -18,6 +18,7 @@ from teleop_core.graph.topics import (
     SLAVE_OPERATION,
     SLAVE_SETPOINT_JS,
 )
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.parameters import RobotParameters
 from teleop_core.slave.bridges import BRIDGES, Command
@@ -32,8 +33,8 @@ _STATE, _BRAKED = OPERATION.index("state"), OPERATION.index("is_braked")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArmBridgeParameters(RobotParameters):
-    """Parameters of :class:`ArmBridge`."""
+class BridgeParameters:
+    """Parameters of every bridge to a controller."""
 
     kind: Choice = choice(
         BRIDGES, "joint_state", doc="what the arm's controller understands", fixed=True
@@ -44,21 +45,6 @@ class ArmBridgeParameters(RobotParameters):
     state_topic: str = parameter(
         "", fixed=True,
         doc="where the arm's JointState comes from; empty: from where that of its kind does",
-    )  # fmt: skip
-    joints: tuple[str, ...] = parameter(
-        (), fixed=True, doc="ours=theirs for each joint that the arm calls otherwise"
-    )
-    signs: tuple[float, ...] = parameter(
-        (), lower=-1.0, upper=1.0, fixed=True,
-        doc="1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
-    )  # fmt: skip
-    offsets: tuple[float, ...] = parameter(
-        (), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0"
-    )
-    order: tuple[str, ...] = parameter(
-        (), fixed=True,
-        doc="the arm's joints in the order of its commands, which a forward command does not name; "
-        "empty: the robot's order",
     )  # fmt: skip
     rate: int = parameter(
         500, unit="1/s", lower=100, upper=1000, fixed=True, source="assumed",
@@ -72,10 +58,6 @@ class ArmBridgeParameters(RobotParameters):
     oldest_stamp: float = parameter(
         0.1, unit="s", lower=0.001, upper=1.0, fixed=True, source="assumed",
         doc="samples whose stamps differ by more from our clock are refused",
-    )  # fmt: skip
-    start_tolerance: float = parameter(
-        0.02, unit="rad or m", lower=1e-4, upper=0.1, fixed=True, source="assumed",
-        doc="the arm is commanded once each joint is as near to its setpoint",
     )  # fmt: skip
     jump_tolerance: float = parameter(
         0.02, unit="rad or m", lower=1e-4, upper=0.1, fixed=True, source="assumed",
@@ -97,46 +79,79 @@ class ArmBridgeParameters(RobotParameters):
             raise ParameterError("rate", self.rate, f"one of {', '.join(map(str, RATES))}")
 
 
-class ArmBridge(RunningStage):
-    """Stage that leads a real arm's controller, and says where the arm is.
+@dataclass(frozen=True, kw_only=True)
+class ArmBridgeParameters(RobotParameters, BridgeParameters):
+    """Parameters of :class:`ArmBridge`."""
 
-    Its node calls it: ``hear`` for each message of the arm, ``command`` when one is due.
+    joints: tuple[str, ...] = parameter(
+        (), fixed=True, doc="ours=theirs for each joint that the arm calls otherwise"
+    )
+    signs: tuple[float, ...] = parameter(
+        (), lower=-1.0, upper=1.0, fixed=True,
+        doc="1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
+    )  # fmt: skip
+    offsets: tuple[float, ...] = parameter(
+        (), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0"
+    )
+    order: tuple[str, ...] = parameter(
+        (), fixed=True,
+        doc="the arm's joints in the order of its commands, which a forward command does not name; "
+        "empty: the robot's order",
+    )  # fmt: skip
+    start_tolerance: float = parameter(
+        0.02, unit="rad or m", lower=1e-4, upper=0.1, fixed=True, source="assumed",
+        doc="the arm is commanded once each joint is as near to its setpoint",
+    )  # fmt: skip
 
-    Raises:
-        TeleopError: The robot has no drives, or the joints do not fit.
+
+class ControllerBridge(RunningStage):
+    """Base of stages that lead a real controller, and say where its joints are.
+
+    Its node calls it: ``hear`` for each message of the controller, ``command`` when one is due.
+
+    Args:
+        stage: What it is: reads setpoints first, and writes what is measured.
+        parameters: Of the bridge.
+        joints: Which joint is which.
+        lead: What goes to the controller.
+        speed_limit: Rated speeds (n,) [rad/s or m/s].
+        dt: Length of a tick [s].
     """
 
-    def __init__(self, parameters: ArmBridgeParameters, dt: float = DT) -> None:
-        robot = load_robot_set(parameters.robot, parameters.geometry)
-        if robot.drives is None:
-            raise ParameterError("arm_bridge.robot", parameters.robot, "a robot with drives")
-        super().__init__(ARM_BRIDGE, robot.n, dt)
+    def __init__(
+        self, stage: Stage, parameters: BridgeParameters, joints: JointMap, lead: Lead,
+        speed_limit: Array, dt: float,
+    ) -> None:  # fmt: skip
+        super().__init__(stage, len(joints.ours), dt)
         self.kernel = _nothing
-        p, speed = parameters, robot.drives.speed_limit
-        self.parameters, self.joints = (
-            p,
-            JointMap(robot.joint_names, p.joints, p.signs, p.offsets, p.order),
-        )
-        oldest = p.oldest_stamp if p.stamps == "header" else 0.0
-        self.hearing = Hearing(self.joints, speed, p.jump_tolerance, oldest)
-        self.lead_arm = Lead(robot.lower, robot.upper, speed, p.start_tolerance, 1.0 / p.rate)
-        self._every, self._sent_ns = round(1e9 / p.rate), 0
-        self._due_ns = 0
+        self.parameters, self.joints, self.lead_arm = parameters, joints, lead
+        oldest = parameters.oldest_stamp if parameters.stamps == "header" else 0.0
+        self.hearing = Hearing(joints, speed_limit, parameters.jump_tolerance, oldest)
+        self._setpoint, self._measured = stage.reads[0], stage.writes[0]
+        self._every, self._sent_ns = round(1e9 / parameters.rate), 0
+        self._due_ns, self._left_ns = 0, 0
 
     def hear(self, sample: Sample, now_ns: int) -> bool:
         """Take what the arm says at ``now_ns`` [ns]; whether ``slave/measured_js`` is new.
 
-        After a jump nothing is, until the server has left ENABLED: the arm begins anew then.
+        Nothing is after a jump, or where the server went on without the arm, until the server has
+        left ENABLED: the arm begins anew then.
         """
         hearing, row = self.hearing, self.signals
-        if hearing.has_jumped and row["slave_operation"][_STATE] != State.ENABLED:
-            hearing.begin_anew()
-            self.lead_arm.let_go("the arm jumped")
-        if not hearing.hear(sample, now_ns):
+        if row["slave_operation"][_STATE] != State.ENABLED:
+            self._left_ns = 0
+            if hearing.has_jumped:
+                hearing.begin_anew()
+                self.lead_arm.let_go("the arm jumped")
+        if not hearing.hear(sample, now_ns) or self._is_left(now_ns):
             return False
         values = (hearing.position, hearing.velocity, hearing.effort)
-        row["slave_measured_js"] = np.concatenate(values)
+        row[self._measured.field] = np.concatenate(values)
         return True
+
+    def _is_left(self, now_ns: int) -> bool:
+        """Whether the server has gone on without the arm for longer than setpoints may fail."""
+        return 0 < self._left_ns < now_ns - round(1e9 * self.parameters.setpoint_timeout)
 
     def is_due(self, now_ns: int) -> bool:
         """Whether a command is due in the tick of a time [ns]; times missed are left out."""
@@ -177,12 +192,23 @@ class ArmBridge(RunningStage):
             return lead.let_go(hearing.wrong if hearing.has_jumped else silent)
         if not is_led:
             return lead.let_go("waits for slave/operation: no server leads it")
-        if row["slave_operation"][_BRAKED] > 0.0:
+        if self._is_braked():
             return lead.brake(hearing.position, elapsed)
         if setpoint_age > p.setpoint_timeout:
-            return lead.let_go(f"no slave/setpoint_js for {setpoint_age:.1f} s")
-        setpoint = row["slave_setpoint_js"]
-        return lead.step(setpoint, hearing.position, self.joints.ours, elapsed)
+            return lead.let_go(f"no {self._setpoint.name} for {setpoint_age:.1f} s")
+        return self._leads(row[self._setpoint.field], now_ns, elapsed)
+
+    def _is_braked(self) -> bool:
+        """Whether brakes hold the joints."""
+        return bool(self.signals["slave_operation"][_BRAKED] > 0.0)
+
+    def _leads(self, setpoint: Array, now_ns: int, elapsed: float) -> bool:
+        """Go towards the setpoint, unless the server went on without the arm."""
+        is_led = not self._is_left(now_ns) and self.lead_arm.step(
+            setpoint, self.hearing.position, self.joints.ours, elapsed
+        )
+        self._left_ns = 0 if is_led else self._left_ns or now_ns
+        return is_led
 
     def trouble(self) -> str:
         """Why the arm holds, or what it says that is not believed, in one line; empty if well."""
@@ -193,6 +219,23 @@ class ArmBridge(RunningStage):
     def concerns(self) -> list[str]:
         """Why the arm holds."""
         return [text] if (text := self.trouble()) else []
+
+
+class ArmBridge(ControllerBridge):
+    """Stage that leads a real arm's controller, and says where the arm is.
+
+    Raises:
+        TeleopError: The robot has no drives, or the joints do not fit.
+    """
+
+    def __init__(self, parameters: ArmBridgeParameters, dt: float = DT) -> None:
+        robot, p = load_robot_set(parameters.robot, parameters.geometry), parameters
+        if robot.drives is None:
+            raise ParameterError("arm_bridge.robot", p.robot, "a robot with drives")
+        speed = robot.drives.speed_limit
+        joints = JointMap(robot.joint_names, p.joints, p.signs, p.offsets, p.order)
+        lead = Lead(robot.lower, robot.upper, speed, p.start_tolerance, 1.0 / p.rate)
+        super().__init__(ARM_BRIDGE, p, joints, lead, speed, dt)
 
 
 def _nothing(row: object, dt: float) -> None:

@@ -150,7 +150,7 @@ class Hearing:
             self.velocity += share * ((position - self.position) / passed - self.velocity)
         effort = _numbers(sample.effort, sample.names, places)
         known = effort is not None and np.isfinite(effort).all()
-        self.effort[:] = self._joints.rate(effort) if effort is not None and known else 0.0
+        self.effort[:] = self._joints.effort(effort) if effort is not None and known else 0.0
         self.position[:] = position
         self.stamp_ns, self.heard_ns = sample.stamp_ns, now_ns
 

@@ -18,6 +18,8 @@ class Lead:
         speed_limit: Rated speeds (n,) [rad/s or m/s].
         tolerance: How far a joint may be from its setpoint when the lead begins [rad or m].
         period: Time from command to command [s].
+        presses: Whether joints may stand short of their setpoints, as fingers on what they hold:
+            they begin anywhere, and go on from the last command if the setpoint is still there.
 
     Attributes:
         position: The last command (n,) [rad or m].
@@ -27,9 +29,11 @@ class Lead:
     """
 
     def __init__(
-        self, lower: Array, upper: Array, speed_limit: Array, tolerance: float, period: float
-    ) -> None:
+        self, lower: Array, upper: Array, speed_limit: Array, tolerance: float, period: float,
+        *, presses: bool = False,
+    ) -> None:  # fmt: skip
         n = len(lower)
+        self._presses, self._has_led = presses, False
         self._lower, self._upper, self._speed_limit = lower, upper, speed_limit
         self.tolerance, self._period = tolerance, period
         self.position, self.velocity, self._braked = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -56,14 +60,16 @@ class Lead:
         self._is_braked = False
         if not self.is_leading:
             off = np.abs(setpoint - measured)
-            if not (off <= self.tolerance).all():
+            if not self._presses and not (off <= self.tolerance).all():
                 i = int(np.argmax(off))
                 return self.let_go(
                     f"{names[i]} is {off[i]:.4g} from its setpoint, at most {self.tolerance:g} "
                     "to begin"
                 )
-            self.position[:] = measured
-            self.is_leading, self.waits = True, ""
+            stays = self._has_led and (np.abs(setpoint - self.position) <= self.tolerance).all()
+            if not (self._presses and stays):
+                self.position[:] = measured
+            self.is_leading, self._has_led, self.waits = True, True, ""
         self._approach(np.clip(setpoint, self._lower, self._upper), elapsed)
         return True
 

@@ -18,6 +18,7 @@ class JointMap:
         offsets: Of each of our joints [rad or m]; empty: 0.
         order: The arm's joints in the order of its commands; empty: in that of ours.
         owner: What the names of the parameters begin with, for messages.
+        is_scaled: Whether signs may be other numbers too, as where the other one counts a way.
 
     Attributes:
         theirs: The arm's names, in our order.
@@ -35,10 +36,13 @@ class JointMap:
         offsets: Sequence[float] = (),
         order: Sequence[str] = (),
         owner: str = "arm_bridge.",
+        *,
+        is_scaled: bool = False,
     ) -> None:
         self.ours, self.theirs = tuple(ours), _theirs(ours, renamed, f"{owner}joints")
         n = len(self.ours)
-        if len(signs) not in {0, n} or any(abs(sign) != 1.0 for sign in signs):
+        is_one = is_scaled or all(abs(sign) == 1.0 for sign in signs)
+        if len(signs) not in {0, n} or not is_one:
             raise ParameterError(f"{owner}signs", tuple(signs), f"{n} of 1.0 or -1.0, or empty")
         if len(offsets) not in {0, n}:
             raise ParameterError(f"{owner}offsets", tuple(offsets), f"{n} numbers, or empty")
@@ -77,16 +81,20 @@ class JointMap:
         return self._signs * theirs + self._offsets
 
     def rate(self, theirs: Array) -> Array:
-        """Our velocities or efforts (n,) of the arm's in our order."""
+        """Our velocities (n,) of the arm's in our order."""
         return self._signs * theirs
+
+    def effort(self, theirs: Array) -> Array:
+        """Our efforts (n,) of the arm's in our order, which do the same work."""
+        return theirs / self._signs
 
     def command(self, ours: Array) -> Array:
         """The arm's positions (n,), in the order of its commands, of ours [rad or m]."""
-        return (self._signs * (ours - self._offsets))[self._sent]
+        return ((ours - self._offsets) / self._signs)[self._sent]
 
     def command_rate(self, ours: Array) -> Array:
         """The arm's velocities (n,), in the order of its commands, of ours [rad/s or m/s]."""
-        return (self._signs * ours)[self._sent]
+        return (ours / self._signs)[self._sent]
 
 
 def _theirs(ours: Sequence[str], renamed: Sequence[str], parameter: str) -> tuple[str, ...]:

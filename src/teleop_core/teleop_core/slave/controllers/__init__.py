@@ -6,7 +6,7 @@ source compensates, limits of the drives and encoders belong to the slave, not t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.base.registry import Registry
+from teleop_core.base.registry import Registry, part_check, tried
 from teleop_core.graph.signals import DT
 from teleop_core.kernels import pointer
 from teleop_core.kernels.geometry import Array
@@ -104,20 +104,15 @@ def drives_and_poles(robot: Robot, law: str, bandwidth: tuple[float, ...]) -> tu
     return drives, per_joint(robot, f"controller.{law}.bandwidth", bandwidth, drives.bandwidth)
 
 
+_checked_form = part_check("controller", Controller, "gains", "control", "begin", "shift")
+
+
 def _checked(name: str, part: object) -> Controller:
-    if not isinstance(part, Controller):
-        raise PartError("controller", name, f"a Controller, not a {type(part).__name__}")
-    if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
-        text = "one whose parameters are a dataclass, not an instance of one"
+    controller = _checked_form(name, part)
+    if not isinstance(controller.uses_model, bool):
+        text = f"one whose uses_model is a bool, not {controller.uses_model!r}"
         raise PartError("controller", name, text)
-    for field in ("gains", "control", "begin", "shift"):
-        if not callable(getattr(part, field)):
-            raise PartError("controller", name, f"one whose {field} can be called")
-    if not isinstance(part.uses_model, bool):
-        raise PartError(
-            "controller", name, f"one whose uses_model is a bool, not {part.uses_model!r}"
-        )
-    return part
+    return controller
 
 
 def _try(part: Controller) -> None:
@@ -125,20 +120,14 @@ def _try(part: Controller) -> None:
     from teleop_core.robots import load_robot
 
     robot = load_robot("scara")
-    try:
+    needs = (
+        "one with gains(parameters, robot, viscous) -> (n, k) and control(gains, memory, "
+        "setpoint, measured, feedforward, limit, dt, effort), and parameters that all have defaults"
+    )
+    with tried("controller", part.name, needs):
         gains = np.asarray(part.gains(part.parameters(), robot, np.zeros(robot.n)), np.float64)
         _insist_on_table(part, gains, robot.n)
         effort, is_inside = _tried_effort(part, gains, robot.home)
-    except PartError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        raise PartError(
-            "controller", part.name,
-            "one with gains(parameters, robot, viscous) -> (n, k) and control(gains, memory, "
-            "setpoint, measured, feedforward, limit, dt, effort), and parameters that all have "
-            f"defaults; it raises {type(error).__name__}: {reason}",
-        ) from error  # fmt: skip
     if not is_inside:
         text = f"one that writes n efforts and no more memory than it declares, {part.memory}"
         raise PartError("controller", part.name, text)

@@ -6,14 +6,34 @@ class Presses:
 
     Every sender numbers its messages, 1 for the first. A number that is left out belongs to a
     message that was lost, by a full queue, by a process that stood still, or on the way; it may
-    have been a press, so it counts as one. A message that arrives twice, through two readers,
-    counts once.
+    have been a press, so it counts as one. What was lost before the first message that came of a
+    sender, the middleware alone knows. A message that arrives twice, through two readers, counts
+    once.
     """
 
     def __init__(self) -> None:
         self._last: dict[bytes, int] = {}
-        self.lost = 0
-        """Messages that were lost so far."""
+        self._missing = self._told = 0
+
+    @property
+    def lost(self) -> int:
+        """Messages that were lost so far, by their numbers or by the middleware's account."""
+        return max(self._missing, self._told)
+
+    def lose(self, count: int) -> tuple[bool, ...]:
+        """States of the button that the middleware's own account of lost messages adds.
+
+        Args:
+            count: Messages that it has lost so far, of all senders.
+
+        Returns:
+            A press if these are more than at the last call; otherwise nothing. A loss that the
+            numbers told too may give a second press: taking it off the account could hide the loss
+            of another sender.
+        """
+        is_new = count > self._told
+        self._told = count
+        return (True,) if is_new else ()
 
     def take(self, sender: bytes, number: int, *, is_pressed: bool) -> tuple[bool, ...]:
         """States of the button, oldest first, that a message of a reliable sender adds.
@@ -33,7 +53,7 @@ class Presses:
             return ()
         self._last[sender] = number
         missing = max(0, number - last - 1)
-        self.lost += missing
+        self._missing += missing
         return (True, is_pressed) if missing else (is_pressed,)
 
     def knows(self, sender: bytes) -> bool:

@@ -5,13 +5,13 @@ behind the encoders. Each file says where its numbers come from.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, PartError, ShapeError
-from teleop_core.base.registry import Registry
+from teleop_core.base.registry import Registry, part_check, tried
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
@@ -98,27 +98,12 @@ class Plant:
     physics: Callable[[Any, Robot], Physics]
 
 
-def _checked(name: str, part: object) -> Plant:
-    if not isinstance(part, Plant):
-        raise PartError("plant", name, f"a Plant, not a {type(part).__name__}")
-    if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
-        text = "one whose parameters are a dataclass, not an instance of one"
-        raise PartError("plant", name, text)
-    if not callable(part.physics):
-        raise PartError("plant", name, "one whose physics can be called")
-    return part
-
-
 def _try(part: Plant) -> None:
     """Try it once, so that what cannot work is told before anything runs."""
     from teleop_core.robots import load_robot
 
-    try:
+    with tried("plant", part.name, "one with physics(parameters, robot) -> Physics"):
         made = part.physics(part.parameters(), load_robot("scara"))
-    except Exception as error:
-        reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
-        text = f"one with physics(parameters, robot) -> Physics; it raises {reason}"
-        raise PartError("plant", part.name, text) from error
     if not isinstance(made, Physics):
         raise PartError("plant", part.name, f"one that gives Physics, not {type(made).__name__}")
 
@@ -130,7 +115,7 @@ PLANTS: Registry[Plant] = Registry(
         "ideal": "teleop_core.slave.plants.ideal:IDEAL",
         "hardware": "teleop_core.slave.plants.hardware:HARDWARE",
     },
-    _checked,
+    part_check("plant", Plant, "physics"),
     _try,
 )
 """All plants by name."""

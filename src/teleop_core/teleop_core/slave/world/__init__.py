@@ -1,4 +1,4 @@
-"""World: what the slave's tip can touch, one file per shape.
+"""World: what the slave's tool can touch, one file per shape.
 
 An object is a shape: how far a point is outside of it, which way its surface looks, and how it is
 drawn. What it is made of, and how it pushes, is the same for all
@@ -113,6 +113,7 @@ WORLD_OBJECTS: Registry[WorldObject] = Registry(
         "button": "teleop_core.slave.world.button:BUTTON",
         "mesh": "teleop_core.slave.world.mesh:MESH",
         "height_field": "teleop_core.slave.world.height_field:HEIGHT_FIELD",
+        "hole": "teleop_core.slave.world.hole:HOLE",
     },
     part_check("world object", WorldObject, "distance", "outline"),
     _try,

@@ -1,13 +1,16 @@
-"""Contact: how an object pushes the tip, and how the push reaches the joints.
+"""Contact: how an object pushes the tool, and how the push reaches the joints.
 
-Where the tip is against the object is found once in a tick. Within the tick the surface counts as
-flat there and the arm's Jacobian as constant, so that every Runge-Kutta stage of the arm's motion
+The tool touches with one point, its tip, or with several along its axis. Each has a record of its
+own, with its surface, its bristle, and the Jacobian of the place where it touches.
+
+Where the points are against the object is found once in a tick. Within the tick the surface counts
+as flat there and the Jacobians as constant, so that every Runge-Kutta stage of the arm's motion
 feels the push of its own place and speed: a contact that is steep for the tick is smooth for the
 integrator.
 """
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -30,21 +33,23 @@ from teleop_core.slave.world.puncture import (
 )
 
 NEAR = 5e-3
-"""A tip that is farther outside [m] does not get there within a tick."""
+"""A point that is farther outside [m] does not get there within a tick."""
 
 
 class WorldNumbers(PunctureNumbers, ButtonNumbers):
-    """Fields of a parameter record with what the object is made of, and where it is."""
+    """Fields of a parameter record with the object's material and place, and with the tool."""
 
     has_world: int
     world_stiffness: float
     world_damping: float
     world_friction: float
     world_center: Vector3
+    tool_length: float  # from the tip to the last of several points [m]
+    tool_radius: float  # [m]
 
 
 class ContactState(PunctureState, ButtonState):
-    """Fields of a state record with the contact at the start of the tick."""
+    """Fields of a record with the contact of one point of the tool, at the start of the tick."""
 
     is_near: int
     touch_q: PerJoint
@@ -105,16 +110,8 @@ def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: A
 
 
 @inner
-def add_push(p: WorldNumbers, s: ContactState, q: Array, dq: Array, effort: Array) -> None:
-    """Add what the object does to the joints: the transposed Jacobian times its push.
-
-    Args:
-        p: Parameters.
-        s: State.
-        q: Joints of the links (n,) [rad or m].
-        dq: Their speeds (n,).
-        effort: Written (n,) [N·m or N].
-    """
+def _add_push(p: WorldNumbers, s: ContactState, q: Array, dq: Array, effort: Array) -> None:
+    """Add what the push on one point does to the joints; see :func:`add_push`."""
     moved, speed, force = np.zeros(3), np.zeros(3), np.empty(3)
     for i in range(q.shape[0]):
         for k in range(3):
@@ -124,6 +121,22 @@ def add_push(p: WorldNumbers, s: ContactState, q: Array, dq: Array, effort: Arra
     for i in range(q.shape[0]):
         for k in range(3):
             effort[i] += s.touch_J[k, i] * force[k]
+
+
+@inner
+def add_push(p: WorldNumbers, contacts: Any, q: Array, dq: Array, effort: Array) -> None:
+    """Add what the object does to the joints: the transposed Jacobian of each point times its push.
+
+    Args:
+        p: Parameters.
+        contacts: :class:`ContactState` of each point of the tool (N,).
+        q: Joints of the links (n,) [rad or m].
+        dq: Their speeds (n,).
+        effort: Written (n,) [N·m or N].
+    """
+    for point in range(contacts.shape[0]):
+        if contacts[point].is_near:
+            _add_push(p, contacts[point], q, dq, effort)
 
 
 @inner
@@ -145,14 +158,17 @@ def _lay_flat(s: ContactState) -> None:
 
 
 @inner
-def _begin_at(s: ContactState, arm: Arm, q: Array, dq: Array, speed: Array) -> None:
-    """Take surface and Jacobian as they are now, for the tick; write the tip's speed (3,)."""
-    arm.jacobian(arm.tip, arm.tip_geometry, arm.J)
+def _begin_at(s: ContactState, arm: Arm, lever: Array, q: Array, dq: Array, speed: Array) -> None:
+    """Take surface and Jacobian for the tick where the tool touches, ``lever`` (3,) off its tip.
+
+    Writes the speed (3,) of that place.
+    """
     for k in range(3):
         s.normal[k] = arm.normal[k]
+        a, b = (k + 1) % 3, (k + 2) % 3
         for i in range(q.shape[0]):
-            s.touch_J[k, i] = arm.J[k, i]
-            speed[k] += arm.J[k, i] * dq[i]
+            s.touch_J[k, i] = arm.J[k, i] + arm.J[3 + a, i] * lever[b] - arm.J[3 + b, i] * lever[a]
+            speed[k] += s.touch_J[k, i] * dq[i]
     for i in range(q.shape[0]):
         s.touch_q[i] = q[i]
 
@@ -171,35 +187,77 @@ def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
 
 
 @inner
-def touch(p: WorldNumbers, s: ContactState, arm: Arm, q: Array, dq: Array, felt: Array) -> None:
-    """Find where the tip is against the object, and write what it feels (6,) [N, N·m].
+def _touch_at(
+    p: WorldNumbers, s: ContactState, arm: Arm, has_jacobian: bool, lever: Array, q: Array,
+    dq: Array, force: Array,
+) -> bool:  # fmt: skip
+    """Find where one point is against the object, and write the push on it (3,) [N].
 
     Args:
         p: Parameters.
-        s: State; written.
-        arm: With ``T`` of the true tip, its joints ``tip``, ``jacobian``, ``distance`` and
-            ``shape``; its rooms ``offset``, ``normal`` and ``J`` are written.
-        q: Joints of the links (n,) [rad or m], which move the tip from here on.
+        s: State of the point; written.
+        arm: As :func:`touch` takes it.
+        has_jacobian: Whether ``arm.J`` is that of this tick already.
+        lever: Point from the tip (3,) [m]; written: where it touches.
+        q: Joints of the links (n,).
         dq: Their speeds (n,).
-        felt: Force on the tip along the slave's base, and no torque about the tip; written.
+        force: Written.
+
+    Returns:
+        Whether ``arm.J`` is that of this tick now.
     """
-    speed, force = np.zeros(3), np.zeros(3)
+    speed = np.zeros(3)
     for k in range(3):
-        arm.offset[k] = arm.T[k, 3] - p.world_center[k]
+        force[k] = 0.0
+        arm.offset[k] = arm.T[k, 3] + lever[k] - p.world_center[k]
     if s.is_near:
         _slide(s, q)
-    before, s.gap = s.gap, arm.distance(arm.offset, arm.shape, arm.normal)
+    before, s.gap = s.gap, arm.distance(arm.offset, arm.shape, arm.normal) - p.tool_radius
     if s.punctures > 0:
         follow_channel(p, s, p.world_stiffness, before, arm.offset, arm.normal)
     if p.click_force > 0.0:
         follow_button(p, s, before)
     s.is_near = int(s.gap < NEAR)
     if s.is_near:
-        _begin_at(s, arm, q, dq, speed)
+        for k in range(3):
+            lever[k] -= p.tool_radius * arm.normal[k]
+        if not has_jacobian:
+            arm.jacobian(arm.tip, arm.tip_geometry, arm.J)
+            has_jacobian = True
+        _begin_at(s, arm, lever, q, dq, speed)
         _lay_flat(s)
         push = _push(p, s, np.zeros(3), speed, force)
         _keep_bend(p, s, force)
         if not s.is_open:
             puncture(p, s, p.world_stiffness, push, arm.offset)
-    for k in range(3):
-        felt[k], felt[3 + k] = force[k], 0.0
+    return has_jacobian
+
+
+@inner
+def touch(p: WorldNumbers, contacts: Any, arm: Arm, q: Array, dq: Array, felt: Array) -> None:
+    """Find where the tool is against the object, and write what its tip feels (6,) [N, N·m].
+
+    The points are balls of the tool's radius. They lie evenly along its axis, which is z of the
+    tip: the first is the tip, the last is ``tool_length`` behind it.
+
+    Args:
+        p: Parameters.
+        contacts: :class:`ContactState` of each point (N,); written.
+        arm: With ``T`` of the true tip, its joints ``tip``, ``jacobian``, ``distance`` and
+            ``shape``; its rooms ``offset``, ``normal`` and ``J`` are written.
+        q: Joints of the links (n,) [rad or m], which move the tip from here on.
+        dq: Their speeds (n,).
+        felt: Sum of the forces along the slave's base, and of their torques about the tip; written.
+    """
+    lever, force, has_jacobian = np.empty(3), np.empty(3), False
+    for k in range(6):
+        felt[k] = 0.0
+    for point in range(contacts.shape[0]):
+        behind = p.tool_length * point / max(contacts.shape[0] - 1, 1)
+        for k in range(3):
+            lever[k] = -behind * arm.T[k, 2]
+        has_jacobian = _touch_at(p, contacts[point], arm, has_jacobian, lever, q, dq, force)
+        for k in range(3):
+            a, b = (k + 1) % 3, (k + 2) % 3
+            felt[k] = felt[k] + force[k] if point else force[k]
+            felt[3 + k] += lever[a] * force[b] - lever[b] * force[a]

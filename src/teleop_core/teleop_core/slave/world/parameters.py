@@ -68,6 +68,19 @@ class WorldParameters:
         0.3, lower=0.0, upper=2.0, doc="over the normal force, if the material is own"
     )
 
+    tool_points: int = parameter(
+        1, lower=1, upper=16, fixed=True,
+        doc="places where the tool touches: its tip, and others behind it along its axis, which is "
+        "z of the tip",
+    )  # fmt: skip
+    tool_length: float = parameter(
+        0.02, unit="m", lower=1e-3, upper=1.0, fixed=True,
+        doc="from the tip to the last of several points", source="assumed",
+    )  # fmt: skip
+    tool_radius: float = parameter(
+        0.0, unit="m", lower=0.0, upper=0.1, fixed=True, doc="of the tool at each of its points"
+    )
+
     puncture_force: float = parameter(
         0.0, unit="N", lower=0.0, upper=100.0,
         doc="push along the normal at which the surface gives way to the tip, of any material; "
@@ -101,29 +114,47 @@ class WorldParameters:
         """Numbers of the object, as its distance takes them; a mesh is read, and may be refused."""
         return WORLD_OBJECTS.find(self.kind.kind).numbers(self.kind.parameters)
 
-    def distance(self, tip: Array, center: Array) -> float:
-        """How far a tip (3,) is outside the object with its middle at ``center`` (3,) [m]."""
+    def tool(self, T_base_tip: Array) -> Array:
+        """Places (N, 3) [m] of the tool's points in the slave's base, of the tip's pose (4, 4)."""
+        behind = np.linspace(0.0, self.tool_length, self.tool_points)
+        places: Array = T_base_tip[:3, 3] - behind[:, None] * T_base_tip[:3, 2]
+        return places
+
+    def distance(self, tool: Array, center: Array) -> float:
+        """How far outside the object the nearest point of a tool is [m].
+
+        Args:
+            tool: Places of its points (N, 3) [m].
+            center: Middle of the object (3,) [m].
+        """
         part = WORLD_OBJECTS.find(self.kind.kind)
-        return float(part.distance(tip - center, self.shape, np.zeros(3)))
+        found = (part.distance(place - center, self.shape, np.zeros(3)) for place in tool)
+        return float(min(found)) - self.tool_radius
 
     def __post_init__(self) -> None:
         if len(self.place) not in {0, 3}:
             raise ParameterError("world.place", self.place, "x, y, z, or empty")
         if self.puncture_force > 0.0 and getattr(self.kind.parameters, "click_force", 0.0) > 0.0:
             raise ParameterError("world.puncture_force", self.puncture_force, "0 for a button")
+        is_needle = self.puncture_force > 0.0 or hasattr(self.kind.parameters, "click_force")
+        if is_needle and (self.tool_points > 1 or self.tool_radius > 0.0):
+            name = "tool_points" if self.tool_points > 1 else "tool_radius"
+            text = "that of a needle (1 point, radius 0) for a button, or with a puncture_force"
+            raise ParameterError(f"world.{name}", getattr(self, name), text)
 
-    def below(self, tip: Array) -> Array:
-        """Middle of the object (3,) [m] that lies straight below a tip (3,) [m], a gap apart.
+    def below(self, T_base_tip: Array) -> Array:
+        """Middle of the object (3,) [m] that lies straight below a tip's pose (4, 4), a gap apart.
 
         Raises:
             ParameterError: There is none.
         """
+        tool, tip = self.tool(T_base_tip), T_base_tip[:3, 3]
         down, near, far = np.array([0.0, 0.0, -1.0]), 0.0, _FARTHEST
-        if not self.distance(tip, tip) < self.gap <= self.distance(tip, tip + far * down):
+        if not self.distance(tool, tip) < self.gap <= self.distance(tool, tip + far * down):
             text = f"given for a {self.kind.kind} that cannot lie straight below the tip"
             raise ParameterError("world.place", self.place, text)
         for _ in range(60):  # to a rounding of the place
             way = 0.5 * (near + far)
-            is_apart = self.distance(tip, tip + way * down) >= self.gap
+            is_apart = self.distance(tool, tip + way * down) >= self.gap
             near, far = (near, way) if is_apart else (way, far)
         return tip + far * down

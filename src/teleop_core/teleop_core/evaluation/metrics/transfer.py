@@ -1,0 +1,91 @@
+"""Transfer: how many objects the jaw brought from peg to peg, how fast, and how pegs pulled."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.evaluation.context import Context
+from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.rows import Row, row
+from teleop_core.evaluation.windows import Window
+from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_GRIP
+
+GROUP = "peg transfer"
+_TRANSFERRED, _DROPPED, _PULL = (
+    SLAVE_JAW_BOARD.columns.index(name) for name in ("transferred", "dropped", "pull")
+)
+_GRIPS = SLAVE_JAW_GRIP.columns.index("grips")
+
+
+@dataclass(frozen=True)
+class TransferScore:
+    """What became of the objects of a board; None without a jaw."""
+
+    transferred: int | None = figure("1", "objects that were let go onto another peg")
+    dropped: int | None = figure("1", "objects that came to rest on no peg")
+    time_s: float | None = figure("s", "mean time of those transferred, from the last grip to rest")
+    peak_pull_n: float | None = figure(
+        "N", "largest pull of a peg on the gripped object, across the peg"
+    )
+
+
+class TransferMetric(Metric):
+    """Counts, times and pulls of a simulated board, by what its simulator tells."""
+
+    name = "transfer"
+    keys = keys_of("transfer", TransferScore)
+    topics = (SLAVE_JAW_BOARD, SLAVE_JAW_GRIP)
+
+    def __init__(self, _: Context) -> None:
+        self._first: np.ndarray | None = None
+        self._last = np.zeros(len(SLAVE_JAW_BOARD.columns))
+        self._grips = np.nan  # of the last sample
+        self._peak = 0.0
+        self._begins: list[int] = []  # of grips [ns]
+        self._ends: list[int] = []  # of transfers [ns]
+
+    def add(self, window: Window) -> None:
+        """Take one window."""
+        grips, board = window.samples(SLAVE_JAW_GRIP), window.samples(SLAVE_JAW_BOARD)
+        if len(grips):
+            count = np.append(self._grips, grips.values[:, _GRIPS])
+            self._begins += grips.stamp_ns[np.diff(count) > 0.0].tolist()
+            self._grips = count[-1]
+        if not len(board):
+            return
+        if self._first is None:
+            self._first = self._last = board.values[0]
+        count = np.append(self._last[_TRANSFERRED], board.values[:, _TRANSFERRED])
+        self._ends += board.stamp_ns[np.diff(count) > 0.0].tolist()
+        self._last = board.values[-1]
+        self._peak = max(self._peak, float(board.values[:, _PULL].max()))
+
+    def _time(self) -> float | None:
+        """Mean time [s] from the last grip before a transfer to its end."""
+        before = np.searchsorted(self._begins, self._ends)
+        times = [
+            1e-9 * (end - self._begins[i - 1])
+            for end, i in zip(self._ends, before.tolist(), strict=True)
+            if i
+        ]
+        return float(np.mean(times)) if times else None
+
+    def values(self) -> TransferScore:
+        """Score of everything so far."""
+        if self._first is None:
+            return TransferScore(None, None, None, None)
+        counts = self._last - self._first
+        transferred, dropped = int(counts[_TRANSFERRED]), int(counts[_DROPPED])
+        return TransferScore(transferred, dropped, self._time(), self._peak)
+
+    def rows(self) -> list[Row]:
+        """All four; nothing where no object came onto a peg or missed one."""
+        score = self.values()
+        if not score.transferred and not score.dropped:
+            return []
+        return [
+            Row(GROUP, "transferred", "", str(score.transferred)),
+            Row(GROUP, "dropped", "", str(score.dropped)),
+            row(GROUP, "time of a transfer, mean", "s", score.time_s),
+            row(GROUP, "pull of a peg, max", "N", score.peak_pull_n),
+        ]

@@ -1,0 +1,70 @@
+"""Drive of the simulated jaw: its control law, and two fingers that close on an object.
+
+The fingers turn apart by the same angle, so that one angle between them says how wide the jaw is:
+their pads are ``2 L sin(angle / 2)`` apart.
+"""
+
+import math
+
+from teleop_core.kernels import inner
+from teleop_core.kernels.fields import Fields
+
+
+class DriveNumbers(Fields):
+    """Fields of a parameter record with the jaw's drive and the stiffness of what it grips."""
+
+    upper: float  # largest angle [rad]
+    effort: float  # largest one of the drive [N·m]
+    stiffness: float  # of the control law [N·m/rad]
+    damping: float  # of the control law [N·m·s/rad]
+    inertia: float  # [kg·m²]
+    friction: float  # viscous [N·m·s/rad]
+    length: float  # of a finger [m]
+    size: float  # of the object [m]
+    pad_stiffness: float  # of both pads and the object [N/m]
+    pad_damping: float  # [N·s/m]
+
+
+class DriveState(Fields):
+    """Fields of a state record with where the jaw is."""
+
+    setpoint: float  # [rad]
+    angle: float  # [rad]
+    velocity: float  # [rad/s]
+    effort: float  # of the drive [N·m]
+    force: float  # of each finger on the object [N]
+    is_between: int  # whether the object is between the fingers
+
+
+@inner
+def width(p: DriveNumbers, angle: float) -> float:
+    """Distance between the pads [m] at an angle [rad]."""
+    return 2.0 * p.length * math.sin(0.5 * angle)
+
+
+@inner
+def drive(p: DriveNumbers, s: DriveState, setpoint_speed: float, dt: float) -> None:
+    """Move the jaw on by a tick: a PD law within the drive's limit, against the object if it is.
+
+    The law holds its effort for the tick. The object's push is taken at the end of the tick
+    (backward Euler), so that a stiff object gives no energy to the jaw, whatever ``dt`` is.
+    """
+    asked = p.stiffness * (s.setpoint - s.angle) + p.damping * (setpoint_speed - s.velocity)
+    s.effort = min(max(asked, -p.effort), p.effort)
+    momentum = p.inertia * s.velocity + dt * s.effort
+    resisted = p.inertia + dt * p.friction
+    velocity, s.force = momentum / resisted, 0.0
+    if s.is_between:
+        lever = p.length * math.cos(0.5 * s.angle)
+        depth = p.size - width(p, s.angle)
+        pushed = momentum + dt * lever * p.pad_stiffness * depth
+        # The damper works from the first touch on, not before: a tick that begins outside has none.
+        pad_damping = p.pad_damping if depth > 0.0 else 0.0
+        given = (dt * p.pad_stiffness + pad_damping) * lever
+        against = pushed / (resisted + dt * lever * given)
+        force = p.pad_stiffness * depth - given * against
+        if force > 0.0:
+            velocity, s.force = against, force
+    angle = s.angle + dt * velocity
+    s.angle = min(max(angle, 0.0), p.upper)
+    s.velocity = velocity if s.angle == angle else 0.0

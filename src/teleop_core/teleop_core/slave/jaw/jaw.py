@@ -1,0 +1,183 @@
+"""Stage ``jaw``: the jaw's server, which says where the jaw may go; drives, or a gripper, obey.
+
+It leads the jaw's setpoint as ``slave`` leads the arm's. Where the jaw is, it is told.
+"""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.graph.row import Row
+from teleop_core.graph.signals import DT, assign
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
+    NO_COMMAND_NS,
+    OPERATION,
+    SLAVE_JAW_MEASURED_JS,
+    SLAVE_JAW_SERVO_JP,
+    SLAVE_JAW_SETPOINT_JS,
+    SLAVE_OPERATION,
+)
+from teleop_core.kernels import inner, kernel
+from teleop_core.kernels.fields import Fields, record
+from teleop_core.slave.operation.states import State
+
+_STATE, _ENABLED = OPERATION.index("state"), int(State.ENABLED)
+_NEAR = 1e-3  # so near to where the jaw stands a command has come to it [rad]
+_MOVED = 0.05  # a jaw that is so much farther from its setpoint was moved by others [rad]
+_CLOSING = 0.02  # a command that becomes less by so much closes: a hand that rests is not as rough
+
+
+@dataclass(frozen=True, kw_only=True)
+class JawParameters:
+    """Parameters of :class:`Jaw`."""
+
+    command_timeout: float = parameter(
+        0.1, unit="s", lower=0.002, upper=5.0,
+        doc="the jaw stays where it is led when for longer than this no command came, or the jaw "
+        "did not say where it is",
+    )  # fmt: skip
+    upper: float = parameter(
+        0.8, unit="rad", lower=0.05, upper=3.0, fixed=True, source="assumed",
+        doc="largest angle between the fingers that the jaw is led to",
+    )  # fmt: skip
+    speed_limit: float = parameter(
+        4.0, unit="rad/s", lower=0.01, upper=100.0, doc="of the setpoint", source="assumed"
+    )
+
+
+class JawNumbers(Fields):
+    """Parameter record of the jaw's server."""
+
+    upper: float  # [rad]
+    speed: float  # [rad/s]
+    timeout_ns: int
+
+
+class JawState(Fields):
+    """State record of the jaw's server."""
+
+    told_ns: int  # stamp of the newest command
+    heard_ns: int  # when it came
+    sampled_ns: int  # stamp of the newest slave/jaw/measured_js
+    seen_ns: int  # when it came
+    off: float  # how far the jaw was from its setpoint then [rad]
+    setpoint: float  # [rad]
+    is_led: int  # whether commands lead the jaw since it held last
+    lowest: float  # command since then [rad]
+    highest: float  # [rad]
+
+
+@inner
+def _see(p: JawNumbers, s: JawState, row: Row) -> None:
+    """Take where the jaw says that it is.
+
+    Before a command leads it the setpoint is there. So it is where the jaw was silent, and stands
+    farther from its setpoint than before: somebody else moved it.
+    """
+    angle = row.slave_jaw_measured_js[0]
+    if row.slave_jaw_measured_js_ns == s.sampled_ns or not math.isfinite(angle):
+        return
+    was_silent = row.now_ns - s.seen_ns > p.timeout_ns
+    is_elsewhere = was_silent and abs(angle - s.setpoint) > s.off + _MOVED
+    if row.slave_jaw_setpoint_js_ns == NO_COMMAND_NS or is_elsewhere:
+        s.setpoint = min(max(angle, 0.0), p.upper)
+    s.off = abs(angle - s.setpoint)
+    s.sampled_ns, s.seen_ns = row.slave_jaw_measured_js_ns, row.now_ns
+
+
+@inner
+def _may_move(p: JawNumbers, s: JawState, row: Row) -> bool:
+    """Whether the arm may move, and commands and measured angles come."""
+    if row.slave_jaw_servo_jp_ns != s.told_ns:
+        s.told_ns, s.heard_ns = row.slave_jaw_servo_jp_ns, row.now_ns
+    is_heard = s.told_ns != 0 and row.now_ns - s.heard_ns <= p.timeout_ns
+    is_seen = s.sampled_ns != 0 and row.now_ns - s.seen_ns <= p.timeout_ns
+    is_sound = math.isfinite(row.slave_jaw_servo_jp[0])
+    return bool(is_heard and is_seen and is_sound and row.slave_operation[_STATE] == _ENABLED)
+
+
+@inner
+def _is_led(s: JawState, wanted: float) -> bool:
+    """Whether a command leads the jaw, which after a hold it does by the operator's doing alone.
+
+    It opens the jaw once one has asked for the angle held, or less: nothing falls because the hand
+    was opened during a stop. It closes the jaw once one has asked for the angle held, or more, or
+    while it closes.
+    """
+    if s.is_led == 0:
+        s.lowest, s.highest = min(s.lowest, wanted), max(s.highest, wanted)
+        if wanted > s.setpoint:
+            s.is_led = 1 if s.lowest <= s.setpoint + _NEAR else 0
+        else:
+            s.is_led = 1 if s.highest >= min(s.setpoint - _NEAR, wanted + _CLOSING) else 0
+    return s.is_led > 0
+
+
+@kernel
+def jaw_step(p: JawNumbers, s: JawState, row: Row, dt: float) -> None:
+    """One tick: move the setpoint towards the command, if the jaw may move.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        row: Signals.
+        dt: Tick [s].
+    """
+    _see(p, s, row)
+    if not _may_move(p, s, row):
+        s.is_led, s.lowest, s.highest = 0, math.inf, -math.inf
+    else:
+        # Below 0 the fingers press on each other, or harder on what is thin.
+        wanted, most = min(max(row.slave_jaw_servo_jp[0], -p.upper), p.upper), p.speed * dt
+        if _is_led(s, wanted):
+            s.setpoint += min(max(wanted - s.setpoint, -most), most)
+            row.slave_jaw_setpoint_js_ns = row.slave_jaw_servo_jp_ns
+    row.slave_jaw_setpoint_js[0] = s.setpoint
+
+
+class Jaw(RunningStage):
+    """Stage of the jaw's server; the setpoint begins where the jaw is."""
+
+    def __init__(self, parameters: JawParameters, dt: float = DT) -> None:
+        super().__init__(JAW_STAGE, 0, dt)
+        self.parameters, self.state = record(JawNumbers), record(JawState)
+        self.kernel, self.arguments = jaw_step, (self.parameters, self.state)
+        self._begin = self.signals.copy()
+        self.retune(parameters)
+        self.reset()
+
+    def reset(self) -> None:
+        """As before the first tick: no command is in force."""
+        s, row = self.state, self.signals
+        assign(s, 0)
+        assign(row, self._begin)
+        s["setpoint"] = row["slave_jaw_setpoint_js"] = self.parameters["upper"]
+        s["lowest"], s["highest"] = math.inf, -math.inf
+        row["slave_jaw_setpoint_js_ns"] = NO_COMMAND_NS
+
+    def retune(self, parameters: JawParameters) -> None:
+        """Take new parameters from the next tick on; the setpoint stays."""
+        p = self.parameters
+        p["upper"], p["speed"] = parameters.upper, parameters.speed_limit
+        p["timeout_ns"] = round(parameters.command_timeout * 1e9)
+
+    def concerns(self) -> list[str]:
+        """A command that has not come yet to where the jaw holds."""
+        s = self.state
+        if s["is_led"] or s["lowest"] > s["highest"]:
+            return []
+        asked, held = float(self.signals["slave_jaw_servo_jp"][0]), float(s["setpoint"])
+        way = "close the hand first" if asked > held else "open the hand first, or close it"
+        return [f"the jaw holds at {held:.3f} rad, commanded are {asked:.3f} rad: {way}"]
+
+
+JAW_STAGE = Stage(
+    "jaw",
+    JawParameters,
+    reads=(SLAVE_JAW_SERVO_JP, SLAVE_OPERATION, SLAVE_JAW_MEASURED_JS),
+    writes=(SLAVE_JAW_SETPOINT_JS,),
+    late=(SLAVE_JAW_MEASURED_JS,),
+    optional=(SLAVE_JAW_SERVO_JP,),
+    make=Jaw,
+)

@@ -1,0 +1,191 @@
+"""Stage ``jaw_sim``: drive and grip of a simulated jaw, which follows the jaw's setpoint."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from teleop_core.base.errors import ParameterError
+from teleop_core.base.parameters import parameter
+from teleop_core.graph.row import Row
+from teleop_core.graph.signals import DT, assign, copy
+from teleop_core.graph.stage import RunningStage, Stage
+from teleop_core.graph.topics import (
+    JAW_OBJECTS,
+    NO_COMMAND_NS,
+    SLAVE_JAW_BOARD,
+    SLAVE_JAW_GRIP,
+    SLAVE_JAW_MEASURED_JS,
+    SLAVE_JAW_OBJECT_CP,
+    SLAVE_JAW_SETPOINT_JS,
+    SLAVE_TRUE_CP,
+)
+from teleop_core.kernels import kernel
+from teleop_core.kernels.fields import record
+from teleop_core.slave.jaw.drive import drive
+from teleop_core.slave.jaw.grip import (
+    PEGS,
+    GripNumbers,
+    GripRoom,
+    GripState,
+    make_room,
+    move_object,
+    put_objects,
+    tell_board,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GripObjectParameters:
+    """Objects that the jaw can grip, as thick from every side; they stand on a flat table."""
+
+    place: tuple[float, ...] = parameter(
+        (), unit="m", lower=-10.0, upper=10.0, fixed=True,
+        doc="its middle in the slave's base at first, half its size above the table; those of "
+        "several one after the other, with the same z; empty: none",
+    )  # fmt: skip
+    size: float = parameter(0.02, unit="m", lower=1e-3, upper=0.2, doc="thickness")
+    mass: float = parameter(0.05, unit="kg", lower=1e-4, upper=10.0, doc="mass")
+    stiffness: float = parameter(
+        4000.0, unit="N/m", lower=10.0, upper=1e6, doc="of it and both pads", source="assumed"
+    )
+    damping: float = parameter(
+        20.0, unit="N·s/m", lower=0.0, upper=1e4, doc="of it and both pads", source="assumed"
+    )
+    friction: float = parameter(
+        0.5, lower=0.0, upper=5.0, doc="dry friction of each pad on it", source="assumed"
+    )
+
+    def __post_init__(self) -> None:
+        n, rest = divmod(len(self.place), 3)
+        if rest or n > JAW_OBJECTS or len(set(self.place[2::3])) > 1:
+            needed = f"x, y, z of up to {JAW_OBJECTS} objects, with one z, or empty"
+            raise ParameterError("jaw_sim.object.place", self.place, needed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PegParameters:
+    """Pegs of the table, upright, which go through objects."""
+
+    place: tuple[float, ...] = parameter(
+        (), unit="m", lower=-10.0, upper=10.0, fixed=True,
+        doc="x, y of the axis of each in the slave's base, one after the other; empty: none",
+    )  # fmt: skip
+    height: float = parameter(
+        0.015, unit="m", lower=1e-3, upper=0.5, source="assumed",
+        doc="by which an object must be lifted to come off",
+    )  # fmt: skip
+    clearance: float = parameter(
+        0.0015, unit="m", lower=0.0, upper=0.1, source="assumed",
+        doc="way of an object from the axis on which the peg does not touch it",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        x, y = self.place[::2], self.place[1::2]
+        if len(x) != len(y) or len(x) > PEGS:
+            raise ParameterError("jaw_sim.pegs.place", self.place, f"x, y of up to {PEGS} pegs")
+        ways = [math.hypot(x[i] - x[k], y[i] - y[k]) for i in range(len(x)) for k in range(i)]
+        if min(ways, default=math.inf) <= 2.0 * self.clearance:
+            needed = f"pegs more than 2 clearances ({2.0 * self.clearance:g} m) apart"
+            raise ParameterError("jaw_sim.pegs.place", self.place, needed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JawSimParameters:
+    """Parameters of :class:`JawSim`."""
+
+    upper: float = parameter(
+        0.8, unit="rad", lower=0.05, upper=3.0, fixed=True, source="assumed",
+        doc="angle between the fingers at the drive's stop, where it begins",
+    )  # fmt: skip
+    effort_limit: float = parameter(
+        0.15, unit="N·m", lower=0.0, upper=100.0, doc="of the drive", source="assumed"
+    )
+    inertia: float = parameter(
+        1e-4, unit="kg·m²", lower=1e-7, upper=1.0, doc="of drive and fingers", source="assumed"
+    )
+    viscous: float = parameter(
+        1e-3, unit="N·m·s/rad", lower=0.0, upper=10.0, doc="friction", source="assumed"
+    )
+    bandwidth: float = parameter(
+        100.0, unit="rad/s", lower=1.0, upper=200.0, source="assumed",
+        doc="of the control law, which is damped critically",
+    )  # fmt: skip
+    finger_length: float = parameter(
+        0.04, unit="m", lower=1e-3, upper=0.5, doc="from the pivot to the pads", source="assumed"
+    )
+    object: GripObjectParameters = field(default_factory=GripObjectParameters)
+    pegs: PegParameters = field(default_factory=PegParameters)
+
+
+@kernel
+def jaw_sim_step(p: GripNumbers, s: GripState, room: GripRoom, row: Row, dt: float) -> None:
+    """One tick: take the setpoint, say where the jaw is, and move jaw and object on.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        room: :class:`~teleop_core.slave.jaw.grip.GripRoom`; written.
+        row: Signals.
+        dt: Tick [s].
+    """
+    before = s.setpoint
+    if row.slave_jaw_setpoint_js_ns > NO_COMMAND_NS:  # else the jaw stays where it begins
+        s.setpoint = row.slave_jaw_setpoint_js[0]
+    row.slave_jaw_measured_js[0], row.slave_jaw_measured_js[1] = s.angle, s.velocity
+    drive(p, s, (s.setpoint - before) / dt, dt)
+    row.slave_jaw_measured_js[2] = s.effort
+    if p.objects:
+        move_object(p, s, room, row)
+        tell_board(p, s, row.slave_jaw_board)
+    copy(s.object, row.slave_jaw_object_cp)
+    grip = row.slave_jaw_grip
+    grip[0], grip[1], grip[2] = s.force, s.is_gripped, s.slid
+    grip[3], grip[4], grip[5] = s.grips, s.slips, s.drops
+
+
+class JawSim(RunningStage):
+    """Stage of the simulated jaw; it begins open, at rest."""
+
+    def __init__(self, parameters: JawSimParameters, dt: float = DT) -> None:
+        super().__init__(JAW_SIM, 0, dt)
+        self.parameters, self.state = record(GripNumbers), record(GripState)
+        self.kernel = jaw_sim_step
+        self.arguments = (self.parameters, self.state, make_room())
+        self._begin = self.signals.copy()
+        self.retune(parameters)
+        self.reset()
+
+    def reset(self) -> None:
+        """Open, at rest; the object stands where it began."""
+        s, p, row = self.state, self.parameters, self.signals
+        assign(s, 0)
+        assign(row, self._begin)
+        s["setpoint"] = s["angle"] = row["slave_jaw_measured_js"][0] = p["upper"]
+        put_objects(self.parameters, self.state, self._places)
+
+    def retune(self, parameters: JawSimParameters) -> None:
+        """Take new parameters from the next tick on."""
+        p, thing = self.parameters, parameters.object
+        p["upper"], p["effort"] = parameters.upper, parameters.effort_limit
+        p["inertia"], p["friction"] = parameters.inertia, parameters.viscous
+        p["length"] = parameters.finger_length
+        p["stiffness"] = parameters.inertia * parameters.bandwidth**2
+        p["damping"] = 2.0 * parameters.inertia * parameters.bandwidth
+        self._places = np.reshape(np.array(thing.place, dtype=np.float64), (-1, 3))
+        p["objects"], p["place"] = len(self._places), thing.place[:3] or (0.0, 0.0, 0.0)
+        pegs = parameters.pegs
+        p["pegs"], p["axes"][: len(pegs.place)] = len(pegs.place) // 2, pegs.place
+        p["peg_height"], p["clearance"] = pegs.height, pegs.clearance
+        p["size"], p["mass"], p["pad_friction"] = thing.size, thing.mass, thing.friction
+        p["pad_stiffness"], p["pad_damping"] = thing.stiffness, thing.damping
+
+
+JAW_SIM = Stage(
+    "jaw_sim",
+    JawSimParameters,
+    reads=(SLAVE_JAW_SETPOINT_JS, SLAVE_TRUE_CP),
+    writes=(SLAVE_JAW_MEASURED_JS, SLAVE_JAW_GRIP, SLAVE_JAW_OBJECT_CP, SLAVE_JAW_BOARD),
+    optional=(SLAVE_TRUE_CP,),
+    make=JawSim,
+)

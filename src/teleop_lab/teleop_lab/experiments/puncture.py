@@ -1,0 +1,195 @@
+"""Puncture: how far the tip overshoots behind a membrane before the hand that feels it stops."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from teleop_core.chain.operators.human import HumanParameters
+from teleop_core.chain.operators.shapes import minimum_jerk
+from teleop_core.evaluation.figure import FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure
+from teleop_core.kernels.geometry import Array
+from teleop_lab.experiments.bench import Bench, Settings
+from teleop_lab.experiments.drawing import PUBLISHED, axis, joined
+from teleop_lab.experiments.experiment import Experiment
+from teleop_lab.experiments.outcome import Findings, Row, absolute
+from teleop_lab.experiments.transmission import CHANNELS, Way, far_settings
+
+WAYS: tuple[Way, ...] = (
+    ("position_force", "none"), ("position_force", "tank"), ("position_force", "tdpa"),
+    ("position_force", "wave"), ("position_position", "none"), ("impedance", "none"),
+    ("three_channel", "none"), ("four_channel", "none"),
+)  # fmt: skip
+"""Architectures and passivities, as of the experiment ``transparency``."""
+ROUND_TRIPS = (0.0, 0.1, 0.2, 0.4)
+"""Half of it each way [s]."""
+SPEED = 0.01
+"""With which the hand pushes on [m/s]; assumed."""
+NOTICED = 0.1
+"""The hand notices a puncture once its force fell by this share of the largest; assumed."""
+_TICKS_MS = 10.0  # of stages and of the fall until it is noticed; assumed
+_REACTION = HumanParameters().reaction_time
+_FELL = 0.1  # smallest fall of the force on the tip from tick to tick, as of a puncture [N]
+_WITHIN = 0.2  # time in which a fall of the force counts [s]; assumed
+_READY, _APPROACH, _PUSH = 4.0, 2.0, 2.5  # [s]
+Job = tuple[Way, float]
+"""Way and round trip [s]."""
+
+
+@dataclass(frozen=True)
+class Puncture:
+    """What a hand makes of a puncture; infinite or not a number where it does not notice.
+
+    Attributes:
+        tip_drop: Largest fall of the force on the tip from tick to tick [N].
+        hand_drop: Largest fall of the force at the hand within 0.2 s after it can tell [N].
+        notice: Time from the puncture until the hand notices [s].
+        overshoot: How far the tip goes on from the place of the puncture, until the hand that
+            stops a reaction time after it noticed has stopped it [m].
+    """
+
+    tip_drop: float
+    hand_drop: float
+    notice: float
+    overshoot: float
+
+
+def _motion(times: Array, stop: float = math.inf) -> Array:
+    """Place (N, 3) [m] of a hand that goes to the block, then pushes on until ``stop`` [s]."""
+    place = np.zeros((len(times), 3))
+    place[:, 2] = 0.04 * minimum_jerk(times / _APPROACH)
+    place[:, 1] = -SPEED * np.clip(times - _APPROACH, 0.0, min(stop - _APPROACH, _PUSH))
+    return place
+
+
+def _settings(way: Way, round_trip: float) -> Settings:
+    architecture, passivity = way
+    channels = CHANNELS[architecture]
+    ports = ("passivity",) if passivity in ("tdpa", "wave") else ()
+    return {
+        **far_settings(round_trip), "coarse_gain": 1.0, "tremor_amplitude": 0.0,
+        "stages": ("network", *channels.stages, *ports),
+        "reflection.architecture": channels.architecture or architecture,
+        "reflection.passivity": passivity,
+    }  # fmt: skip
+
+
+def measure_puncture(bench: Bench, job: Job) -> Puncture:
+    """A puncture by a hand that pushes on, and by the same hand that stops as it has noticed.
+
+    Args:
+        bench: Where it runs.
+        job: Way and round trip [s].
+    """
+    settings, late = _settings(*job), job[1]
+    seconds = _READY + _APPROACH + _PUSH + late
+    rows = bench.signals("puncture", seconds, settings, _motion)
+    force = np.linalg.norm(rows["slave_measured_cf"][:, :3], axis=1)
+    falls = force[:-1] - force[1:]
+    begin = int(falls.argmax())
+    if falls[begin] < _FELL:  # it never got through
+        return Puncture(float(falls[begin]), math.nan, math.nan, math.nan)
+    hears = begin + round(0.5e3 * late)  # nothing before it tells of the puncture
+    led = int(rows["teleop_state"][:, 0].argmax())  # the hand waits until the arm follows
+    end = led + round(1e3 * (_APPROACH + _PUSH))  # from here on the hand itself lets go
+    push = np.linalg.norm(rows["master_servo_cf"][hears:end, :3], axis=1)
+    most = np.maximum.accumulate(push)
+    fell = np.flatnonzero(push < (1.0 - NOTICED) * most)
+    drop = float((most - push)[: round(1e3 * _WITHIN)].max())
+    if not len(fell):
+        return Puncture(float(falls[begin]), drop, math.inf, math.inf)
+    noticed = hears + int(fell[0])
+    stop = 1e-3 * (noticed - led) + _REACTION
+    stopped = bench.signals("puncture", seconds + _REACTION + late, settings,
+                            partial(_motion, stop=stop))  # fmt: skip
+    height = stopped["slave_true_cp"][:, 2]
+    deepest = float(height[begin] - height[begin:].min())
+    return Puncture(float(falls[begin]), drop, 1e-3 * (noticed - begin), deepest)
+
+
+def _rows(found: Mapping[Job, Puncture]) -> tuple[Row, ...]:
+    rows = []
+    for ((architecture, passivity), late), each in found.items():
+        group, told = f"{architecture}, passivity {passivity}", f", {1e3 * late:.0f} ms"
+        if math.isnan(each.notice):
+            rows.append(
+                Row(quantity=f"fall of the force on the tip{told}", unit="N", group=group,
+                    predicted=each.tip_drop, note="the membrane holds")
+            )  # fmt: skip
+            continue
+        is_noticed = math.isfinite(each.notice)
+        rows.append(
+            Row(quantity=f"fall of the force at the hand{told}", unit="N", group=group,
+                published=each.tip_drop, predicted=each.hand_drop,
+                note="" if is_noticed else "the hand does not notice")
+        )  # fmt: skip
+        if not is_noticed:
+            continue
+        rows += [
+            Row(quantity=f"noticed after{told}", unit="ms", group=group, published=500.0 * late,
+                predicted=1e3 * each.notice, within=absolute(_TICKS_MS)),
+            Row(quantity=f"overshoot{told}", unit="mm", group=group,
+                published=1e3 * least_overshoot(late), predicted=1e3 * each.overshoot),
+        ]  # fmt: skip
+    return tuple(rows)
+
+
+def least_overshoot(round_trip: float) -> float:
+    """Way [m] that no hand avoids: its speed times round trip and reaction.
+
+    The force travels half of the round trip, the stop the other half.
+    """
+    return SPEED * (round_trip + _REACTION)
+
+
+def _figure(found: Mapping[Job, Puncture]) -> Figure:
+    late = 1e3 * np.array(ROUND_TRIPS)
+    least = 1e3 * np.array([least_overshoot(each) for each in ROUND_TRIPS])
+    traces = [joined(late, least, "least", PUBLISHED, "mm")]
+    for way, color in _COLORS.items():
+        kept = [(1e3 * job[1], 1e3 * each.overshoot) for job, each in found.items()
+                if job[0] == way and math.isfinite(each.overshoot)]  # fmt: skip
+        if kept:
+            trips, overshoots = np.array(kept).T
+            traces.append(joined(trips, overshoots, f"{way[0]}, {way[1]}", color, "mm"))
+    layout = {"xaxis": axis("round trip", "ms"), "yaxis": axis("overshoot", "mm")}
+    sentence = "How far the tip goes behind the membrane before the hand that felt it has stopped."
+    return Figure("Overshoot of a puncture", sentence, traces, layout, 420)
+
+
+_COLORS = {
+    ("position_force", "none"): FIRST, ("position_force", "wave"): SECOND,
+    ("position_position", "none"): FIXTURE, ("impedance", "none"): MEASURED,
+    ("four_channel", "none"): THIRD,
+}  # fmt: skip
+_NOTES = (
+    f"The hand pushes on with {1e3 * SPEED:g} mm/s through the membrane of the scenario puncture. "
+    f"It notices when its force fell by {100.0 * NOTICED:g} % and stops {1e3 * _REACTION:g} ms "
+    "later (Keele and Posner 1968). Speed and threshold are assumed.",
+    "Published: of the force at the hand, the fall on the tip; of the time until it is noticed, "
+    "the way of the news, half a round trip; of the overshoot, speed times round trip and "
+    "reaction. These are laws; no number that a source measured is here.",
+    "An overshoot is larger than the least one, for hand and tissue spring forward as the "
+    "membrane gives way.",
+    "Where the membrane holds, passivity holds the arm back before it.",
+)
+
+
+def report(found: Mapping[Job, Puncture]) -> Findings:
+    """Rows and figure of what was measured."""
+    return Findings(_rows(found), (_figure(found),), _NOTES)
+
+
+def _measure(bench: Bench) -> Findings:
+    jobs = [(way, late) for way in WAYS for late in ROUND_TRIPS]
+    return report(dict(zip(jobs, bench.map(measure_puncture, jobs), strict=True)))
+
+
+PUNCTURE = Experiment(
+    "puncture",
+    "what the hand feels of a puncture, and how far the tip overshoots, by architecture and delay",
+    "membrane of Okamura, Simone and O'Leary 2004; reaction of Keele and Posner 1968",
+    _measure,
+)

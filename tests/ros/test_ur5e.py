@@ -1,0 +1,129 @@
+"""A UR5e from a URDF, led through an arm bridge by a whole session, and broken by the drill."""
+
+import shlex
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from std_msgs.msg import Float64MultiArray
+
+import teleop_core as tc
+from drill_runs import run_drill
+from mutants import ROOT
+from teleop_core.nodes.children import environment, free_domain
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
+
+CONTROLLER = [sys.executable, str(ROOT / "tests/plain_controller.py"), "forward_command", "ur5e"]
+URDF = ROOT / "examples/ur5e.urdf"
+START = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
+ARM = [f"robot={URDF}", "geometry=[tip=tool0]", f"start={list(START)}"]
+BRIDGE = [sys.executable, "-m", "teleop_core.nodes", "arm_bridge", "--ros-args"]
+STEP = 2.5  # 1.2 of a rated speed, over two periods at most, in steps of one at the rated speed
+
+
+@pytest.fixture
+def bridge(tmp_path):
+    """Command of the bridge that leads the arm."""
+    file = tmp_path / "arm.yaml"
+    file.write_text(
+        f"/**:\n  ros__parameters:\n    robot: {URDF}\n    geometry: [tip=tool0]\n"
+        "arm_bridge:\n  ros__parameters:\n    kind: forward_command\n    rate: 500\n",
+        encoding="utf-8",
+    )
+    return [*BRIDGE, "--params-file", str(file)]
+
+
+@contextmanager
+def witness(domain):
+    """What the controller says of its commands: first one's distance, and the largest step."""
+    context = Context()
+    context.init(domain_id=domain)
+    node = rclpy.create_node("looks_on", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    said = []
+    node.create_subscription(Float64MultiArray, "witness", lambda m: said.append(list(m.data)), 10)
+
+    def newest():
+        while not said or np.isnan(said[-1][0]):
+            executor.spin_once(0.1)
+        for _ in range(100):
+            executor.spin_once(0.0)
+        return said[-1]
+
+    try:
+        yield newest
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        context.shutdown()
+
+
+def led(tmp_path, bridge, seed, *settings, duration="8"):
+    """A recorded session that leads the arm, and what the controller witnessed."""
+    env = environment() | {"ROS_DOMAIN_ID": free_domain()}
+    others = [subprocess.Popen(c, env=env) for c in ([*CONTROLLER, str(seed)], bridge)]
+    out = tmp_path / f"bag_{seed}"
+    live = [
+        sys.executable, "-m", "teleop_core.cli", "live", "--without", "slave_sim",
+        "--out", str(out), "--duration", duration, "--set", *ARM, *settings,
+    ]  # fmt: skip
+    try:
+        with witness(int(env["ROS_DOMAIN_ID"])) as newest:
+            done = subprocess.run(
+                live, env=env, check=False, capture_output=True, text=True, timeout=300
+            )
+            first, largest = newest()
+    finally:
+        for other in others:
+            other.terminate()
+        codes = [other.wait(60) for other in others]
+    assert codes == [0, 0]
+    assert done.returncode == 0, done.stdout + done.stderr
+    return tc.open_recording(out), first, largest
+
+
+def goes_home_and_follows(recording, first, largest):
+    assert first <= STEP
+    assert largest <= STEP
+    measured, setpoints = recording["slave/measured_js"], recording["slave/setpoint_js"]
+    joints = measured.values[:, : len(START)]
+    assert np.abs(joints[0] - START).max() > 0.05  # it stood elsewhere
+    off = np.abs(joints - START).max(axis=1)
+    home = int(np.flatnonzero(off < 0.01)[0])
+    # After that it goes where its setpoints go.
+    later = setpoints.log_ns > measured.log_ns[home]
+    asked, went = np.ptp(setpoints.values[later], axis=0), np.ptp(joints[home:], axis=0)
+    assert asked.max() > 0.02
+    assert went.max() > 0.8 * asked.max()
+
+
+def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(tmp_path, bridge):
+    goes_home_and_follows(*led(tmp_path, bridge, 1))
+
+
+@pytest.mark.soak
+def test_it_starts_twenty_times_without_a_jump(tmp_path, bridge):
+    for seed in range(2, 22):
+        goes_home_and_follows(*led(tmp_path, bridge, seed))
+
+
+def test_the_drill_stops_it_and_finds_it_lost_as_a_simulated_arm(tmp_path, bridge):
+    names = ("stop_topic", "kill_slave_sim")
+    code, text, outcomes = run_drill(
+        tmp_path, *names, "--drives", shlex.join(bridge), "--arm", shlex.join(CONTROLLER),
+        "--set", *ARM,
+    )  # fmt: skip
+    assert set(outcomes) == set(names)
+    assert (outcomes["stop_topic"]["state"], outcomes["stop_topic"]["told"]) == ("FAULT", "stop")
+    assert outcomes["kill_slave_sim"]["told"] == "feedback", text
+    for one in outcomes.values():
+        assert one["measured"]["step_ratio"]["value"] <= 1.0 + 1e-9, text
+        assert one["recovered_s"] is not None, text
+    assert (code == 0) is all(one["is_passed"] for one in outcomes.values())

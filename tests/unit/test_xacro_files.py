@@ -1,0 +1,130 @@
+"""Xacro files: the arm of the URDF that the package xacro writes, and every mistake by its file."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
+from teleop_core.robots import load_robot, load_robot_set
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "any_arm.urdf"
+XMLNS = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+SHOULDER = '<child link="upper_arm"/><origin xyz="0 0 0.1"/>'
+PARTS = f"""<robot {XMLNS}>
+  <xacro:arg name="height" default="0.1"/>
+  <xacro:macro name="place" params="x"><origin xyz="${{x}} 0 $(arg height)"/></xacro:macro>
+</robot>"""
+
+
+def arm(
+    folder, include="$(find some_arm)/urdf/parts.xacro", place='<xacro:place x="${0.03 - 0.03}"/>'
+):
+    """The example as a macro file of a package, with its shoulder from an included file."""
+    (folder / "some_arm" / "urdf").mkdir(parents=True)
+    text = EXAMPLE.read_text()
+    assert SHOULDER in text
+    head, body = (
+        text.replace(SHOULDER, f'<child link="upper_arm"/>{place}')
+        .partition("<robot")[2]
+        .split(">", 1)
+    )
+    name = f'<xacro:arg name="prefix" default=""/><xacro:include filename="{include}"/>'
+    body = body.replace('"shoulder"', '"$(arg prefix)shoulder"')
+    path = folder / "some_arm" / "urdf" / "arm.urdf.xacro"
+    path.write_text(f"<robot{head} {XMLNS}>{name}{body}")
+    (path.parent / "parts.xacro").write_text(PARTS)
+    return path
+
+
+def same(one, other):
+    q = np.random.default_rng(1).uniform(one.lower, one.upper)
+    np.testing.assert_array_equal(one.fk(q), other.fk(q))
+    np.testing.assert_array_equal(one.drives.inertia, other.drives.inertia)
+
+
+@pytest.mark.parametrize("include", ["$(find some_arm)/urdf/parts.xacro", "parts.xacro"])
+def test_a_xacro_is_the_arm_of_its_urdf(include, tmp_path):
+    robot = load_robot(str(arm(tmp_path, include)), tip="tool0")
+    same(robot, load_robot(str(EXAMPLE), tip="tool0"))
+
+
+def test_arguments_of_a_xacro_stand_in_the_geometry_and_stay_texts(tmp_path):
+    path = arm(tmp_path)
+    robot = load_robot_set(str(path), ["tip=tool0", "xacro.prefix=007", "xacro.height=0.5"])
+    assert "007shoulder" in robot.joint_names
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(EXAMPLE.read_text().replace(SHOULDER, SHOULDER.replace("0.1", "0.5")))
+    same(robot, load_robot(str(urdf), tip="tool0"))
+    same(robot, load_robot(str(path), tip="tool0", **{"xacro.height": "0.5"}))
+
+
+def test_packages_are_found_where_meshes_are_and_xacro_is_left_as_it_was(tmp_path, monkeypatch):
+    from xacro import substitution_args
+
+    before = substitution_args._eval_find
+    path = arm(tmp_path, "$(find far_parts)/parts.xacro")
+    with pytest.raises(ParameterError, match="far_parts"):
+        load_robot(str(path), tip="tool0")
+    far = tmp_path / "install" / "share" / "far_parts"
+    far.mkdir(parents=True)
+    (path.parent / "parts.xacro").rename(far / "parts.xacro")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "install"))
+    same(load_robot(str(path), tip="tool0"), load_robot(str(EXAMPLE), tip="tool0"))
+    assert substitution_args._eval_find is substitution_args._eval_dict["find"] is before
+
+
+@pytest.mark.parametrize(
+    ("place", "word"),
+    [
+        ('<xacro:place x="${1 / 0}"/>', "division by zero"),
+        ("<xacro:place/>", "Undefined parameters"),
+        ("<xacro:spot/>", "spot"),
+        ('<origin xyz="$(arg depth) 0 0"/>', "depth"),
+        ('<origin xyz="${__import__(1)} 0 0"/>', "__import__"),
+        ('<origin xyz="$(find ..)"/>', "package is '..'"),
+    ],
+)
+def test_a_mistake_in_a_xacro_is_told_in_one_line_that_names_the_file(place, word, tmp_path):
+    path = arm(tmp_path, place=place)
+    with pytest.raises(ParameterError) as told:
+        load_robot(str(path), tip="tool0")
+    assert word in str(told.value)
+    assert path.name in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_what_no_file_declares_and_what_is_no_xacro_takes_no_argument(tmp_path):
+    path = arm(tmp_path)
+    with pytest.raises(UnknownNameError, match=r"prefx.*height, prefix"):
+        load_robot(str(path), tip="tool0", **{"xacro.prefx": "left_"})
+    with pytest.raises(ParameterError, match=r"is no \.xacro"):
+        load_robot(str(EXAMPLE), tip="tool0", **{"xacro.prefix": "left_"})
+    with pytest.raises(RecordingError, match=r"gone\.xacro"):
+        load_robot(str(tmp_path / "gone.xacro"))
+
+
+def test_entities_of_a_xacro_and_of_what_it_includes_are_refused(tmp_path):
+    path = arm(tmp_path)
+    parts = path.parent / "parts.xacro"
+    bomb = '<!DOCTYPE robot [<!ENTITY a "0.18">]>'
+    for file in (parts, path):
+        text = file.read_text()
+        file.write_text(bomb + text)
+        with pytest.raises(ParameterError, match="DOCTYPE"):
+            load_robot(str(path), tip="tool0")
+        file.write_text(text)
+
+
+def test_without_the_package_one_line_says_how_to_get_it(tmp_path):
+    code = (
+        "import sys; sys.modules['xacro'] = None\n"
+        "from teleop_core.robots import load_robot\n"
+        f"try: load_robot({str(arm(tmp_path))!r}, tip='tool0')\n"
+        "except Exception as error: print(type(error).__name__, error)"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout.startswith("TeleopError")
+    assert "pip install 'teleop_core[urdf]'" in told.stdout
