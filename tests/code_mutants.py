@@ -288,6 +288,8 @@ CODE_MUTANTS = (
             "time > before + _GAP", "time > before + 60.0", "console_scene", "console_history"),
     _mutant("page_stands", "a page is woken from any thread", "console/hooks.py",
             "self.message_event = Wake()", "pass", "tests/scenario/test_console_server.py"),
+    _mutant("guest_left", "who comes in while the console ends is left there", "console/hooks.py",
+            "return _Serving(", "return ws.serve(", "console_port"),
 )  # fmt: skip
 """All of them."""
 

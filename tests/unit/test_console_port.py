@@ -1,13 +1,16 @@
 """Port: a taken one is refused with the process that has it and one that is free."""
 
+import gc
 import os
 import re
 import socket
+import threading
+from contextlib import suppress
 
 import pytest
 
 from teleop_core.base.errors import ParameterError, SessionError
-from teleop_core.console.server import free_port, listen, owner
+from teleop_core.console.server import ConsoleServer, free_port, listen, owner
 
 
 def test_taken_port_is_refused_with_its_owner_and_one_that_is_free():
@@ -32,6 +35,32 @@ def test_port_is_free_again_at_once_when_its_server_has_ended():
     for _ in range(2):
         with listen("127.0.0.1", port), socket.create_connection(("127.0.0.1", port)):
             pass
+
+
+def test_server_that_ends_while_others_come_in_leaves_no_connection_open():
+    for _ in range(10):
+        with ConsoleServer(0) as server:
+            came, ends = threading.Barrier(3), threading.Event()
+            guests = [threading.Thread(target=come_in, args=(server.port, came, ends))
+                      for _ in range(2)]  # fmt: skip
+            for guest in guests:
+                guest.start()
+            came.wait(30)
+        ends.set()
+        for guest in guests:
+            guest.join()
+    gc.collect()  # tells what is still open, which fails a test here
+
+
+def come_in(port, came, ends):
+    """Come and go; meet the others after the tenth time."""
+    times = 0
+    while not ends.is_set():
+        with suppress(OSError):
+            socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
+        times += 1
+        if times == 10:
+            came.wait(30)
 
 
 def test_owner_that_cannot_be_known_is_another_process():

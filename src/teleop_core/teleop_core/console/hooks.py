@@ -16,7 +16,7 @@ from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from socket import socket
-from types import SimpleNamespace
+from types import SimpleNamespace, TracebackType
 from typing import Any, TypedDict, Unpack
 
 import rich
@@ -250,7 +250,7 @@ def _server_at(
     ) -> ws.serve:
         options["max_size"] = LARGEST
         opening: dict[Connection, None] = {}
-        return ws.serve(
+        return _Serving(
             handler,
             sock=opened,
             process_request=_guarded(process_request, guard, answers),
@@ -260,6 +260,25 @@ def _server_at(
         )
 
     return serve
+
+
+class _Serving(ws.serve):
+    """A server that accepts nobody any more a turn of the loop before it ends.
+
+    asyncio takes two turns to accept a connection, and the library waits for one of them. A
+    connection that began in the last turn would belong to nobody and stay open.
+    """
+
+    async def __aexit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        loop = asyncio.get_running_loop()
+        for listens in self.server.sockets:
+            loop.remove_reader(listens.fileno())
+        await super().__aexit__(exc_type, exc_value, traceback)
 
 
 def _guarded(answer: Answer, guard: Guard, answers: Answers) -> Answer:
