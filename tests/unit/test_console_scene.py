@@ -364,7 +364,7 @@ def test_two_fingers_stand_at_the_tip_as_far_apart_as_the_jaw_is_open_and_the_bl
     picked = tc.run("pick", duration=6.0)
     scene, view = drawn(server, RecordedLink(picked.bag), picked.duration - 0.1)
     jaw, seen = scene.arms[""].jaw, view.arms[""].streams
-    np.testing.assert_allclose(jaw.block.position, seen["slave/jaw/object_cp"][:3], atol=STILL)
+    np.testing.assert_allclose(jaw.blocks[0].position, seen["slave/jaw/object_cp"][:3], atol=STILL)
     ends = [node.position + 0.02 * turned(node)[:, 2] for node in jaw.fingers]
     angle = seen["slave/jaw/measured_js"][0]
     width = 2.0 * 0.04 * np.sin(0.5 * angle)
@@ -374,7 +374,7 @@ def test_two_fingers_stand_at_the_tip_as_far_apart_as_the_jaw_is_open_and_the_bl
     np.testing.assert_allclose(begins[0], begins[1], atol=1e-4)  # they turn about one pivot
     none, _ = drawn(server, link, 3.0)
     assert not none.arms[""].jaw.fingers
-    assert none.arms[""].jaw.block is None
+    assert not none.arms[""].jaw.blocks
 
 
 def test_every_block_and_every_peg_of_a_board_is_drawn_where_it_stands(server):
@@ -383,7 +383,7 @@ def test_every_block_and_every_peg_of_a_board_is_drawn_where_it_stands(server):
     jaw = scene.arms[""].jaw
     board = view.arms[""].streams["slave/jaw/board"]
     assert board[0] == 1.0  # the first one stands on another peg
-    found = [jaw.blocks[i].position for i in sorted(jaw.blocks)]
+    found = [node.position for node in jaw.blocks]
     np.testing.assert_allclose(found, board[3:12].reshape(3, 3), atol=STILL)
     axes = [[x, y] for y in (-0.2357, -0.2757) for x in (0.231, 0.256, 0.281)]
     np.testing.assert_allclose([node.position[:2] for node in jaw.pegs], axes, atol=STILL)

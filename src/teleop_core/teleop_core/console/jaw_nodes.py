@@ -18,7 +18,8 @@ from teleop_core.kernels.geometry import Array, quaternion_products, rotations_f
 
 _THICK = 0.1  # of a finger, over its length
 _PEG = 0.2  # thickness of a peg, over that of an object
-_FIRST = 3  # column of slave/jaw/board, of the first object's x
+_FIRST = SLAVE_JAW_BOARD.columns.index("x0")  # of the middles of objects
+_DRAWN = ("finger_length", "object.size", "object.place", "pegs.place", "pegs.height")
 
 
 def finger_poses(tip: Array, angle: float, length: float) -> Array:
@@ -53,10 +54,10 @@ class JawNodes:
 
     def __init__(self, server: viser.ViserServer, path: str) -> None:
         self._server, self._path = server, path
-        self._length, self._size = 0.0, 0.0
+        self._values: dict[str, Setting] = {}
+        self._length = self._size = 0.0
         self.fingers: list[viser.BoxHandle] = []
-        self.block: viser.BoxHandle | None = None
-        self.blocks: dict[int, viser.BoxHandle] = {}
+        self.blocks: list[viser.BoxHandle] = []
         self.pegs: list[viser.BoxHandle] = []
 
     def retune(self, values: Mapping[str, Setting]) -> None:
@@ -65,60 +66,62 @@ class JawNodes:
         Args:
             values: By their names in the group ``jaw_sim``; none of a session without.
         """
-        length, size = values.get("finger_length"), values.get("object.size")
-        sizes = tuple(float(one) if isinstance(one, float) else 0.0 for one in (length, size))
-        if sizes == (self._length, self._size):
+        values = {name: values[name] for name in _DRAWN if name in values}
+        if values == self._values:
             return
-        blocks = [self.block] if self.block is not None else []
-        for node in (*self.fingers, *blocks, *self.blocks.values(), *self.pegs):
+        self._values = values
+        for node in (*self.fingers, *self.blocks, *self.pegs):
             node.remove()
-        self._length, self._size = sizes
-        self.fingers, self.block, self.blocks = [], None, {}
-        middles, height = _pegs(values, self._size)
-        self.pegs = [
-            self._server.scene.add_box(
-                f"{self._path}/peg{i}", color=ROLES["tool"], position=middle,
-                dimensions=(_PEG * self._size, _PEG * self._size, height),
-            )
-            for i, middle in enumerate(middles)
-        ]  # fmt: skip
+        self._length, self._size = (
+            float(one) if isinstance(one := values.get(name), float) else 0.0
+            for name in ("finger_length", "object.size")
+        )
+        self.fingers, self.blocks = [], []
+        thick, (middles, height) = _PEG * self._size, _pegs(values, self._size)
+        self.pegs = []
+        for middle in middles:
+            self._add(self.pegs, "peg", (thick, thick, height))
+            self.pegs[-1].position = middle
 
     def draw(self, tip: Array, view: ArmView) -> None:
-        """Draw the fingers at a tip (7,), and the object where it is told to be."""
+        """Draw the fingers at a tip (7,), and the objects where they are told to be."""
         state, place = view.get(SLAVE_JAW_MEASURED_JS), view.get(SLAVE_JAW_OBJECT_CP)
         if state is not None and self._length > 0.0:
-            if not self.fingers:
-                thick = _THICK * self._length
-                self.fingers = [
-                    self._server.scene.add_box(
-                        f"{self._path}/finger{i}", color=ROLES["tool"],
-                        dimensions=(thick, 2.0 * thick, self._length),
-                    )
-                    for i in range(2)
-                ]  # fmt: skip
-            for node, pose in zip(
-                self.fingers, finger_poses(tip, state[0], self._length), strict=True
-            ):
+            thick = _THICK * self._length
+            while len(self.fingers) < 2:
+                self._add(self.fingers, "finger", (thick, 2.0 * thick, self._length))
+            poses = finger_poses(tip, state[0], self._length)
+            for node, pose in zip(self.fingers, poses, strict=True):
                 move(node, pose)
         if place is not None and self._size > 0.0 and place[:3].any():  # zero: there is no object
-            if self.block is None:
-                self.block = self._box("object")
-            move(self.block, place)
-            self._draw_others(place, view.get(SLAVE_JAW_BOARD))
+            poses = _block_poses(place, view.get(SLAVE_JAW_BOARD))
+            while len(self.blocks) < len(poses):
+                self._add(self.blocks, "object", (self._size,) * 3)
+            for node, pose in zip(self.blocks, poses, strict=True):
+                move(node, pose)
 
-    def _draw_others(self, place: Array, board: Array | None) -> None:
-        """Draw the objects that do not move, upright; the one near ``place`` (7,) lies below it."""
-        middles = [] if board is None else [m for m in board[_FIRST:].reshape(-1, 3) if m.any()]
-        for i, middle in enumerate(middles if len(middles) > 1 else []):
-            if i not in self.blocks:
-                self.blocks[i] = self._box(f"object{i}")
-            is_moving = np.abs(middle - place[:3]).max() < 0.5 * self._size
-            move(self.blocks[i], place if is_moving else np.array([*middle, 1.0, 0.0, 0.0, 0.0]))
+    def _add(
+        self, nodes: list[viser.BoxHandle], name: str, size: tuple[float, float, float]
+    ) -> None:
+        color = TARGET if name == "object" else ROLES["tool"]
+        path = f"{self._path}/{name}{len(nodes)}"
+        nodes.append(self._server.scene.add_box(path, color=color, dimensions=size))
 
-    def _box(self, name: str) -> viser.BoxHandle:
-        return self._server.scene.add_box(
-            f"{self._path}/{name}", color=TARGET, dimensions=(self._size,) * 3
-        )
+
+def _block_poses(place: Array, board: Array | None) -> Array:
+    """Poses (N, 7) of all blocks, those at rest upright.
+
+    Args:
+        place: Pose (7,) of the one that moved last.
+        board: Columns of ``slave/jaw/board``, if it is told.
+    """
+    middles = np.empty((0, 3)) if board is None else board[_FIRST:].reshape(-1, 3)
+    middles = middles[middles.any(axis=1)]  # zero: there is no such block
+    if not len(middles):
+        return place[None]
+    poses = np.hstack((middles, np.tile([1.0, 0.0, 0.0, 0.0], (len(middles), 1))))
+    poses[np.square(middles - place[:3]).sum(axis=1).argmin()] = place
+    return poses
 
 
 def _pegs(values: Mapping[str, Setting], size: float) -> tuple[Array, float]:
