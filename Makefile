@@ -7,6 +7,8 @@ SECONDS_LIVE ?= 60
 # Keep DDS traffic on this machine; export another value to talk to other hosts.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
+# Compiled modules are kept: without them each start of a command or a node takes a second longer.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format docs docs-links bench bench-setup endurance fuzz mutants drill-mutants flaky clean
 
