@@ -190,6 +190,8 @@ CODE_MUTANTS = (
             "slave/operation/presses.py", "count > self._told", "count > self.lost", "presses"),
     _mutant("resume_early", "resume is taken while the arm moves", "slave/operation/states.py",
             "and s.is_moving:", "and s.is_moving > 1:", "operation_states"),
+    _mutant("loss_untold", "a verdict does not name lost messages", "evaluation/verdict.py",
+            'key.endswith(".gaps")', 'key.endswith(".lost")', "evaluation_graph"),
     # jaw
     _mutant("jaw_moves", "a stopped arm's jaw follows the hand", _JAW,
             " and row.slave_operation[_STATE] == _ENABLED", "", "jaw"),

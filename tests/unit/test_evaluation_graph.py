@@ -94,6 +94,13 @@ def test_gaps_of_a_topic_of_a_user_are_counted(recipe, path):
 
 
 @pytest.mark.usefixtures("_smoother")
+def test_a_recording_that_lacks_many_messages_is_told_so_first(recipe, path):
+    recipe.drop(SMOOTH_CP, range(100, 300))
+    verdict = evaluate(recipe.write(path)).verdict
+    assert "200 messages missing" in verdict.text
+
+
+@pytest.mark.usefixtures("_smoother")
 def test_only_a_stamp_that_is_passed_on_may_come_again_for_one_that_was_lost(recipe, path):
     stamps = recipe.stamps.copy()
     stamps[700] = stamps[699]

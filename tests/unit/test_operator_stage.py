@@ -125,6 +125,12 @@ def test_a_replay_of_the_hand_is_that_of_the_device_to_the_bit(recorded, begin):
         assert np.array_equal(again[topic].values, recorded[topic].values), topic
 
 
+def test_a_session_in_virtual_time_misses_no_message_of_what_is_sent_where_it_changes(recorded):
+    topics = recorded.score().topics
+    assert topics["hand/tremor"].gaps is None
+    assert not sum(topic.gaps or 0 for topic in topics.values())
+
+
 def test_a_replayed_hand_feels_another_fixture(recorded):
     loose = tc.replay(recorded, begin="hand", device__friction=0.0)
     assert np.array_equal(loose["hand/servo_cp"].values, recorded["hand/servo_cp"].values)

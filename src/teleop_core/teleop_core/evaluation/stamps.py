@@ -9,20 +9,24 @@ from teleop_core.graph.topics import NO_COMMAND_NS, Topic
 
 
 class StampTally:
-    """Accumulator of the steps between the stamps of one topic."""
+    """Accumulator of the steps between the stamps of one topic.
+
+    Attributes:
+        topic: The topic.
+    """
 
     def __init__(self, topic: Topic) -> None:
-        self._topic, self._steps = topic, Distribution()
+        self.topic, self._steps = topic, Distribution()
         self._repeats = 0
 
     def add(self, window: Window) -> None:
         """Take the topic's samples of a window."""
-        own = window.own(self._topic)
+        own = window.own(self.topic)
         if own.stop > own.start:
-            stamps = window.series[self._topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
+            stamps = window.series[self.topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
             # Before the first command a slave holds its pose under this stamp; 0 in old recordings.
             steps = np.diff(stamps)[stamps[:-1] > NO_COMMAND_NS]
-            if self._topic.stamp.of:
+            if self.topic.stamp.of:
                 self._repeats += int((steps == 0).sum())
             self._steps.add(steps[steps > 0])
 

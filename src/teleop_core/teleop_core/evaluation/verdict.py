@@ -109,7 +109,7 @@ def _messages(values: Values) -> Iterator[Concern]:
     """Lost messages, of all topics."""
     missing = sum(
         int(value) for key, value in values.items()
-        if key.startswith("topics.") and key.endswith(".missing") and isinstance(value, int | float)
+        if key.startswith("topics.") and key.endswith(".gaps") and isinstance(value, int | float)
     )  # fmt: skip
     count = sum(
         int(value) for key, value in values.items()

@@ -117,7 +117,7 @@ class TopicsMetric(Metric):
         Key("topics.<name>.count", "1", "messages"),
         Key("topics.<name>.gaps", "1",
             "messages missing by their stamps, lost or passed over by a stage that takes only the "
-            "newest; null if not a stream"),
+            "newest; null if not a stream, or one that is sent where it changes"),
     )  # fmt: skip
 
     def __init__(self, context: Context) -> None:
@@ -128,11 +128,14 @@ class TopicsMetric(Metric):
 
     def values(self) -> dict[str, TopicScore]:
         """Score of each topic, in the order of their names."""
-        stamps = self._stamps.of
         return {
-            name: TopicScore(info.count, stamps[name].gaps() if name in stamps else None)
+            name: TopicScore(info.count, self._gaps(name))
             for name, info in sorted(self._infos.items())
         }
+
+    def _gaps(self, name: str) -> int | None:
+        tally = self._stamps.of.get(name)
+        return None if tally is None or tally.topic.is_seldom else tally.gaps()
 
     def rows(self) -> list[Row]:
         """Sums over all topics."""
