@@ -1,6 +1,7 @@
 """Every example runs as a user runs it, and says what it claims."""
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -104,6 +105,16 @@ def test_a_block_is_carried_where_the_fingers_hold_it_and_lost_where_they_do_not
     assert ways[2] == pytest.approx(0.0, abs=0.5)  # 2 x 0.05 x 3.86 N < 0.49 N, its weight
     assert slips[2] == 1
     assert max(force) < 5.0
+
+
+def test_blocks_go_from_peg_to_peg_where_hand_hole_and_fingers_let_them(tmp_path):
+    text = run("peg_transfer", tmp_path)
+    rows = [row.split("  ") for row in text.replace("-", "0").splitlines()[1:]]
+    rows = [[float(cell) for cell in row[1:] if cell.strip()] for row in rows]
+    assert [row[:2] for row in rows] == [[3, 0], [0, 0], [2, 1], [0, 0]]
+    pull = math.sqrt(3.86**2 - (0.05 * 9.81) ** 2)  # of a block of 50 g that slides; µ is 0.5
+    assert [row[3] for row in rows] == pytest.approx([0, pull, pull, 0], abs=0.05)
+    assert [row[4] for row in rows] == [0, 3, 0, 3]
 
 
 def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path):
