@@ -39,7 +39,7 @@ def ways(recording, kind):
     return depths, out, force[["fx", "fy", "fz"]][after]
 
 
-@pytest.mark.parametrize("kind", FIXTURES.names())
+@pytest.mark.parametrize("kind", [name for name in FIXTURES if "mesh" not in name])
 def test_every_fixture_holds_the_hand_and_is_scored(kind):
     recording = session(kind)
     score = recording.score()

@@ -291,7 +291,7 @@ TURNED = {
 }
 
 
-@pytest.mark.parametrize("kind", FIXTURES.names())
+@pytest.mark.parametrize("kind", [name for name in FIXTURES if "mesh" not in name])
 def test_outlines_are_those_of_the_fixtures_with_their_parameters(kind):
     part, values, gain = FIXTURES.find(kind), TURNED.get(kind, {}), 0.2
     parameters = part.parameters(**values)

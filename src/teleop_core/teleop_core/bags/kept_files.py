@@ -2,11 +2,11 @@
 
 A recording holds the text of a robot's file (a URDF, a table of links) under ``robot_file`` beside
 ``robot``. All other files stand there by their digests: a mesh or field of heights that is touched
-under ``mesh_file`` beside ``mesh``, drives of a URDF under ``drives_file`` beside ``drives``, the
-meshes that a robot's links look like under ``robot_meshes``, in a line of digest and name each.
-Under each digest are the packed bytes, once for all arms, as long as there is room for them. Where
-a file is gone or says something else by now, what was recorded is written to a temporary folder and
-takes its place.
+under ``mesh_file`` beside ``mesh``, the mesh of a fixture under ``fixture_mesh_file``, drives of a
+URDF under ``drives_file``, the meshes that a robot's links look like under ``robot_meshes``, in a
+line of digest and name each. Under each digest are the packed bytes, once for all arms, as long as
+there is room for them. Where a file is gone or says something else by now, what was recorded is
+written to a temporary folder and takes its place.
 """
 
 import base64
@@ -24,7 +24,8 @@ from teleop_core.robots.parts import DESCRIPTION, arguments_of, file_of
 from teleop_core.robots.visuals import kept_mesh, meshes_of
 from teleop_core.robots.xacro_files import EXPANDED, xml_of
 
-_ROBOT, _MESH, _DRIVES, _FILE, _MESHES = "robot", "mesh", "drives", "_file", "_meshes"
+TOUCHED, FIXTURE = "mesh", "fixture_mesh"
+_ROBOT, _DRIVES, _FILE, _MESHES = "robot", "drives", "_file", "_meshes"
 _PACKED, _DIGEST = "zlib, base64: ", "sha256:"
 _LEVEL = 4  # 27 MB of meshes of an arm take 0.4 s; at 6 they take 1.5 s, and 5 % less room
 _MOST = 2**25
@@ -38,14 +39,15 @@ class KeptFiles:
         self._texts: dict[str, str] = {}
         self._room, self._left_out = _MOST, dict[str, Path]()
 
-    def add_mesh(self, name: str, prefix: str = "") -> None:
-        """Add a mesh or field of heights that is touched; one that cannot be read is none.
+    def add_mesh(self, name: str, prefix: str = "", kind: str = TOUCHED) -> None:
+        """Add a mesh, or a field of heights; one that cannot be read is none.
 
         Args:
             name: Its path.
             prefix: What stands before the names of its arm.
+            kind: Whether it is :data:`TOUCHED` or a :data:`FIXTURE`.
         """
-        self._name(f"{prefix}{_MESH}", name)
+        self._name(f"{prefix}{kind}", name)
 
     def add_robot(self, name: str, settings: Iterable[str] = (), prefix: str = "") -> None:
         """Add the text of a robot's file, if it has one, its drives and the meshes of its links.
@@ -118,7 +120,7 @@ def recorded_files(metadata: Mapping[str, str], arm: str = "") -> dict[str, str]
         recorded, which is there until the program ends.
     """
     prefix, found = f"{arm}/" if arm else "", {}
-    for kind in (_MESH, _DRIVES):
+    for kind in (TOUCHED, FIXTURE, _DRIVES):
         name, digest = (metadata.get(f"{prefix}{kind}{end}", "") for end in ("", _FILE))
         if not (name and digest):
             continue

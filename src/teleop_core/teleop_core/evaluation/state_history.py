@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.bags.kept_files import recorded_files
 from teleop_core.bags.messages import Report
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import EvaluationError
@@ -109,10 +110,11 @@ def read_history(bag: Bag) -> StateHistory:
     fixtures: dict[ReportedFixture, int] = {}
     which: list[int] = []
     wrong: list[EvaluationError] = []
+    files = recorded_files(bag.metadata)
     for report in bag.reports(TELEOP_STATE) if info is not None and info.count else ():
         try:
             row = _row(bag, report)
-            fixture = reported_fixture(report.values, row[_SIZE])
+            fixture = reported_fixture(report.values, row[_SIZE], files)
         except EvaluationError as error:
             wrong.append(error)
             continue

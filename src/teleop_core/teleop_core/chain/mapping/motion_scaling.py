@@ -85,7 +85,6 @@ from teleop_core.kernels.geometry import (
     rotate_by_vector,
     turn_within,
 )
-from teleop_core.kernels.parts import numbers_of
 
 
 class ScalingNumbers(WallNumbers, ReflectionNumbers, PlausibilityNumbers, FollowingNumbers):
@@ -431,7 +430,8 @@ class MotionScaling(RunningStage):
         self.parameters["reach_depth"] = depth
 
     def _take_fixture(self, fixture: FixtureParameters) -> None:
-        kind, numbers = FIXTURES.find(fixture.kind.kind), numbers_of(fixture.kind.parameters)
+        kind = FIXTURES.find(fixture.kind.kind)
+        numbers = kind.numbers(fixture.kind.parameters)
         self.parameters["size"] = kind.size(fixture.kind.parameters)
         depth = kind.depth_pointer
         if depth is self._shape.depth and len(numbers) == len(self._shape.numbers):

@@ -53,6 +53,7 @@ class GridRequest(NamedTuple):
         angles: Of a mesh [rad]; empty for a field of heights.
         step: Between nodes of the grid [m].
         kind: Name of the object.
+        group: Of the parameters that say so.
     """
 
     file: str
@@ -60,11 +61,12 @@ class GridRequest(NamedTuple):
     angles: tuple[float, ...]
     step: float
     kind: str = "mesh"
+    group: str = "world.mesh"
 
     def error(self, name: str, value: object, text: str) -> ParameterError:
         """What is said of the file, ``scale`` or ``step``, by the parameter of the object."""
         is_spacing = name == "scale" and self.kind != "mesh"
-        full = f"world.{self.kind}.{'spacing' if is_spacing else name}"
+        full = f"{self.group}.{'spacing' if is_spacing else name}"
         return ParameterError(full, value, text)
 
 
@@ -96,7 +98,7 @@ def distance_grid(request: GridRequest) -> DistanceGrid:
         what = "a mesh, such as an STL or OBJ" if request.kind == "mesh" else "heights, CSV or .npy"
         text = f"a file with {what} ({error.strerror})"
         raise request.error("file", request.file, text) from error
-    about = (_MADE, path.suffix.lower(), *map(repr, request[1:]))
+    about = (_MADE, path.suffix.lower(), *map(repr, request[1:5]))
     return _found(hashlib.sha256("\n".join(about).encode() + data).hexdigest(), request)
 
 

@@ -26,7 +26,9 @@ class HeightFieldParameters:
 
 
 def _grid(p: HeightFieldParameters) -> DistanceGrid:
-    return distance_grid(GridRequest(p.file, p.spacing, (), p.step, "height_field"))
+    return distance_grid(
+        GridRequest(p.file, p.spacing, (), p.step, "height_field", "world.height_field")
+    )
 
 
 def height_field_numbers(parameters: HeightFieldParameters) -> Array:
