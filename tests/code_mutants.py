@@ -66,7 +66,7 @@ CODE_MUTANTS = (
             "fixtures"),
     _mutant("side_leaves", "a place beyond a fixture is drawn in half-way", _SIDE,
             "place[i] -= fixture.out[i]", "place[i] -= 0.5 * fixture.out[i]", "fixture_side"),
-    _mutant("side_thrown", "the slave jumps to where the hand came through a forbidden body", _SIDE,
+    _mutant("side_thrown", "the slave runs after a hand that came through a forbidden body", _SIDE,
             "if is_free and _distance(aim, last) > most + _ROUNDING:", "if False:",
             "fixture_side"),
     _mutant("side_jumps", "the slave jumps to the nearest place, however far it is", _SIDE,

@@ -51,6 +51,11 @@ class FixtureParameters:
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )  # fmt: skip
 
+    @property
+    def pushes(self) -> bool:
+        """Whether the hand can feel it."""
+        return self.side != "slave" and self.max_force > 0.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class ReachForceParameters:
