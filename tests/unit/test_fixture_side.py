@@ -242,6 +242,18 @@ def test_a_slave_that_went_its_own_way_is_led_from_there_without_a_step(side):
 
 
 @HELD
+def test_tremor_that_is_left_out_of_the_pose_moves_no_slave(side):
+    rng, desk = np.random.default_rng(8), HeldDesk(fixture(side))
+    for i in range(300):
+        desk.hold("clutch", is_held=i % 50 > 40)
+        desk.row["master_filtered_out"] = rng.normal(scale=1 * MM, size=3)
+        before = desk.sent
+        assert desk.go(rng.normal(scale=3 * MM, size=3) if i % 3 else (0, 0, 0)) <= ROUNDING
+        if i % 3 == 0 or i % 50 > 40:
+            assert np.array_equal(desk.sent, before)
+
+
+@HELD
 def test_after_a_pause_of_the_master_the_slave_stays_where_it_is(side):
     desk = HeldDesk(fixture(side))
     desk.go((18 * MM, 0, 0))
