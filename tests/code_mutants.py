@@ -30,6 +30,7 @@ def _mutant(
 _BUTTON = "slave/world/button.py"
 _CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
 _SCALING, _LINK = "chain/mapping/motion_scaling.py", "chain/network/link.py"
+_SIDE = "chain/mapping/side.py"
 _TDPA, _CENTRE = "chain/passivity/tdpa.py", "chain/fixtures/remote_centre.py"
 _CENTRE_SCORE, _TOUCH = "evaluation/metrics/remote_centre.py", "evaluation/metrics/touch.py"
 _JAW, _JAW_SCORE = "slave/jaw/jaw.py", "evaluation/metrics/jaw.py"
@@ -71,6 +72,21 @@ CODE_MUTANTS = (
     _mutant("mesh_gone", "a fixture's mesh is scored by the file of today",
             "chain/fixtures/reported_fixture.py", "moved.get(text, text)", "text",
             "fixture_meshes"),
+    _mutant("side_leaves", "a place beyond a fixture is drawn in half-way", _SIDE,
+            "place[i] -= fixture.out[i]", "place[i] -= 0.5 * fixture.out[i]", "fixture_side"),
+    _mutant("side_thrown", "the slave runs after a hand that came through a forbidden body", _SIDE,
+            "if is_free and _distance(aim, last) > most + _ROUNDING:", "if False:",
+            "fixture_side"),
+    _mutant("side_jumps", "the slave jumps to the nearest place, however far it is", _SIDE,
+            "if not _draw_in(fixture, aim) or _distance(aim, last) > most + _ROUNDING:",
+            "if not _draw_in(fixture, aim):", "fixture_side"),
+    _mutant("side_forgets", "a hand that comes back moves the slave before it is inside", _SIDE,
+            "s.beyond[i] = hand[i] - aim[i]", "s.beyond[i] = 0.0", "fixture_side"),
+    _mutant("side_all", "the hand feels a fixture of the slave alone", _SCALING,
+            "if s.is_fixture_on and p.holds_hand:", "if s.is_fixture_on:", "fixture_side"),
+    _mutant("side_slips", "the fixture is reported beyond where it holds the slave", _SCALING,
+            "s.center[i] - s.master[i] + s.beyond[i]", "s.center[i] - s.master[i]",
+            "fixture_side"),
     _mutant("unit_lost", "commanded turns drift off unit length", _SCALING,
             "s.command[i] *= 1.5 - 0.5 * square", "s.command[i] *= 1.0", "motion_scaling"),
     _mutant("wild_hand", "the sample after a wild one is compared with it",

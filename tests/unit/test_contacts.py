@@ -216,7 +216,9 @@ def test_walls_within_what_is_passive_are_not_told(stiffness, delay):
 @pytest.mark.parametrize("wall", ["source", "soft", "step"])
 def test_a_wall_without_damping_is_told_whatever_its_stiffness(wall):
     assert "it is not damped" in passive_note(DEVICE, FixtureParameters(wall=wall), 0.0)
-    assert not passive_note(DEVICE, FixtureParameters(wall=wall, max_force=0.0), 0.0)
+    for silent in ({"max_force": 0.0}, {"side": "slave"}):  # the hand feels nothing
+        assert not passive_note(DEVICE, FixtureParameters(wall=wall, **silent), 0.0)
+        assert not rendered_note(DEVICE, FixtureParameters(wall=wall, **silent))
 
 
 def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothing_by_much_damping():

@@ -16,10 +16,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from any_fixture import KINDS, found, places
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.fixtures import FIXTURES
-from teleop_core.chain.fixtures.box import BoxParameters
 from teleop_core.chain.fixtures.cone import ConeParameters
 from teleop_core.chain.fixtures.cylinder import CylinderParameters
 from teleop_core.chain.fixtures.half_space import HalfSpaceParameters
@@ -27,7 +27,6 @@ from teleop_core.chain.fixtures.keep_out_box import KeepOutBoxParameters
 from teleop_core.chain.fixtures.keep_out_sphere import KeepOutSphereParameters
 from teleop_core.chain.fixtures.line import LineParameters
 from teleop_core.chain.fixtures.path import PathParameters, path_depth
-from teleop_core.chain.fixtures.sphere import SphereParameters
 from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.kernels.parts import numbers_of
 
@@ -38,47 +37,6 @@ TURNED = 1e-12
 # Shallower places are not compared with points around them [m].
 SHALLOW = 1e-6
 PER_PIECE = 2001
-
-lengths = st.floats(1e-3, 0.1)
-places = st.tuples(*[st.floats(-0.1, 0.1)] * 3)
-directions = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 1e-3)
-sizes = st.tuples(lengths, lengths, lengths)
-endings = st.one_of(st.just(0.0), lengths)
-
-
-def valid(group, **values):
-    """Groups of parameters, those that do not fit together left out."""
-
-    def make(chosen):
-        try:
-            return group(**chosen)
-        except ParameterError:
-            return None
-
-    return st.fixed_dictionaries(values).map(make).filter(lambda made: made is not None)
-
-
-KINDS = {
-    "box": valid(BoxParameters, size=sizes),
-    "sphere": valid(SphereParameters, diameter=lengths),
-    "cylinder": valid(CylinderParameters, diameter=lengths, length=endings, direction=directions),
-    "half_space": valid(HalfSpaceParameters, normal=directions, room=st.floats(0.0, 0.1)),
-    "cone": st.builds(
-        lambda axis, far, half: ConeParameters(
-            axis=axis, half_angle=half, apex=tuple(-far * x / math.hypot(*axis) for x in axis)
-        ),
-        directions, lengths, st.floats(0.05, 1.5),
-    ),
-    "line": valid(
-        LineParameters, direction=directions, tolerance=st.floats(0.0, 0.02), length=endings
-    ),
-    "path": valid(
-        PathParameters, tolerance=st.floats(0.0, 0.02),
-        points=st.lists(places, min_size=1, max_size=5).map(lambda rows: sum(rows, ())),
-    ),
-    "keep_out_sphere": valid(KeepOutSphereParameters, place=places, diameter=lengths),
-    "keep_out_box": valid(KeepOutBoxParameters, place=places, size=sizes),
-}  # fmt: skip
 
 
 # What is allowed, said a second time: how far beyond it a point (..., 3) is, by some measure [m].
@@ -159,13 +117,6 @@ def a_place(data, parameters):
         return offset
     size = getattr(parameters, "size", None) or (parameters.diameter,) * 3
     return np.array(parameters.place) + 5.5 * offset * size  # a tenth more than it is wide
-
-
-def found(name, parameters, offset):
-    """Depth and way of a fixture at a place (3,)."""
-    out = np.full(3, math.nan)
-    depth = FIXTURES.find(name).depth(np.array(offset, dtype=float), numbers_of(parameters), out)
-    return depth, out
 
 
 def test_every_fixture_there_is_is_tried_here():

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.limits import SENT
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, ReachForceParameters
+from teleop_core.chain.mapping.parameters import (
+    FixtureParameters,
+    MotionScalingParameters,
+    ReachForceParameters,
+)
 from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.graph.topics import SLAVE_REACH, Limit
 
@@ -146,3 +151,23 @@ def test_the_clutch_leaves_the_limit():
     arm.step(0)
     assert arm.state("limit") == Limit.NONE
     assert not arm.row["master_servo_cf"].any()
+
+
+@pytest.mark.parametrize("delay", [1, 20])
+@pytest.mark.parametrize("side", ["slave", "both"])
+@pytest.mark.parametrize("half", [4e-3, 6e-3])
+def test_where_a_fixture_holds_the_slave_too_the_nearer_of_wall_and_limit_stops_it(
+    half, side, delay
+):
+    box = {"side": side, "box.size": (2.0 * half,) * 3}
+    arm = Arm(delay, fixture=build(FixtureParameters, box))
+    for pressed in (1.0, 0.0):
+        arm.row["master_buttons"][1] = pressed
+        arm.step(0)
+    for count in [1] * 80 + [-1] * 200:
+        arm.step(count)
+        # The middle is reported to a nanometre.
+        assert abs(arm.x - arm.state("fixture_center_x")) <= half + 1e-9
+        assert arm.x <= min(half, WALL + (delay + 2) * STEP) + ROUNDING
+        if half < WALL:
+            assert arm.state("limit") == Limit.NONE

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from scaling_desk import ANY_HAND, HOME, MM, Desk
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.motion_scaling import (
@@ -13,78 +14,19 @@ from teleop_core.chain.mapping.motion_scaling import (
     to_slave_axes,
 )
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.chain.mapping.plausibility import PlausibilityParameters
 from teleop_core.chain.master.haptic_master import REST_POSITION, REST_TILT
-from teleop_core.graph.signals import STATE, TICK_NS
+from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import (
-    pose_from_transform,
     quaternion_from_rotation,
     rotation,
     rotation_from_quaternion,
-    transform,
 )
-from teleop_core.robots import load_robot
 
-ANY_HAND = PlausibilityParameters(
-    speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0
-)
-"""A hand that may jump, as tests have it do."""
-
-DEGREE, MM = math.pi / 180.0, 1e-3
+DEGREE = math.pi / 180.0
 # Sums and products of a few numbers of size one.
 ROUNDING = 1e-14
 # Box centres are reported to a nanometre.
 NANOMETRE = 1e-9
-HOME = load_robot("rcrt1").fk(load_robot("rcrt1").home)
-
-
-class Desk:
-    """Motion scaling with a hand to move and a slave that stands where it was told to."""
-
-    def __init__(self, **values):
-        self.scaling = MotionScaling(MotionScalingParameters(**{"plausible": ANY_HAND} | values))
-        self.row = self.scaling.signals
-        self.hand, self.turn = np.array(REST_POSITION), np.eye(3)
-        self.pressed = np.zeros(3)
-        self.row["master_measured_cp_ns"] = self.row["slave_setpoint_cp_ns"] = TICK_NS
-        pose_from_transform(HOME, self.row["slave_setpoint_cp"])
-
-    def step(self, move=(0, 0, 0), turn=None, *, stamp_step_ns=TICK_NS, does_follow=True):
-        """One sample after the hand's step [m]; returns the slave command's place."""
-        row, self.hand = self.row, self.hand + np.asarray(move, dtype=float)
-        self.turn = self.turn if turn is None else turn @ self.turn
-        row["master_measured_cp_ns"] += stamp_step_ns
-        pose_from_transform(transform(self.turn, self.hand), row["master_measured_cp"])
-        row["master_buttons"] = self.pressed
-        self.scaling.step()
-        if does_follow:
-            row["slave_setpoint_cp"] = row["slave_servo_cp"]
-            row["slave_setpoint_cp_ns"] = row["master_measured_cp_ns"]
-        return row["slave_servo_cp"][:3].copy()
-
-    def press(self, button):
-        """Sample with a button pressed, then one with it released; the hand rests."""
-        index = ("clutch", "fixture", "mode").index(button)
-        self.pressed[index] = 1.0
-        self.step()
-        self.pressed[index] = 0.0
-        return self.step()
-
-    def hold(self, button, is_held=True):
-        self.pressed[("clutch", "fixture", "mode").index(button)] = float(is_held)
-
-    def attitude(self):
-        out = np.empty((3, 3))
-        rotation_from_quaternion(np.ascontiguousarray(self.row["slave_servo_cp"][3:]), out)
-        return out
-
-    def state(self, name):
-        return self.row["teleop_state"][STATE[name]]
-
-    def box(self):
-        start, size = STATE["fixture_center_x"], STATE["fixture_size_x"]
-        state = self.row["teleop_state"]
-        return state[start : start + 3].copy(), state[size : size + 3].copy()
 
 
 def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of_it():

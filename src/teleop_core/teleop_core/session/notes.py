@@ -93,7 +93,7 @@ def passive_note(device: DeviceParameters, fixture: FixtureParameters, delay: fl
     stiffness = wall.spring(fixture.stiffness, fixture.max_force)
     damping = fixture.damping if wall.is_damped else 0.0
     most = passive_stiffness(damping, DT, delay, device.friction, device.position_resolution)
-    if stiffness <= most * (1.0 + 1e-9) or fixture.max_force == 0.0:
+    if stiffness <= most * (1.0 + 1e-9) or not fixture.pushes:
         return ""
     until = (
         f"with {1e3 * (DT + delay):.3g} ms from sample to force it is passive up to {most:.0f} N/m"
@@ -113,7 +113,7 @@ def rendered_note(device: DeviceParameters, fixture: FixtureParameters) -> str:
     """
     stiffness = WALLS[fixture.wall].spring(fixture.stiffness, fixture.max_force)
     soft = [i for i in range(3) if stiffness > device.stiffness[i]]
-    if not soft or fixture.max_force == 0.0:
+    if not soft or not fixture.pushes:
         return ""
     felt = [1.0 / (1.0 / stiffness + 1.0 / device.stiffness[i]) for i in soft]
     axes, own, both = (

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
@@ -50,6 +50,13 @@ from teleop_core.chain.mapping.reflection import (
     make_law,
     reflect,
 )
+from teleop_core.chain.mapping.side import (
+    Shape,
+    SideNumbers,
+    SideState,
+    hold_slave,
+    let_go,
+)
 from teleop_core.chain.mapping.walls import (
     WALLS,
     WallNumbers,
@@ -87,7 +94,9 @@ from teleop_core.kernels.geometry import (
 )
 
 
-class ScalingNumbers(WallNumbers, ReflectionNumbers, PlausibilityNumbers, FollowingNumbers):
+class ScalingNumbers(
+    WallNumbers, SideNumbers, ReflectionNumbers, PlausibilityNumbers, FollowingNumbers
+):
     """Parameter record of the motion scaling."""
 
     gain: Annotated[Array, 2]  # coarse, fine
@@ -101,15 +110,15 @@ class ScalingNumbers(WallNumbers, ReflectionNumbers, PlausibilityNumbers, Follow
     reach_depth: float  # [m]
 
 
-class ScalingState(LimitState, WallState, PlausibilityState, ReflectionState, FollowingState):
+class ScalingState(
+    LimitState, WallState, SideState, PlausibilityState, ReflectionState, FollowingState
+):
     """State record of the motion scaling."""
 
     buttons: Vector3
     is_fine: int
     must_latch: int
     is_fixture_on: int
-    center: Vector3  # of the fixture [m]
-    master: Vector3
     stylus: Vector3
     aligned: int
 
@@ -166,7 +175,7 @@ def _toggle_fixture(s: ScalingState, buttons: Array, position: Array) -> None:
     if buttons[1] > s.buttons[1]:
         s.is_fixture_on = 1 - s.is_fixture_on
         for i in range(3):
-            s.center[i] = position[i]
+            s.center[i], s.beyond[i] = position[i], 0.0
 
 
 @inner
@@ -183,11 +192,17 @@ def _latch(s: ScalingState, stylus: Array) -> None:
 
 
 @inner
-def _move(p: ScalingNumbers, s: ScalingState, gain: float, position: Array, turn: Array) -> None:
+def _move(
+    p: ScalingNumbers, s: ScalingState, fixture: Shape, gain: float, position: Array, turn: Array
+) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
     step = np.empty(3)
     for i in range(3):
         step[i] = position[i] - s.master[i]
+    if s.is_fixture_on and p.holds_slave:
+        hold_slave(s, fixture, step)
+    else:
+        let_go(s)
     to_slave_axes(p, step, step)
     for i in range(3):
         s.command[i] += gain * step[i]
@@ -207,11 +222,11 @@ def _move(p: ScalingNumbers, s: ScalingState, gain: float, position: Array, turn
 
 @inner
 def _wall(
-    p: ScalingNumbers, s: ScalingState, fixture: "Shape", period: float, stylus: Array, force: Array
+    p: ScalingNumbers, s: ScalingState, fixture: Shape, period: float, stylus: Array, force: Array
 ) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
     length = 0.0
-    if s.is_fixture_on:
+    if s.is_fixture_on and p.holds_hand:
         for i in range(3):
             fixture.offset[i] = stylus[i] - s.center[i]
         length = fixture.depth(fixture.offset, fixture.numbers, fixture.out)
@@ -245,7 +260,7 @@ def _report(p: ScalingNumbers, s: ScalingState, gain: float, is_following: bool,
     if s.is_fixture_on:
         offset = np.empty(3)
         for i in range(3):
-            offset[i] = s.center[i] - s.master[i]
+            offset[i] = s.center[i] - s.master[i] + s.beyond[i]
         to_slave_axes(p, offset, offset)
         for i in range(3):
             # Rounded to a nanometre: a fixture that stands still reports no change.
@@ -285,7 +300,7 @@ def motion_scaling_step(
     p: ScalingNumbers,
     s: ScalingState,
     sent: Sequence[Sent],
-    fixture: "Shape",
+    fixture: Shape,
     law: Law,
     row: Row,
     dt: float,
@@ -306,7 +321,8 @@ def motion_scaling_step(
     slave is engaged anew. While clutched the command is held; while the slave does not follow it
     is the slave's own setpoint. What the arm cannot reach is cut off, and motion goes on from
     there: see :mod:`teleop_core.chain.mapping.limits`. The slave is led by the pose, which a tremor
-    filter may have made late; what pushes the hand goes by the stylus, tremor and all.
+    filter may have made late; what pushes the hand goes by the stylus, tremor and all. A fixture
+    that holds the slave cuts the steps of the command: see :mod:`teleop_core.chain.mapping.side`.
 
     Source:
         Vongbunyong 2008, sections 6.2-6.3.
@@ -337,7 +353,7 @@ def motion_scaling_step(
     if s.must_latch or clutch > 0.0 or s.buttons[0] > 0.0:
         _latch(s, stylus)
     else:
-        _move(p, s, gain, pose, turn)
+        _move(p, s, fixture, gain, pose, turn)
         measure_depth(s, p.reach_depth, row.master_measured_cp_ns)
     _toggle_fixture(s, buttons, stylus)
     s.is_engaged, s.must_latch = 1, 0
@@ -353,15 +369,6 @@ def motion_scaling_step(
     for i in range(7):
         row.slave_servo_cp[i] = s.command[i]
     _report(p, s, gain, is_following, row)
-
-
-class Shape(NamedTuple):
-    """The fixture's depth, its numbers, and room to work in."""
-
-    depth: Any
-    numbers: Array
-    offset: Array
-    out: Array
 
 
 class MotionScaling(RunningStage):
@@ -432,7 +439,12 @@ class MotionScaling(RunningStage):
     def _take_fixture(self, fixture: FixtureParameters) -> None:
         kind = FIXTURES.find(fixture.kind.kind)
         numbers = kind.numbers(fixture.kind.parameters)
-        self.parameters["size"] = kind.size(fixture.kind.parameters)
+        p, s = self.parameters, self.state
+        p["size"] = kind.size(fixture.kind.parameters)
+        p["holds_hand"], p["holds_slave"] = fixture.side != "slave", fixture.side != "hand"
+        if fixture.kind != self._values.fixture.kind:  # the new one begins where the slave is
+            s["center"] += s["beyond"]
+            s["beyond"] = 0.0
         depth = kind.depth_pointer
         if depth is self._shape.depth and len(numbers) == len(self._shape.numbers):
             self._shape.numbers[:] = numbers  # the tick that is composed already goes on

@@ -10,6 +10,7 @@ from teleop_core.base.parameters import Choice, choice, parameter
 from teleop_core.chain.architectures import ARCHITECTURES
 from teleop_core.chain.fixtures import FIXTURES
 from teleop_core.chain.mapping.plausibility import PlausibilityParameters
+from teleop_core.chain.mapping.side import SIDES
 from teleop_core.chain.mapping.walls import WALLS
 from teleop_core.chain.passivity import PASSIVITIES
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation
@@ -24,6 +25,11 @@ class FixtureParameters:
     """What the fixture button puts around the hand."""
 
     kind: Choice = choice(FIXTURES, "box", doc="shape of the fixture")
+    side: str = parameter(
+        "hand", choices=SIDES,
+        doc="whom it holds: hand: it pushes the hand, and the slave goes where that goes; slave: "
+        "the slave's command stays inside, and the hand feels nothing of it; both: both",
+    )  # fmt: skip
     wall: str = parameter(
         "damped", choices=tuple(WALLS),
         doc="damped: spring and damper up to max_force, passive if soft enough (up to 1000 N/m); "
@@ -44,6 +50,11 @@ class FixtureParameters:
         3.3, unit="N", lower=0.0, upper=10.0, doc="largest push; the device limits it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )  # fmt: skip
+
+    @property
+    def pushes(self) -> bool:
+        """Whether the hand can feel it."""
+        return self.side != "slave" and self.max_force > 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

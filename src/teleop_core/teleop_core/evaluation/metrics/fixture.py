@@ -52,7 +52,7 @@ class FixtureScore:
     )
     penetration_rms_mm: float | None = figure("mm", "root mean square of it, zero inside")
     hand_penetration_max_mm: float | None = figure(
-        "mm", "largest distance of the hand from its fixture"
+        "mm", "largest distance of the hand from its fixture, by the command; 0 if held inside"
     )
     kind: str | None = figure("1", "kinds of fixture that were on; null if none was")
     unscored: str | None = figure(
