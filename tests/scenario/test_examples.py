@@ -117,6 +117,17 @@ def test_blocks_go_from_peg_to_peg_where_hand_hole_and_fingers_let_them(tmp_path
     assert [row[4] for row in rows] == [0, 3, 0, 3]
 
 
+def test_shapes_made_of_others_hold_the_hand_and_better_still_the_slave(tmp_path):
+    text = run("combined_fixtures", tmp_path)
+    assert re.findall(r"^(\w+) +(\w+)", text, re.MULTILINE) == [
+        ("union", "hand"), ("union", "both"), ("intersection", "hand"), ("intersection", "both"),
+    ]  # fmt: skip
+    hand, both, inside, inside_both = numbers(r"slave ([\d.]+) mm", text)
+    assert both < 0.5 * hand
+    assert inside_both < 0.5 * inside
+    assert all(0.1 < push < 3.3 for push in numbers(r"push ([\d.]+) N", text))
+
+
 def test_an_operator_who_sees_is_slowed_down_by_what_it_sees_late(tmp_path):
     at_once, late, later = numbers(r"([\d.]+) s to the goal", run("own_operator", tmp_path))
     # exp(-2 t) takes 29 mm to half a millimetre in 2.0 s; the device's friction makes it uneven.

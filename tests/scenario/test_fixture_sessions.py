@@ -5,7 +5,6 @@ import pytest
 
 import teleop_core as tc
 from teleop_core.chain.fixtures import FIXTURES
-from teleop_core.kernels.parts import numbers_of
 
 SECONDS = 10.0
 # The simulated person of the scenario goes up from there: a ceiling holds that hand, no floor.
@@ -34,7 +33,7 @@ def ways(recording, kind):
     offsets = np.ascontiguousarray(offsets - offsets[0])
     part, out = FIXTURES.find(kind), np.empty((len(offsets), 3))
     numbers = {name.rpartition("__")[2]: v for name, v in SETTINGS.get(kind, {}).items()}
-    shape = numbers_of(part.parameters(**numbers))
+    shape = part.numbers(part.parameters(**numbers))
     depths = np.array([part.depth(o, shape, row) for o, row in zip(offsets, out, strict=True)])
     return depths, out, force[["fx", "fy", "fz"]][after]
 

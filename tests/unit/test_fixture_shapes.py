@@ -5,7 +5,6 @@ or by points close together along a path.
 """
 
 import hashlib
-import itertools
 import math
 import os
 import subprocess
@@ -16,7 +15,17 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from any_fixture import KINDS, found, places
+from any_fixture import (
+    BALL,
+    BEYOND,
+    KINDS,
+    THIN,
+    beyond_line,
+    beyond_path,
+    found,
+    pieces,
+    places,
+)
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.fixtures import FIXTURES
@@ -36,78 +45,6 @@ ROUNDING = 1e-14
 TURNED = 1e-12
 # Shallower places are not compared with points around them [m].
 SHALLOW = 1e-6
-PER_PIECE = 2001
-
-
-# What is allowed, said a second time: how far beyond it a point (..., 3) is, by some measure [m].
-
-
-def beyond_cylinder(p, points):
-    x, y, z = np.moveaxis(turned(p.direction, points), -1, 0)
-    ends = np.abs(z) - 0.5 * p.length if p.length else np.full(z.shape, -1.0)
-    return np.maximum(np.hypot(x, y) - 0.5 * p.diameter, ends)
-
-
-def beyond_half_space(p, points):
-    return -p.room - turned(p.normal, points)[..., 2]
-
-
-def beyond_cone(p, points):
-    x, y, z = np.moveaxis(turned(p.axis, points - np.array(p.apex)), -1, 0)
-    far, angle = np.hypot(np.hypot(x, y), z), np.arctan2(np.hypot(x, y), z)
-    return far * (angle - p.half_angle)
-
-
-def beyond_line(p, points):
-    x, y, z = np.moveaxis(turned(p.direction, points), -1, 0)
-    over = np.maximum(np.abs(z) - 0.5 * p.length, 0.0) if p.length else 0.0
-    return np.sqrt(x**2 + y**2 + over**2) - p.tolerance
-
-
-def beyond_path(p, points):
-    along = pieces(p).reshape(-1, 3)
-    apart = [np.linalg.norm(point - along, axis=1).min() for point in points.reshape(-1, 3)]
-    return np.reshape(apart, points.shape[:-1]) - p.tolerance
-
-
-def turned(direction, points):
-    """Points in axes at right angles whose z is a direction; no matter how the others look."""
-    axes = np.linalg.svd(np.array([direction]))[2]  # rows: the direction or against it, two others
-    z = points @ (np.array(direction) / math.hypot(*direction))
-    return np.stack((points @ axes[1], points @ axes[2], z), axis=-1)
-
-
-def pieces(p):
-    """Points close together along every piece of a path, (pieces, PER_PIECE, 3)."""
-    corners = np.vstack((np.zeros(3), np.reshape(p.points, (-1, 3))))
-    share = np.linspace(0.0, 1.0, PER_PIECE)[:, None]
-    return np.stack([a + share * (b - a) for a, b in itertools.pairwise(corners)])
-
-
-BEYOND = {
-    "box": lambda p, x: (np.abs(x) - 0.5 * np.array(p.size)).max(axis=-1),
-    "sphere": lambda p, x: np.linalg.norm(x, axis=-1) - 0.5 * p.diameter,
-    "cylinder": beyond_cylinder,
-    "half_space": beyond_half_space,
-    "cone": beyond_cone,
-    "line": beyond_line,
-    "path": beyond_path,
-    "keep_out_sphere": lambda p, x: 0.5 * p.diameter - np.linalg.norm(x - p.place, axis=-1),
-    "keep_out_box": lambda p, x: (0.5 * np.array(p.size) - np.abs(x - p.place)).min(axis=-1),
-}
-THIN = {"line", "path"}
-"""Those that may have no room at all: points around a place would miss them."""
-
-
-def a_ball_of_points():
-    """Points (N, 3) that fill a ball of radius 1, most of them near its surface."""
-    rng = np.random.default_rng(1)
-    rays = rng.normal(size=(6000, 3))
-    rays /= np.linalg.norm(rays, axis=1)[:, None]
-    return rays * (1.0 - 1e-6 - np.repeat([0.0, 1e-3, 0.02, 0.2, 0.5, 0.9], 1000))[:, None]
-
-
-BALL = a_ball_of_points()
 
 
 def a_place(data, parameters):
@@ -120,7 +57,8 @@ def a_place(data, parameters):
 
 
 def test_every_fixture_there_is_is_tried_here():
-    assert set(FIXTURES.names()) - {"mesh", "keep_out_mesh"} == set(KINDS) == set(BEYOND)
+    elsewhere = {"mesh", "keep_out_mesh", "union", "intersection"}
+    assert set(FIXTURES.names()) - elsewhere == set(KINDS) == set(BEYOND)
 
 
 @pytest.mark.parametrize("name", KINDS)

@@ -96,7 +96,7 @@ def distance_grid(request: GridRequest) -> DistanceGrid:
         data = path.read_bytes()
     except OSError as error:
         what = "a mesh, such as an STL or OBJ" if request.kind == "mesh" else "heights, CSV or .npy"
-        text = f"a file with {what} ({error.strerror})"
+        text = f"a file with {what}" + (f" ({error.strerror})" if request.file else "")
         raise request.error("file", request.file, text) from error
     about = (_MADE, path.suffix.lower(), *map(repr, request[1:5]))
     return _found(hashlib.sha256("\n".join(about).encode() + data).hexdigest(), request)

@@ -1,0 +1,26 @@
+"""Hold the hand, or the slave too, in shapes that are made of others."""
+
+import teleop_core as tc
+
+SHAPES: dict[str, tuple[str, ...]] = {
+    "union": ("sphere diameter=0.03", "cylinder diameter=0.01 length=0.06 at=[0, 0.02, 0]"),
+    "intersection": (
+        "box size=[0.03, 0.03, 0.03]",
+        "keep_out_sphere place=[0, 0.02, 0] diameter=0.02",
+    ),
+}
+
+
+def main() -> None:
+    """Print how far the slave leaves each shape, by whom it holds."""
+    for kind, parts in SHAPES.items():
+        for side in ("hand", "both"):
+            settings = {"fixture": kind, f"fixture.{kind}.parts": parts, "fixture.side": side}
+            score = tc.run("coarse_box", duration=12.0, settings=settings).score()
+            outside = score.value("fixture.penetration_max_mm")
+            push = score.value("force_n.max")
+            print(f"{kind:13}{side:5} slave {outside:.2f} mm outside at most, push {push:.2f} N")
+
+
+if __name__ == "__main__":
+    main()
