@@ -293,6 +293,38 @@ def test_broken_files_of_the_cache_are_made_again(calls, left):
     assert run(calls) == ([70.0, 7.0], 1)
 
 
+def test_kernel_works_while_another_version_keeps_what_this_one_cannot_read(tmp_path):
+    folder = write_all(tmp_path, CALLS)
+    (folder / "outer.py").write_text("""
+import pickle
+from pathlib import Path
+import numba
+from middle import plus_one
+from teleop_core.kernels import numba_private
+
+load = numba_private._Cache.load_overload
+
+def loaded(self, *arguments):
+    found = load(self, *arguments)
+    index = Path(self._cache_file._index_path)
+    index.parent.mkdir(parents=True, exist_ok=True)
+    index.write_bytes(pickle.dumps(numba.__version__) + b"ca_later_module\\nItsRecord\\n.")
+    return found
+
+numba_private._Cache.load_overload = loaded
+print(plus_one(3.0), plus_one(4))
+numba_private._Cache.load_overload = load
+print(sum(plus_one.stats.cache_hits.values()))
+""")
+    assert run(folder) == ([7.0, 9.0], 0)
+    (folder / "outer.py").write_text("""
+from middle import plus_one
+print(plus_one(4))
+print(sum(plus_one.stats.cache_hits.values()))
+""")
+    assert run(folder) == ([9.0], 1)
+
+
 def test_kernel_works_where_its_cache_cannot_be_written_any_more(tmp_path):
     folder = write_all(tmp_path, CALLS)
     (folder / "outer.py").write_text("""

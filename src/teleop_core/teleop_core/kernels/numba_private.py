@@ -286,7 +286,11 @@ class _Cache(FunctionCache):
             folder = Path(self._cache_file._index_path).parent
             folder.mkdir(parents=True, exist_ok=True)
             with store.locked(folder):
-                super().save_overload(sig, data)
+                try:
+                    super().save_overload(sig, data)
+                except _BROKEN:  # by another version of the package, since this one looked
+                    self.flush()
+                    super().save_overload(sig, data)
 
     def keep(self, function: FunctionType, name: str, stamp: tuple[str, ...]) -> "_Cache":
         """Keep a function in the store, or under a name beside its source where there is none."""
