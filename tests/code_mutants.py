@@ -225,6 +225,9 @@ CODE_MUTANTS = (
             "slave/operation/presses.py", "count > self._told", "count > self.lost", "presses"),
     _mutant("resume_early", "resume is taken while the arm moves", "slave/operation/states.py",
             "and s.is_moving:", "and s.is_moving > 1:", "operation_states"),
+    _mutant("first_unheard", "what was said while the listener stood still is of no matter",
+            "nodes/operation.py", "self._still = now", "pass",
+            "tests/ros/test_stop_input.py"),
     _mutant("loss_untold", "a verdict does not name lost messages", "evaluation/verdict.py",
             'key.endswith(".gaps")', 'key.endswith(".lost")', "evaluation_graph"),
     # jaw

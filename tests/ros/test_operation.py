@@ -207,17 +207,6 @@ def test_a_press_while_the_slave_stands_still_stops_the_arm(peer, button, still_
     go_on(peer)
 
 
-@pytest.mark.parametrize("released", [100, 6000])
-def test_a_press_that_is_the_first_word_of_a_button_is_heard_though_it_was_lost(
-    peer, button, still_slave, released
-):
-    slave = still_slave()
-    say(button, pressed=1, released=released)
-    slave.send_signal(signal.SIGCONT)
-    peer.wait(lambda: state(peer) is State.FAULT, "FAULT after the stall")
-    go_on(peer)
-
-
 def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer):
     button = StopButton(peer.node)
     button.say(is_pressed=True)

@@ -36,6 +36,14 @@ def test_a_sender_that_is_found_late_has_lost_nothing():
     assert presses.lost == 0
 
 
+def test_after_a_standstill_all_that_a_new_sender_said_before_counts_as_a_press():
+    presses = Presses()
+    assert presses.take(b"a", 4, is_pressed=False, stood_still=True) == (True, False)
+    assert presses.lost == 3
+    assert presses.take(b"a", 5, is_pressed=False, stood_still=True) == (False,)
+    assert presses.take(b"b", 1, is_pressed=False, stood_still=True) == (False,)
+
+
 def test_a_message_that_was_lost_before_the_first_of_its_sender_counts_as_a_press():
     presses = Presses()
     assert presses.lose(0) == ()

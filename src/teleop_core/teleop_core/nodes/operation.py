@@ -1,5 +1,7 @@
 """Operation on topics and services: the emergency stop of all arms, and the commands of each."""
 
+import math
+import time
 from typing import Any, Protocol
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -13,6 +15,9 @@ from teleop_core.slave.operation.states import COMMANDS, Answer
 STOP_TOPIC = "/teleop/stop"
 """Emergency stop of all arms, std_msgs/Bool: true stops; false says that it is alive."""
 _EVERY = 4
+_STANDSTILL, _AFTER = 0.1, 1.0
+"""Time between two looks that is a standstill, and in which it may have lost a button's first
+messages after that [s]."""
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""
 _RELIABLE, _BEST_EFFORT = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
@@ -67,8 +72,9 @@ class StopInput:
     readers keep all messages, a missing message counts as a press
     (:class:`~teleop_core.slave.operation.presses.Presses`), and a :class:`StopButton` that was
     pressed before it was found tells so. What is missing shows in the numbers of messages, and in
-    the account of the first reader, which hears all who send reliably: a process that stands still
-    as a button is found loses the first messages, and no number tells.
+    the account of the first reader, which hears all who send reliably. A process that stands still
+    as a button is found may lose its first messages, and neither tells: a button that is heard for
+    the first time soon after a standstill, and not from its first message on, counts as pressed.
 
     Args:
         node: Node that owns it.
@@ -77,18 +83,26 @@ class StopInput:
     def __init__(self, node: Any) -> None:
         self._takers = [Taker(node, Bool, STOP_TOPIC, stop_profile(*kind)) for kind in _READERS]
         self._presses, self._ticks = Presses(), 0
+        self._looked, self._still = math.inf, -math.inf  # times of the last look, and standstill
 
     def take(self) -> list[bool]:
         """What was said since the last call, oldest first: pressed or not; mostly nothing."""
         found: list[bool] = []
         self._ticks += 1
+        now, before = time.monotonic(), self._looked
+        self._looked = now
+        if now - before > _STANDSTILL:
+            self._still = now
+        stood_still = now - self._still < _AFTER
         for taker in self._takers if self._ticks % _EVERY == 0 else self._takers[:1]:
             while (taken := taker.take()) is not None:
                 if len(taken.data) < _BYTES:
                     continue
                 is_pressed = taken.data[_BYTES - 1] != 0
                 if taker is not self._takers[-1]:
-                    found += self._presses.take(taken.sender, taken.number, is_pressed=is_pressed)
+                    found += self._presses.take(
+                        taken.sender, taken.number, is_pressed=is_pressed, stood_still=stood_still
+                    )
                 elif not self._presses.knows(taken.sender):
                     found.append(is_pressed)
         return [*self._presses.lose(self._takers[0].lost), *found]

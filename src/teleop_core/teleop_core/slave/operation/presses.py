@@ -6,9 +6,9 @@ class Presses:
 
     Every sender numbers its messages, 1 for the first. A number that is left out belongs to a
     message that was lost, by a full queue, by a process that stood still, or on the way; it may
-    have been a press, so it counts as one. What was lost before the first message that came of a
-    sender, the middleware alone knows. A message that arrives twice, through two readers, counts
-    once.
+    have been a press, so it counts as one. Of a sender that is heard for the first time all before
+    may have been said long ago; it counts where the listener stood still meanwhile, for it may have
+    been sent to it then. A message that arrives twice, through two readers, counts once.
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,9 @@ class Presses:
         self._told = count
         return (True,) if is_new else ()
 
-    def take(self, sender: bytes, number: int, *, is_pressed: bool) -> tuple[bool, ...]:
+    def take(
+        self, sender: bytes, number: int, *, is_pressed: bool, stood_still: bool = False
+    ) -> tuple[bool, ...]:
         """States of the button, oldest first, that a message of a reliable sender adds.
 
         Args:
@@ -43,12 +45,14 @@ class Presses:
             number: Number of the message at its sender, 1 for the first; 0 where the middleware
                 does not number messages.
             is_pressed: What the message says.
+            stood_still: Whether the listener has just stood still.
 
         Returns:
             Nothing for a message that was taken already; a press first where messages are missing
-            before this one. Of a sender that is heard for the first time nothing is missing.
+            before this one. Of a sender that is heard for the first time nothing is missing, but
+            after a standstill all before.
         """
-        last = self._last.get(sender, number - 1)
+        last = self._last.get(sender, 0 if stood_still else number - 1)
         if 0 < number <= last:
             return ()
         self._last[sender] = number

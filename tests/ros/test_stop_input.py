@@ -1,0 +1,107 @@
+"""Stop input: what a process hears of a stop button that was pressed while it stood still."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from std_msgs.msg import Bool
+
+from teleop_core.nodes.children import environment
+from teleop_core.nodes.operation import STOP_TOPIC, StopInput
+
+pytestmark = pytest.mark.ros
+READER = Path(__file__).resolve().parents[1] / "stop_reader.py"
+
+
+@pytest.fixture
+def start(peer):
+    """Function that starts a process which listens for so many presses."""
+    started = []
+
+    def start(presses):
+        words, env = [sys.executable, str(READER), str(presses)], environment()
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True,
+                                   env=env | {"ROS_DOMAIN_ID": peer.domain})  # fmt: skip
+        started.append(process)
+        assert process.stdout.readline() == "ready\n"
+        peer.wait(lambda: peer.node.count_subscribers(STOP_TOPIC) == 3, "all three readers")
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+def button_of(peer):
+    button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
+    peer.wait(lambda: button.get_subscription_count() == 2, "both who hear reliable senders")
+    return button
+
+
+def say(button, released):
+    """A press, and so many releases after it, as fast as they go."""
+    for is_pressed in (True,) + (False,) * released:
+        button.publish(Bool(data=is_pressed))
+
+
+def stand_still(peer, reader):
+    reader.send_signal(signal.SIGSTOP)
+    process = psutil.Process(reader.pid)
+    peer.wait(lambda: process.status() == psutil.STATUS_STOPPED, "a reader that stands still")
+    return time.monotonic()
+
+
+def go_on(peer, reader, since):
+    """Go on after a standstill of a third of a second at least."""
+    peer.wait(lambda: time.monotonic() > since + 0.3, "a standstill")
+    reader.send_signal(signal.SIGCONT)
+
+
+def test_a_press_that_is_the_first_word_of_a_button_is_heard_though_the_middleware_lost_it(
+    peer, start
+):
+    """The middleware keeps the newest messages for who stands still; no number tells of others."""
+    reader, button = start(1), button_of(peer)
+    assert reader.stdout.readline() == "found\n"
+    since = stand_still(peer, reader)
+    say(button, 6000)
+    go_on(peer, reader, since)
+    assert reader.wait(30) == 0
+
+
+def test_presses_of_buttons_that_were_made_while_the_listener_stood_still_are_heard(peer, start):
+    """A button keeps its last ten messages for who has not found it yet.
+
+    Often all of them arrive nevertheless: hence several buttons.
+    """
+    reader = start(12)
+    since = stand_still(peer, reader)
+    for _ in range(12):
+        say(button_of(peer), 100)
+    go_on(peer, reader, since)
+    assert reader.wait(30) == 0
+
+
+@pytest.mark.parametrize("stood_still", [True, False])
+def test_what_a_button_said_before_it_was_heard_counts_after_a_standstill_alone(peer, stood_still):
+    button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
+    for _ in range(3):
+        button.publish(Bool(data=False))
+    stop, heard, begin = StopInput(peer.node), [], time.monotonic()
+    try:
+        peer.wait(lambda: button.get_subscription_count() == 2, "both who hear reliable senders")
+        heard += stop.take()
+        peer.wait(lambda: (not stood_still and heard.extend(stop.take()))
+                  or time.monotonic() > begin + 0.4, "a while")  # fmt: skip
+        assert not heard
+        button.publish(Bool(data=False))
+        peer.wait(lambda: heard.extend(stop.take()) or heard, "the fourth message")
+    finally:
+        stop.close()
+    assert heard == [True, False] if stood_still else heard == [False]
