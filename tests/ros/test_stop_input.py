@@ -11,7 +11,7 @@ import pytest
 from std_msgs.msg import Bool
 
 from teleop_core.nodes.children import environment
-from teleop_core.nodes.operation import STOP_TOPIC, StopInput
+from teleop_core.nodes.operation import STOP_TOPIC, StopButton, StopInput
 
 pytestmark = pytest.mark.ros
 READER = Path(__file__).resolve().parents[1] / "stop_reader.py"
@@ -86,6 +86,21 @@ def test_presses_of_buttons_that_were_made_while_the_listener_stood_still_are_he
         say(button_of(peer), 100)
     go_on(peer, reader, since)
     assert reader.wait(30) == 0
+
+
+def test_a_button_that_was_released_before_it_was_found_is_released_after_a_standstill_too(peer):
+    button = StopButton(peer.node)
+    button.say(is_pressed=True)
+    button.say(is_pressed=False)
+    stop, heard = StopInput(peer.node), []
+    try:
+        stop.take()
+        since = time.monotonic()
+        peer.wait(lambda: button.listeners == 3 and time.monotonic() > since + 0.3, "a while")
+        peer.wait(lambda: heard.extend(stop.take()) or heard, "its state")
+    finally:
+        stop.close()
+    assert heard == [False]
 
 
 @pytest.mark.parametrize("stood_still", [True, False])

@@ -73,8 +73,9 @@ class StopInput:
     (:class:`~teleop_core.slave.operation.presses.Presses`), and a :class:`StopButton` that was
     pressed before it was found tells so. What is missing shows in the numbers of messages, and in
     the account of the first reader, which hears all who send reliably. A process that stands still
-    as a button is found may lose its first messages, and neither tells: a button that is heard for
-    the first time soon after a standstill, and not from its first message on, counts as pressed.
+    as a button is found may lose its first messages, and neither tells: a button that the first
+    reader hears for the first time soon after a standstill, and not from its first message on,
+    counts as pressed. The second reader hears what was said long ago, too.
 
     Args:
         node: Node that owns it.
@@ -101,8 +102,9 @@ class StopInput:
                 is_pressed = taken.data[_BYTES - 1] != 0
                 if taker is not self._takers[-1]:
                     found += self._presses.take(
-                        taken.sender, taken.number, is_pressed=is_pressed, stood_still=stood_still
-                    )
+                        taken.sender, taken.number, is_pressed=is_pressed,
+                        stood_still=stood_still and taker is self._takers[0],
+                    )  # fmt: skip
                 elif not self._presses.knows(taken.sender):
                     found.append(is_pressed)
         return [*self._presses.lose(self._takers[0].lost), *found]
