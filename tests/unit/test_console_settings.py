@@ -38,7 +38,9 @@ def test_lists_are_read_as_people_write_them(shown, present, wanted):
     assert _parsed(shown, ParameterInfo("node", "name", present)) == wanted
 
 
-@pytest.mark.parametrize("value", [(0.1, 2.0), ("a=0.1", "b"), (), True, 3, 0.25, "hold"])
+@pytest.mark.parametrize(
+    "value", [(0.1, 2.0), ("a=0.1", "b"), ("ball at=[0, 1]", "box"), (), True, 3, 0.25, "hold"]
+)
 def test_a_setting_text_is_read_by_the_session_as_the_value(value):
     found = parse(_text(value)) if not isinstance(value, bool) else {"True": True}[_text(value)]
     assert (tuple(found) if isinstance(found, list) else found) == value

@@ -178,14 +178,21 @@ def _shown(value: Setting) -> bool | int | float | str:
     """Value as a control shows it: lists as text."""
     if not isinstance(value, tuple):
         return value
-    return (
-        "[" + ", ".join(f"{one:g}" if isinstance(one, float) else str(one) for one in value) + "]"
-    )
+    words = [f"{one:g}" if isinstance(one, float) else str(one) for one in _words(value)]
+    return f"[{', '.join(words)}]"
 
 
 def _text(value: Setting) -> str:
     """Value as ``--set`` takes it."""
-    return "[" + ",".join(map(str, value)) + "]" if isinstance(value, tuple) else str(value)
+    if not isinstance(value, tuple):
+        return str(value)
+    return f"[{','.join(map(str, _words(value)))}]"
+
+
+def _words(values: tuple[float | str, ...]) -> list[float | str]:
+    """Numbers as they are; texts in quotes if one of them would fall apart in a list without."""
+    is_quoted = any(isinstance(one, str) and set(one) & set(",[]()'\"") for one in values)
+    return [repr(one) if is_quoted and isinstance(one, str) else one for one in values]
 
 
 def _form(info: ParameterInfo) -> str:
