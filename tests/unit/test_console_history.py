@@ -5,7 +5,14 @@ import pytest
 
 from teleop_core.console.history import SPAN, History, LiveScores
 from teleop_core.console.link import Arm, ArmView
-from teleop_core.graph.topics import MASTER_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_SERVO_CP
+from teleop_core.graph.topics import (
+    ENERGY,
+    MASTER_ENERGY,
+    MASTER_MEASURED_CF,
+    SLAVE_ENERGY,
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+)
 from teleop_core.robots import load_robot
 
 ARM = Arm("", load_robot("rcrt1"))
@@ -36,6 +43,14 @@ def test_what_was_not_known_is_not_a_number_in_history():
     history = History(ARM)
     history.add(1.0, ArmView(), float("nan"))
     assert np.isnan(history.read("joints")[1]).all()
+
+
+def test_the_energy_that_both_ports_may_still_give_is_drawn_in_joules():
+    history, view = History(ARM), seen((0, 0, 0), (0, 0, 0))
+    for topic, left in ((MASTER_ENERGY, 0.004), (SLAVE_ENERGY, -0.001)):
+        view.streams[topic.name] = np.where(np.array(ENERGY) == "margin", left, 7.0)
+    history.add(1.0, view, 0.001)
+    assert history.read("left")[1].tolist() == [[0.004, -0.001]]
 
 
 def test_a_time_that_goes_back_begins_history_anew():

@@ -6,7 +6,10 @@ import numpy as np
 
 from teleop_core.console.link import Arm, ArmView
 from teleop_core.graph.topics import (
+    ENERGY,
+    MASTER_ENERGY,
     MASTER_MEASURED_CF,
+    SLAVE_ENERGY,
     SLAVE_MEASURED_CP,
     SLAVE_MEASURED_JS,
     SLAVE_SERVO_CP,
@@ -17,13 +20,15 @@ from teleop_core.kernels.geometry import Array
 SPAN = 30.0
 """How far plots reach back [s]."""
 _ROWS = 1200  # 30 s at 40 Hz
+_LEFT = ENERGY.index("margin")
 
 
 class History:
     """Last seconds of one arm: a row for each look.
 
     Columns: joints wanted (n) and measured (n) [rad or m], place wanted and measured (3 each) [m],
-    force (3) [N], distance from the wanted place [m], delay [s]; NaN where nothing was known.
+    force (3) [N], distance from the wanted place [m], delay [s], energy that the ports of hand and
+    slave may still give (2) [J]; NaN where nothing was known.
 
     Args:
         arm: The arm.
@@ -31,9 +36,9 @@ class History:
 
     def __init__(self, arm: Arm) -> None:
         self.arm, n = arm, arm.robot.n
-        ends = np.cumsum([n, n, 3, 3, 3, 1, 1]).tolist()
+        ends = np.cumsum([n, n, 3, 3, 3, 1, 1, 2]).tolist()
         starts = [0, *ends]
-        names = ("wanted", "joints", "reference", "place", "force", "error", "delay")
+        names = ("wanted", "joints", "reference", "place", "force", "error", "delay", "left")
         self._columns = {name: slice(a, b) for name, a, b in zip(names, starts, ends, strict=False)}
         self._rows = np.full((_ROWS, ends[-1]), np.nan)
         self._times = np.full(_ROWS, np.nan)
@@ -60,6 +65,9 @@ class History:
         away = row[self._columns["reference"]] - row[self._columns["place"]]
         row[self._columns["error"]] = np.sqrt(away @ away)
         row[self._columns["delay"]] = delay
+        for i, topic in enumerate((MASTER_ENERGY, SLAVE_ENERGY)):
+            if (energies := view.get(topic)) is not None:
+                row[self._columns["left"].start + i] = energies[_LEFT]
         self._times[self._next] = time
         self._next, self._count = (self._next + 1) % _ROWS, min(self._count + 1, _ROWS)
 

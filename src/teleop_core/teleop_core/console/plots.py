@@ -30,6 +30,7 @@ _PLOTS = (
     _Plot("force at the stylus [N]", ("force",), 1.0, ("x", "y", "z")),
     _Plot("tracking error [mm]", ("error",), 1e3, ("error",)),
     _Plot("master sample to slave command, median [ms]", ("delay",), 1e3, ("delay",)),
+    _Plot("energy left to give, with passivity [mJ]", ("left",), 1e3, ("hand", "slave")),
 )
 
 

@@ -15,7 +15,9 @@ from teleop_core.base.errors import RecordingError, TeleopError
 from teleop_core.base.parameters import specs, values_of
 from teleop_core.console.link import Arm, ArmView, ParameterInfo, Setting
 from teleop_core.graph.topics import (
+    MASTER_ENERGY,
     OPERATION,
+    SLAVE_ENERGY,
     SLAVE_JAW_BOARD,
     SLAVE_JAW_MEASURED_JS,
     SLAVE_JAW_OBJECT_CP,
@@ -37,6 +39,7 @@ MOST = 200 << 20
 _STAMP_BYTES = 16
 _KEPT = (
     *STREAMS, SLAVE_MEASURED_CF, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP, SLAVE_JAW_BOARD,
+    MASTER_ENERGY, SLAVE_ENERGY,
 )  # fmt: skip
 
 
