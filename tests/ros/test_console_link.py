@@ -147,11 +147,13 @@ def test_of_a_session_in_a_namespace_the_link_knows_arm_and_recorder(compose, pe
         assert Bag(tmp_path / "kept").topics["left/slave/measured_cp"].count
 
 
-def test_energies_of_both_ports_are_seen_in_a_session_with_passivity(tmp_path):
+def test_a_second_session_of_the_process_is_alone_and_its_energies_are_seen(live, tmp_path):
+    first, *_ = live
     stages = ["teleop.stages=[network,passivity]", "reflection.passivity=tdpa"]
     texts = ["operator=remote", "teleop.duration=3600.0", "operator.patience=0.0", CALM, *stages]
     configured = api.configuration(None, texts=texts)
     with ConsoleSession(configured, tmp_path / "bag", lambda _: None) as session:
+        assert session.domain != first.domain
         link, energies = session.link(), {topics.MASTER_ENERGY.name, topics.SLAVE_ENERGY.name}
         with link:
             wait_until(lambda: energies <= link.view().arms[""].streams.keys(), "energies")

@@ -27,14 +27,16 @@ _STILL = 3.0  # a thread of its own speaks ten times a second, whatever the proc
 _STILL_STARTING = 60.0  # the interpreter loads, perhaps from a cold disk
 
 
-def environment() -> dict[str, str]:
+def environment(domain: int | None = None) -> dict[str, str]:
     """Environment of the nodes: this machine only, and a domain of their own, if nothing is said.
 
-    What concerns this process as well is set here too.
+    What concerns this process as well is set here too, but for the domain: one process may lead
+    several sessions.
     """
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     choose_transport()
-    return dict(os.environ) | {"ROS_DOMAIN_ID": os.environ.get("ROS_DOMAIN_ID") or free_domain()}
+    given = str(domain) if domain is not None else os.environ.get("ROS_DOMAIN_ID")
+    return dict(os.environ) | {"ROS_DOMAIN_ID": given or free_domain()}
 
 
 _reserved: deque[socket.socket] = deque()

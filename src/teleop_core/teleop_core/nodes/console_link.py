@@ -111,6 +111,7 @@ class LiveLink:
         )  # fmt: skip
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
+        self._is_closed = False
         self._thread = threading.Thread(target=self._spin, name="console link", daemon=True)
         self._thread.start()
         self._lock = threading.Lock()
@@ -136,15 +137,17 @@ class LiveLink:
 
     def close(self) -> None:
         """Leave the session as it is."""
+        self._is_closed = True  # first: an executor that is shut down while it spins breaks
+        self._executor.wake()
+        self._thread.join(PATIENCE)
         self._executor.shutdown()
         self._context.try_shutdown()
-        self._thread.join(PATIENCE)
         with suppress(Exception):  # the middleware may have let go already
             self._node.destroy_node()
 
     def _spin(self) -> None:
         with suppress(ExternalShutdownException):
-            while self._context.ok():
+            while self._context.ok() and not self._is_closed:
                 self._executor.spin_once(timeout_sec=0.1)
 
     # -- finding ---------------------------------------------------------------------------------

@@ -1,6 +1,5 @@
 """Console session: the live session behind a page, started and ended by it."""
 
-import os
 import threading
 from collections.abc import Callable, Collection
 from pathlib import Path
@@ -39,6 +38,8 @@ class _Lines:
 class ConsoleSession:
     """A session in a domain of its own, to be used with ``with``; composed if all nodes are ours.
 
+    Where ``ROS_DOMAIN_ID`` is set, its domain is that one, and the process can lead no second one.
+
     Its processes end with this one, however that comes about.
 
     Args:
@@ -55,8 +56,7 @@ class ConsoleSession:
         self, configuration: Configuration, out: Path, say: Callable[[str], None],
         without: Collection[str] = (),
     ) -> None:  # fmt: skip
-        os.environ["ROS_DOMAIN_ID"] = environment()["ROS_DOMAIN_ID"]
-        self.domain = int(os.environ["ROS_DOMAIN_ID"])
+        self.domain = int(environment()["ROS_DOMAIN_ID"])
         self._configuration, self._out, self._without = configuration, out, without
         self._console = Console(file=_Lines(say), width=200)  # type: ignore[arg-type]
         self._interrupt, self._error = Interrupt(), ""
@@ -74,6 +74,7 @@ class ConsoleSession:
             live(
                 self._configuration, self._out, self._console,
                 is_composed=not self._without, without=self._without, interrupt=self._interrupt,
+                domain=self.domain,
             )  # fmt: skip
         except TeleopError as error:
             if not self._interrupt.has_come:

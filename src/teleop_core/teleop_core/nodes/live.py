@@ -68,7 +68,7 @@ def _crews(graph: Graph, *, is_composed: bool, without: Collection[str] = ()) ->
 
 def live(
     configuration: Configuration, out: Path, console: Console, *, is_composed: bool = False,
-    without: Collection[str] = (), interrupt: Interrupt | None = None,
+    without: Collection[str] = (), interrupt: Interrupt | None = None, domain: int | None = None,
 ) -> None:  # fmt: skip
     """Run and record a session as ROS 2 nodes, for the configured duration or until Ctrl-C.
 
@@ -80,6 +80,7 @@ def live(
         without: Nodes that are not started: others stand in their place, such as an arm bridge in
             that of ``slave_sim``.
         interrupt: What ends it from another thread; None for signals alone.
+        domain: ROS domain; None for that of ``ROS_DOMAIN_ID``, or else a free one.
 
     Raises:
         RecordingError: The directory exists.
@@ -92,7 +93,7 @@ def live(
     if out.exists():
         raise RecordingError(out, "exists already; choose another --out")
     crews = _crews(configuration.graph, is_composed=is_composed, without=without)
-    env = environment()
+    env = environment(domain)
     remove_leftovers()
     interrupt = interrupt or Interrupt()
     # A file without a name: there is nothing to remove, however this ends.
