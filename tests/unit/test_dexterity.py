@@ -9,7 +9,6 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.robots import load_robot
 from teleop_core.robots.dexterity import (
     COLUMNS,
-    condition_number,
     manipulability,
     sample_workspace,
     singular_values,
@@ -35,11 +34,9 @@ def test_scara_is_measured_in_the_four_directions_it_controls():
     assert manipulability(arm, q) == pytest.approx(0.4 * 0.3 * math.sin(1.1), abs=1e-15)
 
 
-def test_a_stretched_arm_has_no_manipulability_and_no_finite_condition():
+def test_a_stretched_arm_has_no_manipulability():
     arm = load_robot("planar_3r")
     assert manipulability(arm, [0.0, 0.0, 0.0]) < 1e-15
-    assert condition_number(arm, [0.0, 0.0, 0.0]) > 1e15
-    assert condition_number(arm, [0.0, 1.5, 0.0]) < 10.0
 
 
 def test_lengths_weigh_linear_against_angular_speed():

@@ -18,6 +18,40 @@ PRINTED = 1e-6
 LOOP = FourBar(4.0, 1.0, 3.5, 2.5)
 
 
+# The four published forms of the closure, by where each breaks the loop: gaps [m] and [rad].
+
+
+def gap_3r(loop, theta1, phi1, phi2, phi3):
+    """Form A, at the right pivot; the angles add up to a multiple of 2 pi (source: 4 pi)."""
+    second, third = theta1 + phi2, theta1 + phi2 + phi3
+    x = loop.l1 * np.cos(theta1) + loop.l2 * np.cos(second) + loop.l3 * np.cos(third) - loop.l0
+    y = loop.l1 * np.sin(theta1) + loop.l2 * np.sin(second) + loop.l3 * np.sin(third)
+    return np.stack((x, y, np.angle(-np.exp(1j * (third - phi1)))))
+
+
+def gap_2r_1r(loop, theta1, phi1, phi2):
+    """Form B, between coupler and rocker."""
+    x = loop.l1 * np.cos(theta1) + loop.l2 * np.cos(theta1 + phi2)
+    y = loop.l1 * np.sin(theta1) + loop.l2 * np.sin(theta1 + phi2)
+    return np.stack((x - loop.l0 - loop.l3 * np.cos(phi1), y - loop.l3 * np.sin(phi1)))
+
+
+def gap_2r_2r(loop, theta1, phi1, phi2, right, a):
+    """Form C, in the coupler at ``a`` from the crank: theta1 + phi2 = phi1 + right + pi."""
+    b, left = loop.l2 - a, theta1 + phi2
+    x = loop.l1 * np.cos(theta1) + a * np.cos(left) - loop.l0 - loop.l3 * np.cos(phi1)
+    y = loop.l1 * np.sin(theta1) + a * np.sin(left) - loop.l3 * np.sin(phi1)
+    x, y = x - b * np.cos(phi1 + right), y - b * np.sin(phi1 + right)
+    return np.stack((x, y, np.angle(-np.exp(1j * (left - phi1 - right)))))
+
+
+def gap_freudenstein(loop, theta1, phi1):
+    """Form D, coupler as a distance: squared distance of its ends less l2² [m²]."""
+    x = loop.l1 * np.cos(theta1) - loop.l0 - loop.l3 * np.cos(phi1)
+    y = loop.l1 * np.sin(theta1) - loop.l3 * np.sin(phi1)
+    return x * x + y * y - loop.l2**2
+
+
 def closed_loops(rng, count):
     """Random lengths and crank angles that close, with their closure."""
     for lengths in rng.uniform(0.3, 4.0, (count, 4)):
@@ -42,10 +76,10 @@ def test_all_four_forms_of_the_closure_agree_for_random_loops_in_both_modes():
         a = rng.uniform(0.0, loop.l2)
         right = theta1 + phi2 - phi1 - math.pi
         gaps = (
-            loop.gap_3r(theta1, phi1, phi2, phi3),
-            loop.gap_2r_1r(theta1, phi1, phi2),
-            loop.gap_2r_2r(theta1, phi1, phi2, right, a),
-            loop.gap_freudenstein(theta1, phi1),
+            gap_3r(loop, theta1, phi1, phi2, phi3),
+            gap_2r_1r(loop, theta1, phi1, phi2),
+            gap_2r_2r(loop, theta1, phi1, phi2, right, a),
+            gap_freudenstein(loop, theta1, phi1),
         )
         worst = max(worst, *(float(np.abs(gap).max()) for gap in gaps))
         count += 1
@@ -57,7 +91,7 @@ def test_forms_as_printed_would_leave_gaps():
     theta1 = 0.7
     _, phi1, phi2, _ = LOOP.close(theta1)
     half_turn_short = theta1 + phi2 - phi1 - math.pi / 2.0  # the slide's pi/2
-    assert np.abs(LOOP.gap_2r_2r(theta1, phi1, phi2, half_turn_short, 1.0)).max() > 1.0
+    assert np.abs(gap_2r_2r(LOOP, theta1, phi1, phi2, half_turn_short, 1.0)).max() > 1.0
     x = LOOP.l1 * math.cos(theta1) - LOOP.l3 * np.cos(phi1)
     y = LOOP.l1 * math.sin(theta1) - LOOP.l3 * np.sin(phi1)
     without_ground = x**2 + y**2 - LOOP.l2**2
@@ -202,7 +236,7 @@ def test_parallelogram_passes_its_change_points_without_turning_the_coupler():
     result = robot.follow(robot.fk(cranks[:, None]), seed=cranks[:1])
     assert np.abs(result.q[:, 0] - cranks).max() < 1e-9
     assert (result.status == IkStatus.FOLLOWED).all()
-    assert np.abs(loop.gap_freudenstein(cranks, cranks)).max() < CLOSED
+    assert np.abs(gap_freudenstein(loop, cranks, cranks)).max() < CLOSED
     # The general closure has the parallelogram as one of its two modes, changing sides at 0, pi.
     modes = loop.close(cranks).phi1
     assert np.abs(np.exp(1j * modes) - np.exp(1j * cranks)[:, None]).min(axis=1).max() < 1e-6

@@ -74,6 +74,12 @@ def bench():
     return Bench()
 
 
+def move_to_pose(motion, T):
+    """Move to where the tip has a pose, as a session does with move_cp."""
+    found = motion.solve(T)
+    return found if isinstance(found, tuple) else motion.move(found)
+
+
 def insist_on_limits(robot, path):
     """Speeds within the drives' and speed changes within twenty times what they can brake."""
     speed = np.diff(path, axis=0) / DT
@@ -124,7 +130,7 @@ def test_a_newer_move_takes_over_from_one_under_way(bench):
 
 def test_a_move_to_a_pose_brings_the_tip_there(bench):
     goal = bench.tip @ transform(rotation("x", 0.05), np.array([0.01, -0.005, 0.008]))
-    assert bench.motion.move_to_pose(goal)[0] is Answer.DONE
+    assert move_to_pose(bench.motion, goal)[0] is Answer.DONE
     bench.run(3000)
     np.testing.assert_allclose(bench.tip, goal, atol=1e-12)
 
@@ -132,7 +138,7 @@ def test_a_move_to_a_pose_brings_the_tip_there(bench):
 def test_a_pose_out_of_reach_is_refused_with_how_far_it_is(bench):
     before, goal = bench.setpoint, bench.tip
     goal[0, 3] += 3.0
-    answer, text = bench.motion.move_to_pose(goal)
+    answer, text = move_to_pose(bench.motion, goal)
     assert answer is Answer.REFUSED
     assert float(re.search(r"nearer than ([\d.e+]+) mm", text)[1]) > 1000.0
     np.testing.assert_array_equal(bench.run(50)[-1], before)
@@ -173,7 +179,7 @@ def test_nothing_is_moved_outside_enabled(bench, state):
     before, now_ns = bench.run(500)[-1], bench.now_ns
     told = [
         bench.motion.move(MIDDLE + SMALL), bench.motion.move_by(SMALL),
-        bench.motion.move_to_pose(bench.tip), bench.motion.drive_joints(SMALL, now_ns),
+        move_to_pose(bench.motion, bench.tip), bench.motion.drive_joints(SMALL, now_ns),
         bench.motion.drive_tip(SMALL, now_ns), bench.motion.servo(MIDDLE + 1e-3, now_ns),
         bench.motion.servo_by(1e-3 * SMALL, now_ns),
     ]  # fmt: skip
@@ -420,8 +426,8 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(commands
         elif name in {"move", "pose", "joints", "tip", "step", "hold"}:
             {
                 "move": lambda w=wild: motion.move(bench.setpoint + w),
-                "pose": lambda w=wild: motion.move_to_pose(
-                    bench.tip @ transform(rotation("z", w[3]), 0.1 * w[:3])
+                "pose": lambda w=wild: move_to_pose(
+                    motion, bench.tip @ transform(rotation("z", w[3]), 0.1 * w[:3])
                 ),
                 "joints": lambda w=wild, n=now_ns: motion.drive_joints(20.0 * w, n),
                 "tip": lambda w=wild, n=now_ns: motion.drive_tip(5.0 * w, n),

@@ -7,8 +7,7 @@ import pytest
 from scipy import signal
 from scipy.spatial.transform import Rotation
 
-from teleop_core.base.errors import ShapeError
-from teleop_core.evaluation.motion_figures import NAMES, Kinematics, motion_figures
+from teleop_core.evaluation.motion_figures import NAMES, Kinematics
 from teleop_core.evaluation.motion_measures import (
     RATE,
     log_dimensionless_jerk,
@@ -30,6 +29,14 @@ BELL_SPARC, BELL_LDLJ = -1.41403, -5.81636
 DECIMALS = 5e-6
 # Linear interpolation to 30 Hz of motion below 3 Hz.
 INTERPOLATION = 0.05
+
+
+def motion_figures(times, place):
+    """Figures of a motion that does not turn."""
+    samples = MotionSamples()
+    samples.add(times, np.hstack((place, np.tile((1.0, 0.0, 0.0, 0.0), (len(times), 1)))))
+    found = Kinematics(samples)
+    return found.figures(found.everything)
 
 
 def hand(times, seed=1):
@@ -221,10 +228,3 @@ def test_share_of_power_is_that_of_the_waves_in_it():
     )
     frequency, density = velocity_spectrum([velocity])
     assert share_between(1.0, 3.0, frequency, density) == pytest.approx(0.5, abs=0.01)
-
-
-@pytest.mark.parametrize("name", ["position", "attitude"])
-def test_arrays_of_another_shape_are_refused_by_name(name):
-    arrays = {"position": np.zeros((9, 3)), "attitude": np.zeros((9, 4)), name: np.zeros((8, 3))}
-    with pytest.raises(ShapeError, match=name):
-        motion_figures(np.arange(9.0), **arrays)

@@ -44,7 +44,7 @@ for command in COMMANDS:
 home = slave.robot.home
 slave.server.motion.move(home - 0.01)
 slave.server.motion.move_by(0.0 * home)
-slave.server.motion.move_to_pose(slave.robot.fk(home))
+slave.server.motion.solve(slave.robot.fk(home))
 slave.server.motion.drive_joints(0.0 * home, 0)
 slave.server.motion.drive_tip(np.zeros(6), 0)
 soft = {"starts_at_home": True, "controller.pid.bandwidth": (20.0,) * 6}

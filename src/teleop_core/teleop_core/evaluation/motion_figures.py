@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base.errors import ShapeError
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.motion_measures import (
     IDLE_SPEED,
@@ -88,29 +87,6 @@ class MotionFigures:
 
 NAMES = tuple(field.name for field in fields(MotionFigures))
 """Names of all figures, in their order."""
-
-
-def motion_figures(times: Array, position: Array, attitude: Array | None = None) -> MotionFigures:
-    """Figures of a recorded motion of any rate.
-
-    Args:
-        times: Rising times (N,) [s].
-        position: Places (N, 3) [m]; rows that are not finite are left out.
-        attitude: Unit quaternions (N, 4), w first; without them there are no turns.
-
-    Raises:
-        ShapeError: An array has another shape.
-    """
-    count = len(times)
-    if position.shape != (count, 3):
-        raise ShapeError("position", expected=(count, 3), received=position.shape)
-    if attitude is not None and attitude.shape != (count, 4):
-        raise ShapeError("attitude", expected=(count, 4), received=attitude.shape)
-    turned = np.tile((1.0, 0.0, 0.0, 0.0), (count, 1)) if attitude is None else attitude
-    samples = MotionSamples()
-    samples.add(times, np.hstack((position, turned)))
-    found = Kinematics(samples)
-    return found.figures(found.everything)
 
 
 class Kinematics:

@@ -82,15 +82,6 @@ def manipulability(robot: Robot, q: object, length: float = 1.0) -> float:
     return float(np.prod(singular_values(robot, q, length)))
 
 
-def condition_number(robot: Robot, q: object, length: float = 1.0) -> float:
-    """Largest over smallest singular value: 1 where all directions are alike, inf when singular.
-
-    Arguments and errors as :func:`singular_values`.
-    """
-    values = singular_values(robot, q, length)
-    return math.inf if values[-1] == 0.0 else float(values[0] / values[-1])
-
-
 def sample_workspace(
     robot: Robot, count: int, rng: np.random.Generator, length: float = 1.0
 ) -> tuple[Array, Array]:

@@ -90,40 +90,6 @@ class FourBar:
             return ((inner, 2.0 * math.pi - inner),)
         return ((inner, outer), (-outer, -inner))
 
-    def gap_3r(self, theta1: Array, phi1: Array, phi2: Array, phi3: Array) -> Array:
-        """Form A, broken at the right pivot: gap in x, y [m] and in angle [rad], (..., 3).
-
-        The angles add up to a multiple of 2 pi (the source says 4 pi).
-        """
-        second, third = theta1 + phi2, theta1 + phi2 + phi3
-        x = self.l1 * np.cos(theta1) + self.l2 * np.cos(second) + self.l3 * np.cos(third) - self.l0
-        y = self.l1 * np.sin(theta1) + self.l2 * np.sin(second) + self.l3 * np.sin(third)
-        return np.stack((x, y, _principal(third + math.pi - phi1)), axis=-1)
-
-    def gap_2r_1r(self, theta1: Array, phi1: Array, phi2: Array) -> Array:
-        """Form B, broken between coupler and rocker: gap in x, y [m], (..., 2)."""
-        x = self.l1 * np.cos(theta1) + self.l2 * np.cos(theta1 + phi2)
-        y = self.l1 * np.sin(theta1) + self.l2 * np.sin(theta1 + phi2)
-        return np.stack((x - self.l0 - self.l3 * np.cos(phi1), y - self.l3 * np.sin(phi1)), axis=-1)
-
-    def gap_2r_2r(self, theta1: Array, phi1: Array, phi2: Array, right: Array, a: float) -> Array:
-        """Form C, coupler broken at ``a`` [m] from the crank: gap in x, y, angle, (..., 3).
-
-        ``right`` is the angle from the rocker to the coupler's right part, seen from the rocker
-        end: theta1 + phi2 = phi1 + right + pi (the slide prints pi/2).
-        """
-        b, left = self.l2 - a, theta1 + phi2
-        x = self.l1 * np.cos(theta1) + a * np.cos(left) - self.l0 - self.l3 * np.cos(phi1)
-        y = self.l1 * np.sin(theta1) + a * np.sin(left) - self.l3 * np.sin(phi1)
-        x, y = x - b * np.cos(phi1 + right), y - b * np.sin(phi1 + right)
-        return np.stack((x, y, _principal(left - phi1 - right - math.pi)), axis=-1)
-
-    def gap_freudenstein(self, theta1: Array, phi1: Array) -> Array:
-        """Form D, coupler as a distance: squared distance of the ends less l2² [m²], (...)."""
-        x = self.l1 * np.cos(theta1) - self.l0 - self.l3 * np.cos(phi1)
-        y = self.l1 * np.sin(theta1) - self.l3 * np.sin(phi1)
-        return np.asarray(x * x + y * y - self.l2**2)
-
 
 def _principal(angle: Array) -> Array:
     """Same angle in (-pi, pi]."""

@@ -97,23 +97,15 @@ class MotionCommands:
         """Move by a step of joints (n,) [rad or m] from the setpoint."""
         return self.move(self._slave.state["setpoint"] + self._joints(step))
 
-    def move_to_pose(self, T: object) -> Told:
-        """Move smoothly to where the tip has a pose: straight in joints, not in space.
+    def solve(self, T: object) -> Array | Told:
+        """Joints (n,) at which the tip has a pose (4, 4), next to the setpoint; or a refusal.
 
-        The branch inside the limits next to the setpoint is taken. This takes long for a tick: in
-        a running session :meth:`solve` first, beside the ticks, then :meth:`move`.
-
-        Args:
-            T: ``T_base_tip`` (4, 4).
+        The branch inside the limits next to the setpoint is taken. This takes long for a tick: a
+        running session solves beside the ticks, and hands the joints to :meth:`move`.
 
         Raises:
             ShapeError: Another shape.
         """
-        found = self.solve(T)
-        return found if isinstance(found, tuple) else self.move(found)
-
-    def solve(self, T: object) -> Array | Told:
-        """Joints (n,) at which the tip has a pose (4, 4), next to the setpoint; or a refusal."""
         seed = np.array(self._slave.state["setpoint"], dtype=np.float64)
         found = self._slave.robot.ik(T, seed)
         if found.status in _REACHED:

@@ -70,11 +70,6 @@ def moved(reading_mm: Array, escape_mm: float) -> Array:
     return np.sqrt(np.square(reading_mm) - escape_mm**2)
 
 
-def published_errors(which: Axis) -> Array:
-    """Desired less measured (10,), of the ruler's readings [mm]."""
-    return DESIRED_MM - moved(np.array(which.read_mm), which.escape_mm)
-
-
 Rest = Callable[[Array], Array]
 """Joints that a controller goes to (n,) [rad or m], to where the tip then really is (3,) [m]."""
 

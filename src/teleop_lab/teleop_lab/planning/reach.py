@@ -111,16 +111,6 @@ class Reach:
         shares = f"{self.given.share:.1%} as given, {self.proposed.share:.1%} proposed"
         return f"Reach({self.path.name}, {self.robot.name}: {shares})"
 
-    def write_page(self, file: Path | str) -> None:
-        """Write a page with the path in space and against time, as given and as proposed.
-
-        Raises:
-            OSError: The file cannot be written.
-        """
-        from teleop_lab.planning.page import write_reach_page
-
-        write_reach_page([self], Path(file))
-
 
 def _silent(done: int, total: int) -> None:
     """Show no progress."""
