@@ -211,7 +211,7 @@ class Peer:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
-        self.observer.__exit__()
+        self.observer.close()
         self._executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()

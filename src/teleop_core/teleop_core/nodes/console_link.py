@@ -14,7 +14,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -35,6 +34,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.display import SEEN, displayed
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.observer import WARNING, Status
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.parameter_client import ParameterClient, ParameterEvents, call
@@ -87,8 +87,8 @@ class _Seen:
                 self._subscription = Subscription(self._node, self._own, self._name, 1)
 
 
-class LiveLink:
-    """A :class:`~teleop_core.console.link.Link` to a running session, to be used with ``with``.
+class LiveLink(Guest):
+    """A :class:`~teleop_core.console.link.Link` to a running session.
 
     Args:
         domain: ROS domain of the session.
@@ -102,25 +102,20 @@ class LiveLink:
     is_live = True
 
     def __init__(self, domain: int, title: str = "", patience: float = PATIENCE) -> None:
+        super().__init__("teleop_console", domain, start_parameter_services=False)
         self.domain = domain
-        self._context = Context()
-        self._context.init(args=[], domain_id=domain)
-        self._node = Node(
-            "teleop_console", context=self._context, use_global_arguments=False,
-            enable_rosout=False, start_parameter_services=False,
-        )  # fmt: skip
         self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        self._executor.add_node(self.node)
         self._is_closed = False
         self._thread = threading.Thread(target=self._spin, name="console link", daemon=True)
         self._thread.start()
         self._lock = threading.Lock()
-        self._button, self._pressing = StopButton(self._node), threading.Lock()
+        self._button, self._pressing = StopButton(self.node), threading.Lock()
         self._clients: dict[str, Any] = {}
-        self._client, self._events = ParameterClient(self._node), ParameterEvents(self._node)
+        self._client, self._events = ParameterClient(self.node), ParameterEvents(self.node)
         self._known: dict[tuple[str, str], ParameterInfo] = {}
         self._statuses: dict[str, Status] = {}
-        self._reports = Subscription(self._node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
+        self._reports = Subscription(self.node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
         self._runs, self._is_pressed = 0, False
         try:
             self._find(patience)
@@ -128,12 +123,6 @@ class LiveLink:
             self.close()
             raise
         self.title = title or str(self._value(self._recorder(), "scenario") or "session")
-
-    def __enter__(self) -> "LiveLink":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Leave the session as it is."""
@@ -143,7 +132,7 @@ class LiveLink:
         self._executor.shutdown()
         self._context.try_shutdown()
         with suppress(Exception):  # the middleware may have let go already
-            self._node.destroy_node()
+            self.node.destroy_node()
 
     def _spin(self) -> None:
         with suppress(ExternalShutdownException):
@@ -156,7 +145,7 @@ class LiveLink:
         """Find arms and their robots."""
         end, suffix, names = time.monotonic() + patience, f"/{SLAVE_OPERATION.name}", set[str]()
         while not names:
-            topics = self._node.get_topic_names_and_types()
+            topics = self.node.get_topic_names_and_types()
             names = {name.removesuffix(suffix).strip("/") for name, _ in topics
                      if name.endswith(suffix)}  # fmt: skip
             if not names and time.monotonic() > end:
@@ -166,15 +155,15 @@ class LiveLink:
                 )
             time.sleep(0.02)
         self.arms = tuple(Arm(name, self._robot(name)) for name in sorted(names))
-        self._seen = {arm.name: [_Seen(self._node, t, arm) for t in SEEN] for arm in self.arms}
+        self._seen = {arm.name: [_Seen(self.node, t, arm) for t in SEEN] for arm in self.arms}
         self._told = {
             arm.name: [
-                Subscription(self._node, topic.of_arm(arm.name), f"/{topic.of_arm(arm.name).name}")
+                Subscription(self.node, topic.of_arm(arm.name), f"/{topic.of_arm(arm.name).name}")
                 for topic in (SLAVE_OPERATION, TELEOP_STATE)
             ]
             for arm in self.arms
         }  # fmt: skip
-        self._hands = {arm.name: _Hand(self._node, arm.name) for arm in self.arms}
+        self._hands = {arm.name: _Hand(self.node, arm.name) for arm in self.arms}
         self._view = View(arms={arm.name: ArmView() for arm in self.arms})
         self._begun = self._heard = time.monotonic()
 
@@ -186,7 +175,7 @@ class LiveLink:
 
     def _recorder(self) -> str:
         """Recorder of the session, in its namespace."""
-        services, end = self._node.get_service_names_and_types(), f"/{RECORDER_NAME}{_SPLIT}"
+        services, end = self.node.get_service_names_and_types(), f"/{RECORDER_NAME}{_SPLIT}"
         found = (name.removesuffix(_SPLIT) for name, _ in services if name.endswith(end))
         return next(found, RECORDER_NAME).strip("/")
 
@@ -257,7 +246,7 @@ class LiveLink:
     def _trigger(self, name: str) -> tuple[bool, str]:
         with self._lock:
             if name not in self._clients:
-                self._clients[name] = self._node.create_client(Trigger, name)
+                self._clients[name] = self.node.create_client(Trigger, name)
         try:
             answer = call(self._clients[name], Trigger.Request(), PATIENCE)
         except SessionError as error:
@@ -284,7 +273,7 @@ class LiveLink:
     def parameters(self) -> Parameters:
         """All parameters of all nodes, asked for anew."""
         found: dict[tuple[str, str], ParameterInfo] = {}
-        services = [name for name, _ in self._node.get_service_names_and_types()]
+        services = [name for name, _ in self.node.get_service_names_and_types()]
         for node in sorted(
             name.removesuffix(_LIST).strip("/") for name in services if name.endswith(_LIST)
         ):

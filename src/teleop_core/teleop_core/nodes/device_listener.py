@@ -3,14 +3,13 @@
 import time
 from typing import Any
 
-from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
 from teleop_core.base.errors import SessionError
 from teleop_core.chain.master.master_bridge import POSE_MESSAGES
 from teleop_core.graph.topics import Kind, Topic
 from teleop_core.kernels.geometry import Array
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.master_bridge import pose_of
 from teleop_core.nodes.streams import Subscription, Waiter
 
@@ -18,8 +17,8 @@ PATIENCE = 5.0
 """Time in which the topic must be found, and a message must come [s]."""
 
 
-class DeviceListener:
-    """Listener to one device, with a middleware context of its own; to be used with ``with``.
+class DeviceListener(Guest):
+    """Listener to one device.
 
     Args:
         topic: Where the device says its poses, or its joints.
@@ -34,35 +33,23 @@ class DeviceListener:
     """
 
     def __init__(self, topic: str, domain: int, patience: float = PATIENCE) -> None:
-        self._context = Context()
-        self._context.init(args=[], domain_id=domain)
-        self._node = Node(
-            "teleop_map_device", context=self._context, use_global_arguments=False,
-            enable_rosout=False, start_parameter_services=False,
-        )  # fmt: skip
+        super().__init__("teleop_map_device", domain, start_parameter_services=False)
         self._subscription: Subscription | None = None
         try:
             self.topic = topic if topic.startswith("/") else f"/{topic}"
             self.message = self._find(domain, patience)
             heard = Topic(self.topic, Kind.POSE, message=self.message)
-            self._subscription = Subscription(self._node, heard, self.topic, 1)
+            self._subscription = Subscription(self.node, heard, self.topic, 1)
             self._waiter = Waiter(self._context, self._subscription)
         except BaseException:
             self.close()
             raise
 
-    def __enter__(self) -> "DeviceListener":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def close(self) -> None:
         """Leave the device as it is."""
         if self._subscription is not None:
             self._subscription.close()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        super().close()
 
     def place(self) -> Array:
         """Where the stylus is now, (3,) in the device's unit.
@@ -104,7 +91,7 @@ class DeviceListener:
     def _find(self, domain: int, patience: float) -> str:
         end = time.monotonic() + patience
         while True:
-            known = dict(self._node.get_topic_names_and_types())
+            known = dict(self.node.get_topic_names_and_types())
             found = [kind for kind in known.get(self.topic, ()) if kind in POSE_MESSAGES]
             if found:
                 return found[0]

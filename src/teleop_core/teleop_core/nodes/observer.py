@@ -4,11 +4,9 @@ import math
 import time
 from dataclasses import dataclass, field
 
-from rclpy.context import Context
-from rclpy.node import Node
-
 from teleop_core.bags.messages import read_reports
 from teleop_core.graph.topics import DIAGNOSTICS
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription, Waiter
 
@@ -33,36 +31,29 @@ class Status:
         return number if math.isfinite(number) else 0.0
 
 
-class Observer:
-    """Listener with a middleware context of its own, to be used with ``with``.
+class Observer(Guest):
+    """Listener to a session.
 
     Args:
-        domain_id: DDS domain.
+        domain: ROS domain.
 
     Attributes:
         statuses: Newest report of each node.
         malformed: Messages that were no reports.
     """
 
-    def __init__(self, domain_id: int) -> None:
+    def __init__(self, domain: int) -> None:
+        super().__init__("teleop_live", domain)
         self.statuses: dict[str, Status] = {}
         self.malformed = 0
-        self._context = Context()
-        self._context.init(args=[], domain_id=domain_id)
-        self._node = Node(
-            "teleop_live", context=self._context, use_global_arguments=False, enable_rosout=False
-        )
-        self._reports = Subscription(self._node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
-        self._button = StopButton(self._node)
+        self._reports = Subscription(self.node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
+        self._button = StopButton(self.node)
         self._waiter = Waiter(self._context, self._reports)
 
-    def __enter__(self) -> "Observer":
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """Leave."""
         self._reports.close()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        super().close()
 
     def listen(self, timeout: float) -> None:
         """Take all reports that come within ``timeout`` [s] of the first one or of now."""
@@ -84,7 +75,7 @@ class Observer:
 
     def senders(self, topic: str) -> int:
         """Publishers of a topic that were found."""
-        return int(self._node.count_publishers(f"/{topic}"))
+        return int(self.node.count_publishers(f"/{topic}"))
 
     def is_active(self, name: str) -> bool:
         """Whether a node has reported that it is at work."""

@@ -8,9 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from rich.console import Console
@@ -22,6 +20,7 @@ from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF
 from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.graph.topics import BY_NAME, Quality
 from teleop_core.nodes.discovery import choose_transport
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import message_type
 
@@ -113,11 +112,8 @@ def _publishers(bag: Bag, names: list[str], *, has_clock: bool) -> Iterator[dict
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     choose_transport()
     types = {name: _type_in(bag, name) for name in names}
-    context = Context()
-    context.init(args=[])
-    node = Node("teleop_play", context=context, use_global_arguments=False, enable_rosout=False)
-    try:
-        publishers = {}
+    with Guest("teleop_play") as guest:
+        node, publishers = guest.node, {}
         for name, kind in types.items():
             topic = _KNOWN.get(name)
             publishers[name] = node.create_publisher(kind, name, profile(topic) if topic else 10)
@@ -127,9 +123,6 @@ def _publishers(bag: Bag, names: list[str], *, has_clock: bool) -> Iterator[dict
         for name, publisher in publishers.items():
             if name not in _KNOWN or _KNOWN[name].quality is not Quality.STREAM:
                 publisher.wait_for_all_acked(Duration(seconds=1))
-    finally:
-        node.destroy_node()
-        context.try_shutdown()
 
 
 def _is_installed(bag: Bag, name: str) -> bool:

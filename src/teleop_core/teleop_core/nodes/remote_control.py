@@ -5,14 +5,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import read_reports
 from teleop_core.base.errors import SessionError
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription
 from teleop_core.slave.operation import State, operation_text
@@ -38,8 +37,8 @@ class ArmState:
     stopped_after: float = -1.0
 
 
-class RemoteControl:
-    """Hand on the arms of one ROS domain, to be used with ``with``.
+class RemoteControl(Guest):
+    """Hand on the arms of one ROS domain.
 
     Args:
         domain: ROS domain.
@@ -51,26 +50,18 @@ class RemoteControl:
     """
 
     def __init__(self, domain: int, patience: float = 3.0) -> None:
+        super().__init__("teleop_remote_control", domain)
         self.domain, self._patience = domain, patience
         self.arms: dict[str, ArmState] = {}
-        self._context = Context()
-        self._context.init(args=[], domain_id=domain)
-        self._node = Node(
-            "teleop_remote_control", context=self._context, use_global_arguments=False,
-            enable_rosout=False,
-        )  # fmt: skip
         self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._button = StopButton(self._node)
+        self._executor.add_node(self.node)
+        self._button = StopButton(self.node)
         self._reports: dict[str, Subscription] = {}
 
-    def __enter__(self) -> "RemoteControl":
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """Leave the arms as they are."""
         self._executor.shutdown()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        super().close()
 
     def look(self) -> dict[str, ArmState]:
         """State of every arm, by its namespace, as soon as each has reported.
@@ -155,7 +146,7 @@ class RemoteControl:
             SessionError: The arm does not answer.
         """
         service = f"/{arm}/slave/{name}" if arm else f"/slave/{name}"
-        client = self._node.create_client(Trigger, service)
+        client = self.node.create_client(Trigger, service)
         self._until(client.service_is_ready, f"{service} on ROS domain {self.domain}")
         future = client.call_async(Trigger.Request())
         self._until(future.done, f"an answer of {service}")
@@ -175,9 +166,9 @@ class RemoteControl:
 
     def listen(self) -> None:
         """Take what has come; look for arms."""
-        for name, kinds in self._node.get_topic_names_and_types():
+        for name, kinds in self.node.get_topic_names_and_types():
             if name.endswith(f"/{SLAVE_OPERATION.name}") and name not in self._reports and kinds:
-                self._reports[name] = Subscription(self._node, SLAVE_OPERATION, name)
+                self._reports[name] = Subscription(self.node, SLAVE_OPERATION, name)
                 self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")] = ArmState()
         for name, reports in self._reports.items():
             arm = self.arms[name.removesuffix(SLAVE_OPERATION.name).strip("/")]

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from teleop_core.bags.messages import SECOND_NS
+from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.streams import message_type
 from teleop_core.nodes.taking import Taker
 from teleop_drill.conformance.rows import ROWS
@@ -65,7 +65,7 @@ class Tap(Taker):
         return [(sent_ns, deserialize_message(data, self.type)) for sent_ns, data in self._kept]
 
 
-class Arm:
+class Arm(Guest):
     """Client of one arm.
 
     Args:
@@ -74,23 +74,11 @@ class Arm:
     """
 
     def __init__(self, namespace: str, domain: int | None = None) -> None:
+        super().__init__("teleop_conformance", domain)
         self.namespace = "/" + namespace.strip("/")
-        self._context = Context()
-        self._context.init(args=[], domain_id=domain)
-        self.node = Node(
-            "teleop_conformance", context=self._context, use_global_arguments=False,
-            enable_rosout=False,
-        )  # fmt: skip
         self._taps: dict[str, Tap] = {}
         self._keeping: dict[str, Tap] = {}
         self._publishers: dict[str, Any] = {}
-
-    def __enter__(self) -> "Arm":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.node.destroy_node()
-        self._context.try_shutdown()
 
     def path(self, name: str) -> str:
         """Full name of one of its topics."""

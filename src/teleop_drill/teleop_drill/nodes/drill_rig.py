@@ -107,7 +107,7 @@ class LiveRig:
             self.session.close()
         finally:
             self.tap.close()
-            self.observer.__exit__()
+            self.observer.close()
             self._executor.shutdown()
             self._node.destroy_node()
             self._own.destroy_node()
