@@ -7,7 +7,6 @@ import threading
 import tty
 from collections import deque
 from collections.abc import Callable
-from types import TracebackType
 
 STOP = " "
 """Key that stops all arms."""
@@ -40,10 +39,7 @@ class Keys:
             self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:  # fmt: skip
+    def __exit__(self, *_: object) -> None:
         self._is_open = False
         if self.is_there:
             self._thread.join()

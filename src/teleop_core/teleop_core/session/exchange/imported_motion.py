@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 
 from teleop_core.base.damage import damage_told
 from teleop_core.base.errors import RecordingError
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.geometry import (
+    Array,
+    quaternion_from_rotation,
+    quaternion_products,
+)
 from teleop_core.kernels.portable import product
 from teleop_core.session.exchange.gathering import bridge, gather
 from teleop_core.session.exchange.options import ImportOptions
-from teleop_core.session.exchange.orientation import continuous, from_matrices, products
+from teleop_core.session.exchange.orientation import continuous
 from teleop_core.session.exchange.source import Source
 from teleop_core.session.exchange.spool import Spool
 from teleop_core.session.exchange.times import SECOND_NS, Stamps, gaps, ordered
@@ -174,7 +178,9 @@ class Motion:
     def _turned(self, quaternions: Array) -> Array:
         """Attitudes (n, 4) in the master's axes; a mirror turns those of the body as well."""
         if self._options.handedness == "right":
-            return products(from_matrices(self._turn[None])[0], quaternions)
+            turn = np.empty(4)
+            quaternion_from_rotation(np.ascontiguousarray(self._turn), turn)
+            return quaternion_products(turn, quaternions)
         # A turn of the file about an axis is the opposite turn about the mirrored axis.
         return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], self._turn.T)))
 

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.kernels import kernel
-from teleop_core.kernels.geometry import Array, multiply_quaternions
+from teleop_core.kernels.geometry import Array, multiply_quaternions, quaternion_from_rotation
 from teleop_core.kernels.portable import dot, length, product
 
 TOLERANCE = 0.1
 """How far a quaternion's length, or a matrix from being a rotation, may be off."""
 _MISSING = 1e-6  # shorter quaternions and directions mean that nothing was measured
-_AXES = {"x": 1, "y": 2, "z": 3}
 
 
 @dataclass
@@ -59,10 +58,16 @@ class Attitudes:
             )
         if self.kind == "forward":
             return self._of_directions(rows)
-        angles = np.radians(rows) if self.degrees else rows
+        return self._of_angles(np.radians(rows) if self.degrees else rows)
+
+    def _of_angles(self, angles: Array) -> Array:
+        from scipy.spatial.transform import Rotation
+
         if self.kind == "euler":
-            return from_euler(self.order, angles)
-        return from_rotation_vectors(angles)
+            turns = Rotation.from_euler(self.order, angles)
+        else:
+            turns = Rotation.from_rotvec(angles)
+        return np.asarray(turns.as_quat(scalar_first=True))
 
     def _unit(self, quaternions: Array) -> Array:
         lengths = length(quaternions)
@@ -82,7 +87,8 @@ class Attitudes:
         mirror = dot(np.cross(matrices[:, 0], matrices[:, 1]), matrices[:, 2]) < 0.0
         self.strange += int(((off | mirror) & ~missing).sum())
         self.mirrored += int((mirror & ~off).sum())
-        quaternions = from_matrices(matrices)
+        quaternions = np.empty((len(matrices), 4))
+        write_quaternions(np.ascontiguousarray(matrices), quaternions)
         quaternions[off | mirror | missing] = math.nan
         return quaternions
 
@@ -135,66 +141,11 @@ def transport(directions: Array, last: Array, quaternions: Array) -> None:
             quaternions[i, j] = last[3 + j]
 
 
-def from_matrices(matrices: Array) -> Array:
-    """Unit quaternions (N, 4) of rotation matrices (N, 3, 3), which may be off by rounding.
-
-    The largest component is computed first (Shepperd 1978).
-    """
-    d = np.diagonal(matrices, axis1=1, axis2=2)
-    trace = d.sum(axis=1)
-    squares = np.column_stack((trace, d))  # largest where that component is the largest
-    largest = np.argmax(squares, axis=1)
-    r = matrices
-    candidates = np.empty((4, len(matrices), 4))
-    wx, wy, wz = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
-    xy, xz, yz = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
-    x, y, z = d.T
-    candidates[0] = np.column_stack((1.0 + trace, wx, wy, wz))
-    candidates[1] = np.column_stack((wx, 1.0 + x - y - z, xy, xz))
-    candidates[2] = np.column_stack((wy, xy, 1.0 - x + y - z, yz))
-    candidates[3] = np.column_stack((wz, xz, yz, 1.0 - x - y + z))
-    chosen = candidates[largest, np.arange(len(matrices))]
-    with np.errstate(invalid="ignore"):
-        unit: Array = chosen / length(chosen)[:, None]
-    return unit
-
-
-def from_rotation_vectors(vectors: Array) -> Array:
-    """Unit quaternions (N, 4) of rotation vectors (N, 3) [rad]."""
-    half = 0.5 * length(vectors)
-    share = 0.5 * np.sinc(half / math.pi)
-    return np.column_stack((np.cos(half), share[:, None] * vectors))
-
-
-def from_euler(order: str, angles: Array) -> Array:
-    """Unit quaternions (N, 4) of Euler angles (N, 3) [rad].
-
-    Args:
-        order: Three axes in the order of the columns; small letters turn about fixed axes, capital
-            ones about the axes that turn along.
-        angles: Rows.
-    """
-    out: Array = np.tile([1.0, 0.0, 0.0, 0.0], (len(angles), 1))
-    for axis, angle in zip(order, angles.T, strict=True):
-        turn = np.zeros((len(angles), 4))
-        turn[:, 0], turn[:, _AXES[axis.lower()]] = np.cos(0.5 * angle), np.sin(0.5 * angle)
-        out = products(out, turn) if order.isupper() else products(turn, out)
-    return out
-
-
-def products(a: Array, b: Array) -> Array:
-    """Quaternions (N, 4) of rotations ``b`` followed by ``a``, each (N, 4) or (4,)."""
-    aw, ax, ay, az = np.moveaxis(a, -1, 0)
-    bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    return np.stack(
-        (
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ),
-        axis=-1,
-    )
+@kernel
+def write_quaternions(matrices: Array, quaternions: Array) -> None:
+    """Write the unit quaternions (N, 4) of rotation matrices (N, 3, 3), which may be off a bit."""
+    for i in range(matrices.shape[0]):
+        quaternion_from_rotation(matrices[i], quaternions[i])
 
 
 def continuous(quaternions: Array, last: Array | None) -> Array:

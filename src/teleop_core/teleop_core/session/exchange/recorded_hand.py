@@ -22,11 +22,11 @@ from teleop_core.chain.operators import Motion, Operator, Setting
 from teleop_core.chain.operators.rest import REST_TILT
 from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.geometry import Array, quaternion_products
 from teleop_core.kernels.portable import arctangent, length
 from teleop_core.session.exchange.master_bag import as_master_bag
 from teleop_core.session.exchange.options import ImportOptions
-from teleop_core.session.exchange.orientation import continuous, products
+from teleop_core.session.exchange.orientation import continuous
 
 COLUMNS = ("t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode")
 """Columns of a table: time [s], position [m], rotation vector [rad], buttons (1 pressed)."""
@@ -153,7 +153,7 @@ def _read(path: Path, options: ImportOptions | None, changed_ns: int) -> Samples
     new = np.concatenate(([True], np.diff(series.stamp_ns) > 0))
     stamps, values = series.stamp_ns[new], series.values[new]
     start_ns, first = int(stamps[0]), values[0, 3:] * (1.0, -1.0, -1.0, -1.0)
-    turns = continuous(products(values[:, 3:], first), np.array([1.0, 0.0, 0.0, 0.0]))
+    turns = continuous(quaternion_products(values[:, 3:], first), np.array([1.0, 0.0, 0.0, 0.0]))
     at: Array = (stamps - start_ns) * np.float64(1e-9)
     pressed, closed = _changes(bag, MASTER_BUTTONS, start_ns), _changes(bag, HAND_JAW, start_ns)
     return Samples(at, values[:, :3] - values[0, :3], turns, *pressed, *closed)
@@ -227,7 +227,7 @@ def held(changed_at: Array, values: Array, times: Array) -> Array:
 
 def _in_axes_of(rest: Array, turns: Array) -> Array:
     """Rotation vectors (N, 3) in the axes of an attitude, of turns (N, 4) in the base's."""
-    own = products(products(rest * (1.0, -1.0, -1.0, -1.0), turns), rest)
+    own = quaternion_products(quaternion_products(rest * (1.0, -1.0, -1.0, -1.0), turns), rest)
     sine = length(own[:, 1:])
     angle = 2.0 * arctangent(sine, own[:, 0])
     return np.asarray(own[:, 1:] * (angle / np.where(sine > 0.0, sine, 1.0))[:, None])

@@ -1,7 +1,6 @@
 """Spool: rows of numbers that are kept between two passes, on disk if there are many."""
 
 import tempfile
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,10 +55,5 @@ class Spool:
     def __enter__(self) -> "Spool":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
