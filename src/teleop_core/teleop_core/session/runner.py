@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags.arms import ARMS_KEY
-from teleop_core.bags.kept_files import FIXTURE, KeptFiles, recorded_files, recorded_geometry
+from teleop_core.bags.kept_files import (
+    FIXTURE,
+    TOUCHED,
+    KeptFiles,
+    recorded_files,
+    recorded_geometry,
+)
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
@@ -137,12 +143,6 @@ def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
     samples[f"{field}_ns"][is_known] = stamps[at[is_known]]
 
 
-_FILES = (
-    "robot", "world.mesh.file", "world.height_field.file", "fixture.mesh.file",
-    "fixture.keep_out_mesh.file",
-)  # fmt: skip
-
-
 def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     """Configuration and scenario that a recording was made with; empty ones for foreign bags.
 
@@ -160,9 +160,9 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     found = {arm: recorded_files(bag.metadata, arm) for arm in set(owners.values())}
     for name, values in layer.items():
         files = found[owners[name]]
-        for key in _FILES:
-            if (file := values.get(key)) in files:
-                values[key] = files[str(file)]
+        for key, value in values.items():
+            if (key == "robot" or key.endswith(".file")) and str(value) in files:
+                values[key] = files[str(value)]
         if isinstance(geometry := values.get("geometry"), tuple | list):
             values["geometry"] = recorded_geometry(map(str, geometry), files)
     _begin_at_home(layer)
@@ -241,12 +241,10 @@ def describe(configuration: Configuration) -> dict[str, str]:
     if graph.arms != ("",):
         about["arms"] = " ".join(graph.arms)
     for arm, prefix in prefixes.items():  # before what only is looked at
-        world = configuration.value("world", arm)
-        if world is not None and world.kind.kind in {"mesh", "height_field"}:
-            files.add_mesh(world.kind.parameters.file, prefix)
-        fixture = configuration.value("fixture", arm)
-        if fixture is not None and fixture.kind.kind in {"mesh", "keep_out_mesh"}:
-            files.add_mesh(fixture.kind.parameters.file, prefix, FIXTURE)
+        for name, kind in (("world", TOUCHED), ("fixture", FIXTURE)):
+            part = configuration.value(name, arm)
+            if file := part and getattr(part.kind.parameters, "file", ""):
+                files.add_mesh(file, prefix, kind)
     for arm, prefix in prefixes.items():
         about |= {f"{prefix}{n}": str(configuration.value(n, arm)) for n in ("robot", "seed")}
         geometry = configuration.value("geometry", arm) or ()

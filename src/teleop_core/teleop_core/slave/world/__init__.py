@@ -33,7 +33,8 @@ class WorldObject:
 
     Attributes:
         name: What ``--set world=`` calls it.
-        parameters: Its parameter group: real numbers and tuples of them, in the slave's base.
+        parameters: Its parameter group: real numbers and tuples of them, in the slave's base. What
+            a text ``file`` among them names is kept with recordings.
         distance: ``distance(offset, shape, normal)``, a kernel or a plain function. ``offset`` (3,)
             [m] runs from the middle of the object to the tip, along the slave's base; ``shape``
             holds the numbers of the parameters in their order; ``normal`` (3,) gets the unit vector
