@@ -10,13 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.base.parameters import parameter
+from teleop_core.graph.noise import Noise
 from teleop_core.graph.row import Row
 from teleop_core.kernels import inner
 from teleop_core.kernels.fields import Fields, Wrench
 from teleop_core.slave.arm import Arm
 
-BLOCK = 1000
-"""Ticks for which the noise is drawn at once."""
 STANDARD_GRAVITY = 9.80665
 """Weight of a mass [m/s²]; it pulls along -z of the slave's base."""
 _STREAM = 3  # of random numbers beside the seed; those of a human operator are 1 and 2
@@ -96,32 +95,17 @@ class ForceSensorParameters:
         p["is_ideal"] = not (p["has_noise"] or p["sensor_share"] or np.any(p["sensor_offset"]))
 
 
-class SensorNoise:
-    """Noise of the coming ticks, which the same seed draws again.
-
-    Attributes:
-        rows: Standard normal numbers, shape (:data:`BLOCK`, 6), a row for each sample.
-    """
+class SensorNoise(Noise):
+    """Noise of a sensor, which the same seed draws again."""
 
     def __init__(self, seed: int) -> None:
-        self._seed, self.rows = seed, np.zeros((BLOCK, 6))
+        super().__init__()
+        self._seed = seed
         self.reset()
 
     def reset(self) -> None:
         """Begin again."""
-        self._rng = np.random.default_rng((self._seed, _STREAM))
-        self._end = 0
-
-    def prepare(self, s: SensorState, ticks: int) -> None:
-        """Draw what the next ticks take from row ``s.next_noise`` on."""
-        first = int(s["next_noise"])
-        left = self._end - first
-        if left >= ticks:
-            return
-        self.rows[:left] = self.rows[first : self._end]
-        self._end = BLOCK
-        s["next_noise"] = 0
-        self.rows[left:] = self._rng.standard_normal((BLOCK - left, 6))
+        self.begin(np.random.default_rng((self._seed, _STREAM)))
 
 
 @inner

@@ -27,6 +27,7 @@ from teleop_core.chain.master.hand_mechanics import (
 from teleop_core.chain.master.rendering import RenderingNumbers, RenderingState, render
 from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT, rest_pose
 from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.graph.noise import Noise
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, assign
 from teleop_core.graph.stage import RunningStage, Stage
@@ -52,8 +53,6 @@ from teleop_core.kernels.geometry import (
 )
 from teleop_core.slave.operation.states import State
 
-BLOCK = 1000
-"""Ticks for which the noise is drawn at once, at most."""
 _DOUBT_NS = 1_000_000_000
 """Time for which a source of force is not believed after it was out of range [ns]."""
 _GRIP_NS = 300_000_000
@@ -202,7 +201,7 @@ class HapticMaster(RunningStage):
     def __init__(self, parameters: HapticMasterParameters, dt: float = DT) -> None:
         super().__init__(HAPTIC_MASTER, 0, dt)
         self.parameters, self.state = record(MasterNumbers), record(MasterState)
-        self._noises = np.zeros((BLOCK, 6))
+        self._noise = Noise()
         self._fixed = parameters
         self.kernel = haptic_master_step
         self.retune(parameters)
@@ -210,12 +209,12 @@ class HapticMaster(RunningStage):
 
     def reset(self) -> None:
         """Stylus in the inkwell, with the random numbers of the seed; a hand is about to come."""
-        self._rng = np.random.default_rng(self._fixed.seed)
-        self._rng.uniform(0.0, 2.0 * math.pi, PHASES)  # those of the operator, who has the seed too
-        self._end_of_noise = 0
+        rng = np.random.default_rng(self._fixed.seed)
+        rng.uniform(0.0, 2.0 * math.pi, PHASES)  # those of the operator, who has the seed too
+        self._noise.begin(rng)
         rest = transform(rotation("x", REST_TILT), np.array(REST_POSITION))
         self.handle = make_handle(self._fixed.device, rest)
-        self.arguments = (self.parameters, self.state, self.handle, self._noises)
+        self.arguments = (self.parameters, self.state, self.handle, self._noise.rows)
         self._bound = None
         assign(self.state, 0)
         self.signals["master_contact"] = 0.0
@@ -263,14 +262,7 @@ class HapticMaster(RunningStage):
 
     def prepare(self, ticks: int) -> None:
         """Draw the noise of the next ticks."""
-        first = int(self.state["next_noise"])
-        left = self._end_of_noise - first
-        if left >= ticks:
-            return
-        self._noises[:left] = self._noises[first : self._end_of_noise]
-        self._end_of_noise = BLOCK
-        self.state["next_noise"] = 0
-        self._noises[left:] = self._rng.standard_normal((BLOCK - left, 6))
+        self._noise.prepare(self.state, ticks)
 
 
 HAPTIC_MASTER = Stage(

@@ -13,6 +13,7 @@ from teleop_core.chain.operators.parameters import PRESS_TIME, OperatorParameter
 from teleop_core.chain.operators.remote import RemoteHand
 from teleop_core.chain.operators.rest import REST_POSITION, rest_pose
 from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.graph.noise import BLOCK, Noise
 from teleop_core.graph.row import Row
 from teleop_core.graph.signals import DT, STATE, assign
 from teleop_core.graph.stage import RunningStage, Stage
@@ -29,9 +30,6 @@ from teleop_core.graph.topics import (
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Fields, Vector3, record, record_array
 from teleop_core.kernels.geometry import Array, rotate_by_vector
-
-BLOCK = 1000
-"""Ticks for which the wanted motion and the tremor are drawn at once, at most."""
 
 
 class OperatorNumbers(Fields):
@@ -139,18 +137,18 @@ class RunningOperator(RunningStage):
         super().__init__(OPERATOR, 0, dt)
         self.parameters, self.state = record(OperatorNumbers), record(OperatorState)
         # The first record of what is wanted is that of the present tick.
-        self._wanted, self._noises = record_array(Wanted, BLOCK + 1), np.zeros((BLOCK, 6))
+        self._wanted, self._noise = record_array(Wanted, BLOCK + 1), Noise()
         self._fixed = parameters
         self.kernel = operator_step
-        self.arguments = (self.parameters, self.state, self._wanted, self._noises)
+        self.arguments = (self.parameters, self.state, self._wanted, self._noise.rows)
         self.retune(parameters)
         self.reset()
 
     def reset(self) -> None:
         """Stylus in the inkwell, at time zero, with the random numbers of the seed."""
         fixed, row = self._fixed, self.signals
-        self._rng = np.random.default_rng(fixed.seed)
-        phases = self._rng.uniform(0.0, 2.0 * math.pi, PHASES)
+        rng = np.random.default_rng(fixed.seed)
+        phases = rng.uniform(0.0, 2.0 * math.pi, PHASES)
         self._operator = OPERATORS.find(fixed.kind.kind)
         self.ahead = min(self._operator.ahead, BLOCK)
         seen = Seen(*(row[topic.field] for topic in OPERATOR.reads))
@@ -159,7 +157,8 @@ class RunningOperator(RunningStage):
         buttons = fixed.buttons
         has_presses = bool(buttons.clutch or buttons.fixture or buttons.mode or buttons.jaw)
         self._person = None if has_presses else self.hand
-        self._tick, self._end, self._end_of_noise = 0, 1, 0
+        self._noise.begin(rng)
+        self._tick, self._end = 0, 1
         assign(self.state, 0)
         now, rest = self._wanted[0], rest_pose()
         self._rest = rest[3:]
@@ -190,7 +189,7 @@ class RunningOperator(RunningStage):
 
     def prepare(self, ticks: int) -> None:
         """Draw what is wanted in the next ticks, as far ahead as the operator can be asked."""
-        self._prepare_noise(ticks)
+        self._noise.prepare(self.state, ticks)
         now = int(self.state["next"])
         left = self._end - now  # with the record of the present tick
         if left > ticks:
@@ -199,16 +198,6 @@ class RunningOperator(RunningStage):
         self._end = max(ticks, min(left - 1 + self._operator.ahead, BLOCK)) + 1
         self.state["next"] = 0
         self._draw(self._wanted[left : self._end])
-
-    def _prepare_noise(self, ticks: int) -> None:
-        first = int(self.state["next_noise"])
-        left = self._end_of_noise - first
-        if left >= ticks:
-            return
-        self._noises[:left] = self._noises[first : self._end_of_noise]
-        self._end_of_noise = BLOCK
-        self.state["next_noise"] = 0
-        self._noises[left:] = self._rng.standard_normal((BLOCK - left, 6))
 
     def _draw(self, drawn: Any) -> None:
         """Fill records with what the operator wants in the ticks that follow."""
