@@ -1,5 +1,7 @@
 """Pairing: which samples of two topics belong together."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
@@ -70,6 +72,17 @@ def same_stamp(stamp_ns: Integers, other_stamp_ns: Integers) -> Integers:
     ordered = other_stamp_ns[order]
     at = np.minimum(np.searchsorted(ordered, stamp_ns), len(ordered) - 1)
     return np.where(ordered[at] == stamp_ns, order[at], NONE)
+
+
+def mean_wait_s(begins_ns: Sequence[int], ends_ns: Sequence[int]) -> float | None:
+    """Mean time [s] from the last beginning, not after an end, to it; None without any."""
+    before = np.searchsorted(begins_ns, ends_ns, side="right")
+    waits = [
+        1e-9 * (end - begins_ns[i - 1])
+        for end, i in zip(ends_ns, before.tolist(), strict=True)
+        if i
+    ]
+    return float(np.mean(waits)) if waits else None
 
 
 def _order(stamps: Integers) -> Integers:

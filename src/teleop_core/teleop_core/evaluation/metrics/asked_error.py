@@ -111,20 +111,25 @@ _MEANING = (
 )
 
 
-class AskedErrorMetric(SpreadMetric):
+class _AskedMetric(SpreadMetric):
+    """Spread of an error against what was asked for."""
+
+    group, topics = _GROUP, ASKED_TOPICS
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._asked = context.shared(Asked)
+
+
+class AskedErrorMetric(_AskedMetric):
     """Spread of the distance between tip and asked place, [mm].
 
     What limits cut off stays in the error until the next clutch stroke, and the lag of filters and
     interpolation is in it.
     """
 
-    name, group = "asked_error_mm", _GROUP
+    name = "asked_error_mm"
     keys = (Key("asked_error_mm.rms|sd|max", "mm", f"{_MEANING}: {SPREAD_MEANING}"),)
-    topics = ASKED_TOPICS
-
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._asked = context.shared(Asked)
 
     def errors(self, window: Window) -> Array:
         """Distances (N,) [mm]."""
@@ -133,19 +138,14 @@ class AskedErrorMetric(SpreadMetric):
         return np.asarray(np.linalg.norm(off, axis=1) * 1e3)
 
 
-class AskedTurnMetric(SpreadMetric):
+class AskedTurnMetric(_AskedMetric):
     """Spread of the angle between the tool and its asked orientation, [deg].
 
     None where ``rotation_gain`` is not 1: the tool then has no orientation that is asked for.
     """
 
-    name, group, label, unit = "asked_error_deg", _GROUP, "rotation", "deg"
+    name, label, unit = "asked_error_deg", "rotation", "deg"
     keys = (Key("asked_error_deg.rms|sd|max", "deg", f"angle of {_MEANING}: {SPREAD_MEANING}"),)
-    topics = ASKED_TOPICS
-
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._asked = context.shared(Asked)
 
     def errors(self, window: Window) -> Array:
         """Angles (N,) [deg]."""

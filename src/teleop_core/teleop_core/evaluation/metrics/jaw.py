@@ -7,6 +7,7 @@ import numpy as np
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import COMMAND, DARK, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.pairing import mean_wait_s
 from teleop_core.evaluation.rows import Row, number, row
 from teleop_core.evaluation.traces import Envelope
 from teleop_core.evaluation.windows import Window
@@ -71,23 +72,13 @@ class JawMetric(Metric):
         self._peak = max(self._peak, float(grips.values[:, _FORCE].max()))
         self._force.add(grips.log_ns, grips.values[:, :1])
 
-    def _delay(self) -> float | None:
-        """Mean time [s] from the last command that begins to close to the grip that follows."""
-        before = np.searchsorted(self._closings, self._begins, side="right")
-        times = [
-            1e-9 * (begin - self._closings[i - 1])
-            for begin, i in zip(self._begins, before.tolist(), strict=True)
-            if i
-        ]
-        return float(np.mean(times)) if times else None
-
     def values(self) -> JawScore:
         """Score of everything so far."""
         if self._first is None:
             return JawScore(None, None, None, None, None)
         counts = self._last - self._first
         grips, slips, drops = (int(counts[i]) for i in (_GRIPS, _SLIPS, _DROPS))
-        return JawScore(grips, slips, drops, self._peak, self._delay())
+        return JawScore(grips, slips, drops, self._peak, mean_wait_s(self._closings, self._begins))
 
     def rows(self) -> list[Row]:
         """Counts, force and delay; nothing without a grip."""

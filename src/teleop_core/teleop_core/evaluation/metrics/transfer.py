@@ -6,6 +6,7 @@ import numpy as np
 
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import Metric, figure, keys_of
+from teleop_core.evaluation.pairing import mean_wait_s
 from teleop_core.evaluation.rows import Row, row
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_GRIP
@@ -60,23 +61,15 @@ class TransferMetric(Metric):
         self._last = board.values[-1]
         self._peak = max(self._peak, float(board.values[:, _PULL].max()))
 
-    def _time(self) -> float | None:
-        """Mean time [s] from the last grip before a transfer to its end."""
-        before = np.searchsorted(self._begins, self._ends)
-        times = [
-            1e-9 * (end - self._begins[i - 1])
-            for end, i in zip(self._ends, before.tolist(), strict=True)
-            if i
-        ]
-        return float(np.mean(times)) if times else None
-
     def values(self) -> TransferScore:
         """Score of everything so far."""
         if self._first is None:
             return TransferScore(None, None, None, None)
         counts = self._last - self._first
         transferred, dropped = int(counts[_TRANSFERRED]), int(counts[_DROPPED])
-        return TransferScore(transferred, dropped, self._time(), self._peak)
+        return TransferScore(
+            transferred, dropped, mean_wait_s(self._begins, self._ends), self._peak
+        )
 
     def rows(self) -> list[Row]:
         """All four; nothing where no object came onto a peg or missed one."""
