@@ -19,11 +19,7 @@ def in_order(series: Series) -> Series:
     """The samples in the order of their stamps; as they are if that is their order already."""
     if not (np.diff(series.stamp_ns) < 0).any():
         return series
-    order = np.argsort(series.stamp_ns, kind="stable")
-    return Series(
-        series.stamp_ns[order], series.log_ns[order], series.values[order],
-        series.names, series.frame_id,
-    )  # fmt: skip
+    return series[np.argsort(series.stamp_ns, kind="stable")]
 
 
 def replayed_span(path: Path, name: str, stamp_ns: NDArray[np.int64]) -> tuple[int, int]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from teleop_core.evaluation.accumulators import Moments
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.metric import Metric, figure, keys_of
 from teleop_core.evaluation.metrics.motion import approach_end_ns
@@ -49,7 +50,7 @@ class RemoteCentreMetric(Metric):
 
     def __init__(self, context: Context) -> None:
         self._begin_ns = approach_end_ns(context) if context.span is None else context.span.first_ns
-        self._count, self._squares, self._most, self._least = 0, 0.0, 0.0, np.inf
+        self._off, self._least = Moments(), np.inf
         self._last: Array | None = None
 
     def add(self, window: Window) -> None:
@@ -61,17 +62,14 @@ class RemoteCentreMetric(Metric):
         if self._last is None or not counts.any():
             return
         off, depth = distances(poses.values[counts, :7], self._last[:3], self._last[3:])
-        self._count += len(off)
-        self._squares += float((off**2).sum())
-        self._most = max(self._most, float(off.max()))
+        self._off.add(1e3 * off)
         self._least = min(self._least, float(depth.min()))
 
     def values(self) -> RemoteCentreScore:
         """Score of everything so far."""
-        if not self._count:
-            return RemoteCentreScore(None, None, None)
-        rms = 1e3 * float(np.sqrt(self._squares / self._count))
-        return RemoteCentreScore(rms, 1e3 * self._most, 1e3 * self._least)
+        off = self._off.spread()
+        least = 1e3 * self._least if self._off.count else None
+        return RemoteCentreScore(off.rms, off.max, least)
 
     def rows(self) -> list[Row]:
         """All three; nothing without a remote centre."""
