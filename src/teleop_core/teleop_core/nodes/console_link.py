@@ -19,12 +19,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from teleop_core.bags.messages import Layout, layout, read_any, read_numbers, read_reports
+from teleop_core.bags.messages import Layout, layout, read_any, read_numbers
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.console.link import Arm, ArmView, ParameterInfo, Parameters, Setting, View
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import (
-    DIAGNOSTICS,
     OPERATION,
     OPERATOR_BUTTONS,
     OPERATOR_SERVO_CP,
@@ -34,9 +33,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.display import SEEN, displayed
-from teleop_core.nodes.guest import Guest
-from teleop_core.nodes.observer import WARNING, Status
-from teleop_core.nodes.operation import StopButton
+from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.parameter_client import ParameterClient, ParameterEvents, call
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot_set
@@ -87,7 +84,7 @@ class _Seen:
                 self._subscription = Subscription(self._node, self._own, self._name, 1)
 
 
-class LiveLink(Guest):
+class LiveLink(Observer):
     """A :class:`~teleop_core.console.link.Link` to a running session.
 
     Args:
@@ -102,7 +99,7 @@ class LiveLink(Guest):
     is_live = True
 
     def __init__(self, domain: int, title: str = "", patience: float = PATIENCE) -> None:
-        super().__init__("teleop_console", domain, start_parameter_services=False)
+        super().__init__(domain, "teleop_console", start_parameter_services=False)
         self.domain = domain
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
@@ -110,12 +107,10 @@ class LiveLink(Guest):
         self._thread = threading.Thread(target=self._spin, name="console link", daemon=True)
         self._thread.start()
         self._lock = threading.Lock()
-        self._button, self._pressing = StopButton(self.node), threading.Lock()
+        self._pressing = threading.Lock()
         self._clients: dict[str, Any] = {}
         self._client, self._events = ParameterClient(self.node), ParameterEvents(self.node)
         self._known: dict[tuple[str, str], ParameterInfo] = {}
-        self._statuses: dict[str, Status] = {}
-        self._reports = Subscription(self.node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
         self._runs, self._is_pressed = 0, False
         try:
             self._find(patience)
@@ -214,24 +209,17 @@ class LiveLink(Guest):
                 view.state = dict(zip(TELEOP_STATE.columns, map(float, found[1]), strict=True))
 
     def _hear_nodes(self, view: View) -> None:
-        is_new = False
-        while (taken := self._reports.take()) is not None:
-            with suppress(ValueError):  # bytes of anybody, that are no report
-                for one in read_reports(taken.data):
-                    status = Status(one.level, one.message, one.values, time.monotonic())
-                    self._statuses[one.name] = status
-                    is_new = True
-        if not is_new:
+        if not self.take():
             return
-        named = (s for n, s in self._statuses.items() if n.rsplit("/", 1)[-1] == RECORDER_NAME)
+        named = (s for n, s in self.statuses.items() if n.rsplit("/", 1)[-1] == RECORDER_NAME)
         recorder = next(named, None)
         if recorder is not None and recorder.values.get("out"):
             is_recording = recorder.number("is_recording") > 0
             view.recording = Path(recorder.values["out"]) if is_recording else None
         view.news = tuple(
-            f"{name}: {s.message}" for name, s in self._statuses.items() if s.level >= WARNING
+            f"{name}: {s.message}" for name, s in self.statuses.items() if s.level >= WARNING
         )
-        slave = self._statuses.get("/".join(filter(None, (self.arms[0].name, "slave"))))
+        slave = self.statuses.get("/".join(filter(None, (self.arms[0].name, "slave"))))
         if slave is not None:
             unknown = "delay_ms.median" not in slave.values
             median, worst = (slave.number(f"delay_ms.{w}") * 1e-3 for w in ("median", "p99"))
@@ -253,7 +241,7 @@ class LiveLink(Guest):
             return False, str(error)
         return bool(answer.success), str(answer.message)
 
-    def press(self, *, is_pressed: bool) -> None:
+    def press(self, *, is_pressed: bool = True) -> None:
         """Press or release the emergency stop of all arms.
 
         A stop is said again at every :meth:`view` until all arms have said that it is in force.

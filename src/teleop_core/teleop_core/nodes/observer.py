@@ -3,6 +3,7 @@
 import math
 import time
 from dataclasses import dataclass, field
+from typing import Any
 
 from teleop_core.bags.messages import read_reports
 from teleop_core.graph.topics import DIAGNOSTICS
@@ -36,14 +37,16 @@ class Observer(Guest):
 
     Args:
         domain: ROS domain.
+        name: What its node is called.
+        options: Further ones of the node, as rclpy has them.
 
     Attributes:
         statuses: Newest report of each node.
         malformed: Messages that were no reports.
     """
 
-    def __init__(self, domain: int) -> None:
-        super().__init__("teleop_live", domain)
+    def __init__(self, domain: int, name: str = "teleop_live", **options: Any) -> None:
+        super().__init__(name, domain, **options)
         self.statuses: dict[str, Status] = {}
         self.malformed = 0
         self._reports = Subscription(self.node, DIAGNOSTICS, f"/{DIAGNOSTICS.name}", 100)
@@ -58,6 +61,11 @@ class Observer(Guest):
     def listen(self, timeout: float) -> None:
         """Take all reports that come within ``timeout`` [s] of the first one or of now."""
         self._waiter.wait(timeout)
+        self.take()
+
+    def take(self) -> bool:
+        """Take all reports that have come; whether there were any."""
+        is_new = False
         while (taken := self._reports.take()) is not None:
             try:
                 reports = read_reports(taken.data)
@@ -68,6 +76,8 @@ class Observer(Guest):
                 self.statuses[one.name] = Status(
                     one.level, one.message, one.values, time.monotonic()
                 )
+                is_new = True
+        return is_new
 
     def press(self, *, is_pressed: bool = True) -> None:
         """Press the emergency stop of all arms, or release it; from any thread."""
