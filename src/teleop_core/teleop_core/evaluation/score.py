@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NoReturn, TypeVar, cast
+from typing import TYPE_CHECKING, Generic, NoReturn, TypeVar
 
 from teleop_core.base.errors import EvaluationError, UnknownNameError
 from teleop_core.evaluation.accumulators import Delay, Spread
@@ -124,6 +124,21 @@ class Result:
     rows: tuple[Row, ...]
 
 
+class _Found(Generic[Record]):
+    """Attribute of a score: what the metric of that name found, of a type."""
+
+    def __init__(self, kind: type[Record]) -> None:
+        self._kind = kind
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, score: "Score | None", owner: type) -> Record:
+        if score is None:
+            return self  # type: ignore[return-value]
+        return score.record(self._name, self._kind)
+
+
 @dataclass(frozen=True, repr=False)
 class Score:
     """Score of one arm of a recording; :func:`keys` says what each entry means.
@@ -210,80 +225,36 @@ class Score:
 
     # -- the metrics of this package, typed ------------------------------------------------------
 
-    @property
-    def samples(self) -> Samples:
-        """How many slave poses were scored."""
-        return self.record("samples", Samples)
-
-    @property
-    def reach(self) -> ReachScore:
-        """For how much of the time the slave followed, and why not for all of it."""
-        return self.record("reach", ReachScore)
-
-    @property
-    def asked_error_mm(self) -> Spread:
-        """Distance of the slave's tip from where the hand would have brought it, [mm]."""
-        return self.record("asked_error_mm", Spread)
-
-    @property
-    def asked_error_deg(self) -> Spread:
-        """Angle between the tool and how the hand would have turned it, [deg]."""
-        return self.record("asked_error_deg", Spread)
-
-    @property
-    def position_error_mm(self) -> Spread:
-        """Distance of the slave's tip from its reference, [mm]."""
-        return self.record("position_error_mm", Spread)
-
-    @property
-    def orientation_error_deg(self) -> OrientationError:
-        """Angles between the slave's tip and its reference, [deg]."""
-        return self.record("orientation_error_deg", OrientationError)
-
-    @property
-    def true_error_mm(self) -> Spread:
-        """Distance of the true tip from its reference, [mm]; of None where nobody tells it."""
-        return self.record("true_error_mm", Spread)
-
-    @property
-    def command_error_mm(self) -> Spread:
-        """Distance of the slave's tip from the newest command, [mm]."""
-        return self.record("command_error_mm", Spread)
-
-    @property
-    def command_orientation_error_deg(self) -> OrientationError:
-        """Angles between the slave's tip and the newest command, [deg]."""
-        return self.record("command_orientation_error_deg", OrientationError)
-
-    @property
-    def fixture(self) -> FixtureScore:
-        """How far hand and slave got out of the virtual fixture."""
-        return self.record("fixture", FixtureScore)
-
-    @property
-    def force_n(self) -> Spread:
-        """Magnitude of the force on the hand, [N]."""
-        return self.record("force_n", Spread)
-
-    @property
-    def latency_ms(self) -> dict[str, Delay]:
-        """Delay of each stage and of the whole chain, [ms]."""
-        return cast(dict[str, Delay], self.record("latency_ms", dict))
-
-    @property
-    def ticks(self) -> Ticks:
-        """Control ticks of the slave."""
-        return self.record("ticks", Ticks)
-
-    @property
-    def nodes(self) -> Counts:
-        """Counts that the nodes reported last."""
-        return cast(Counts, self.record("nodes", dict))
-
-    @property
-    def topics(self) -> dict[str, TopicScore]:
-        """Messages of each topic and how many are missing."""
-        return cast(dict[str, TopicScore], self.record("topics", dict))
+    samples = _Found(Samples)
+    """How many slave poses were scored."""
+    reach = _Found(ReachScore)
+    """For how much of the time the slave followed, and why not for all of it."""
+    asked_error_mm = _Found(Spread)
+    """Distance of the slave's tip from where the hand would have brought it, [mm]."""
+    asked_error_deg = _Found(Spread)
+    """Angle between the tool and how the hand would have turned it, [deg]."""
+    position_error_mm = _Found(Spread)
+    """Distance of the slave's tip from its reference, [mm]."""
+    orientation_error_deg = _Found(OrientationError)
+    """Angles between the slave's tip and its reference, [deg]."""
+    true_error_mm = _Found(Spread)
+    """Distance of the true tip from its reference, [mm]; of None where nobody tells it."""
+    command_error_mm = _Found(Spread)
+    """Distance of the slave's tip from the newest command, [mm]."""
+    command_orientation_error_deg = _Found(OrientationError)
+    """Angles between the slave's tip and the newest command, [deg]."""
+    fixture = _Found(FixtureScore)
+    """How far hand and slave got out of the virtual fixture."""
+    force_n = _Found(Spread)
+    """Magnitude of the force on the hand, [N]."""
+    latency_ms = _Found[dict[str, Delay]](dict)
+    """Delay of each stage and of the whole chain, [ms]."""
+    ticks = _Found(Ticks)
+    """Control ticks of the slave."""
+    nodes = _Found[Counts](dict)
+    """Counts that the nodes reported last."""
+    topics = _Found[dict[str, TopicScore]](dict)
+    """Messages of each topic and how many are missing."""
 
 
 def _by_key(tree: Mapping[str, Plain]) -> dict[str, Leaf]:
