@@ -47,7 +47,7 @@ def witness(domain):
     """What the controller says of its commands: first one's distance, and the largest step."""
     context = Context()
     context.init(domain_id=domain)
-    node = rclpy.create_node("looks_on", context=context)
+    node = rclpy.create_node("looks_on", context=context, start_parameter_services=False)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     said = []
