@@ -13,7 +13,10 @@ from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import Float64MultiArray
 
 import teleop_core as tc
+from browser import Tab
+from console_process import STARTS, ConsoleProcess
 from drill_runs import run_drill
+from driven_page import PATIENT, SIZE, pull, ready, rest
 from mutants import ROOT
 from teleop_core.nodes.children import environment, free_domain
 
@@ -44,7 +47,7 @@ def witness(domain):
     """What the controller says of its commands: first one's distance, and the largest step."""
     context = Context()
     context.init(domain_id=domain)
-    node = rclpy.create_node("looks_on", context=context)
+    node = rclpy.create_node("looks_on", context=context, start_parameter_services=False)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     said = []
@@ -65,26 +68,35 @@ def witness(domain):
         context.shutdown()
 
 
-def led(tmp_path, bridge, seed, *settings, duration="8"):
-    """A recorded session that leads the arm, and what the controller witnessed."""
+@contextmanager
+def arm(*others):
+    """A domain in which the others run, and what the controller among them witnesses at the end."""
     env = environment() | {"ROS_DOMAIN_ID": free_domain()}
-    others = [subprocess.Popen(c, env=env) for c in ([*CONTROLLER, str(seed)], bridge)]
+    started = [subprocess.Popen(command, env=env) for command in others]
+    try:
+        with witness(int(env["ROS_DOMAIN_ID"])) as newest:
+            yield env, newest
+    finally:
+        for other in started:
+            other.terminate()
+        codes = [other.wait(60) for other in started]
+    assert set(codes) == {0}
+
+
+def led(tmp_path, bridge, seed, *settings, operator=()):
+    """A recorded session that leads the arm, and what the controller witnessed."""
     out = tmp_path / f"bag_{seed}"
     live = [
         sys.executable, "-m", "teleop_core.cli", "live", "--without", "slave_sim",
-        "--out", str(out), "--duration", duration, "--set", *ARM, *settings,
+        *(["--without", "operator"] if operator else []),
+        "--out", str(out), "--duration", "8", "--set", *ARM, *settings,
     ]  # fmt: skip
-    try:
-        with witness(int(env["ROS_DOMAIN_ID"])) as newest:
-            done = subprocess.run(
-                live, env=env, check=False, capture_output=True, text=True, timeout=300
-            )
-            first, largest = newest()
-    finally:
-        for other in others:
-            other.terminate()
-        codes = [other.wait(60) for other in others]
-    assert codes == [0, 0]
+    others = [[*CONTROLLER, str(seed)], bridge, *([operator] if operator else [])]
+    with arm(*others) as (env, newest):
+        done = subprocess.run(
+            live, env=env, check=False, capture_output=True, text=True, timeout=300
+        )
+        first, largest = newest()
     assert done.returncode == 0, done.stdout + done.stderr
     return tc.open_recording(out), first, largest
 
@@ -106,6 +118,37 @@ def goes_home_and_follows(recording, first, largest):
 
 def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(tmp_path, bridge):
     goes_home_and_follows(*led(tmp_path, bridge, 1))
+
+
+def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path, bridge):
+    pytest.importorskip("pygame")
+    pad = [sys.executable, str(ROOT / "tests/padded_operator.py"), "operator"]
+    operator = [*pad, "--ros-args", "-p", "kind:=gamepad"]
+    recording, first, largest = led(tmp_path, bridge, 1, "operator=gamepad", operator=operator)
+    goes_home_and_follows(recording, first, largest)
+    hand = recording["hand/servo_cp"][["x", "y", "z"]]
+    assert sorted(np.ptp(hand, axis=0))[1] > 0.02  # round and round in a plane
+
+
+@pytest.mark.soak
+@pytest.mark.browser
+def test_a_person_at_the_page_leads_it_without_a_jump(tmp_path, bridge):
+    pytest.importorskip("viser")
+    with arm([*CONTROLLER, "1"], bridge) as (env, newest):
+        out = tmp_path / "bag"
+        texts = ["--without", "slave_sim", "--out", out, "--set", *ARM, PATIENT]
+        console = ConsoleProcess(tmp_path, *texts, env=env)
+        try:
+            with Tab(tmp_path / "browser", *SIZE) as tab:
+                tab.visit(console.url)
+                tab.shows("ENABLED", STARTS)
+                ready(tab)
+                tab.mouse("mouseReleased", *pull(tab, 0))
+                rest(tab)
+        finally:
+            assert console.end() == 0, console.text
+        first, largest = newest()
+    goes_home_and_follows(tc.open_recording(out), first, largest)
 
 
 @pytest.mark.soak

@@ -37,6 +37,7 @@ from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.parameter_client import ParameterClient, ParameterEvents, call
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot_set
+from teleop_core.robots.robot import Robot
 from teleop_core.slave.operation import operation_text
 
 PATIENCE = 5.0
@@ -93,7 +94,7 @@ class LiveLink(Observer):
         patience: Time in which an arm must be found [s].
 
     Raises:
-        SessionError: There is no arm on this domain.
+        SessionError: There is no arm on this domain, or one does not say which robot it is.
     """
 
     is_live = True
@@ -162,11 +163,12 @@ class LiveLink(Observer):
         self._view = View(arms={arm.name: ArmView() for arm in self.arms})
         self._begun = self._heard = time.monotonic()
 
-    def _robot(self, arm: str) -> Any:
+    def _robot(self, arm: str) -> Robot:
         slave = "/".join(filter(None, (arm, "slave")))
-        name = str(self._value(slave, "robot") or "rcrt1")
-        geometry = self._value(slave, "geometry")
-        return load_robot_set(name, geometry if isinstance(geometry, tuple) else ())  # type: ignore[arg-type]
+        values = self._client.values(slave, ["robot", "geometry"])  # no answer is no RCRT-1
+        geometry = values.get("geometry")
+        texts = tuple(map(str, geometry)) if isinstance(geometry, tuple) else ()
+        return load_robot_set(str(values.get("robot", "rcrt1")), texts)
 
     def _recorder(self) -> str:
         """Recorder of the session, in its namespace."""
