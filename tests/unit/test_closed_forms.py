@@ -18,8 +18,12 @@ from random_arms import (
     urdf,
     wrist_axes,
 )
+from teleop_core.kernels import kernel
 from teleop_core.robots import IkStatus, dh_kernels, load_robot, swivel
+from teleop_core.robots.branches import turn
 from teleop_core.robots.chains import chain_of
+from teleop_core.robots.closed_form import constants_at
+from teleop_core.robots.swivel_arcs import ARCS, MARGIN, cut_circle, swivel_of
 
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 SIX = [(kind, wrist_axes, "spherical") for kind in SHOULDERS]
@@ -247,10 +251,51 @@ def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(seed, lo
                                   for m, h in zip(middle, half, strict=True)])  # fmt: skip
     found, work = np.empty((13, 8)), np.empty((60, 4))
     for q in rng.uniform(arm.lower, arm.upper, (100, 7)):
-        swivel._branches(arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(), True, found,
-                         work)  # fmt: skip
-        off = (found[:8, :7] - middle + math.pi) % (2.0 * math.pi) - math.pi
-        assert ((abs(off) <= half + 1e-9).all(axis=1) & (found[:8, 7] > 0.5)).any()
+        count, _ = swivel._branches(arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(),
+                                    True, found, work)  # fmt: skip
+        off = (found[:count, :7] - middle + math.pi) % (2.0 * math.pi) - math.pi
+        assert ((abs(off) <= half + 1e-9).all(axis=1) & (found[:count, 7] > 0.5)).any()
+
+
+@kernel
+def psi_of(branch, elbow, seed, limits, geometry, work):
+    """Psi [rad] that is taken of a branch; infinity where none is legal."""
+    S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
+    K, arcs = geometry[constants_at(7) :], np.empty(ARCS)
+    cut_circle(S, W, K, limits, arcs)
+    return swivel_of(branch, S, W, K, seed, limits, arcs)
+
+
+@kernel
+def write_at(branch, psi, elbow, seed, limits, geometry, work, q):
+    """Write the joints (8,) of a branch at psi [rad], by whole turns into limits if any are."""
+    S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
+    K, M, angles = geometry[constants_at(7) :], work[8:12], work[12:14]
+    swivel._write(S, W, psi, K, seed, M, angles, q, branch)
+    turn(q, seed, limits, 0, 7)
+
+
+def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(load):
+    rng, scan, legal = np.random.default_rng(6), np.arange(-3.14, 3.14, 0.02), 0
+    for _ in range(4):
+        arm, found, work = (
+            load(swivel_axes(rng), narrow(rng, 7)),
+            np.empty((13, 8)),
+            np.empty((60, 4)),
+        )
+        limits, row, others = arm.limits(), arm.geometry_row, [0, 1, 2, 4, 5, 6]
+        for q in rng.uniform(arm.lower, arm.upper, (15, 7)):
+            seed = rng.uniform(arm.lower, arm.upper)
+            swivel._branches(arm.fk(q), row, seed, limits, False, found, work)
+            for elbow, branch in np.ndindex(2, 4):
+                psi = psi_of(branch, elbow, seed, limits, row, work)
+                legal += math.isfinite(psi)
+                for at in scan[abs(scan) < abs(psi) - MARGIN - 1e-9]:
+                    write_at(branch, at, elbow, seed, limits, row, work, found[8])
+                    joints = found[8, others]
+                    is_in = (joints >= arm.lower[others]) & (joints <= arm.upper[others])
+                    assert not (is_in.all() and found[8, 7] > 0.5)
+    assert legal > 20
 
 
 @pytest.mark.parametrize("limits", [IIWA14_LIMITS, [(-0.9, 0.7)] * 7], ids=["iiwa 14", "narrow"])

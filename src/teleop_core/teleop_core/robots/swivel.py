@@ -19,10 +19,11 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.branches import BESIDE, is_allowed, turn
+from teleop_core.robots.branches import BESIDE, cost_of, is_allowed, turn
 from teleop_core.robots.closed_form import (
     angle_of,
     box_around,
+    branch_cost,
     choose,
     constants_at,
     kept,
@@ -35,7 +36,7 @@ from teleop_core.robots.dh_kernels import descend
 from teleop_core.robots.kinematics import is_askable
 from teleop_core.robots.spherical_wrist import wrist_angles
 from teleop_core.robots.subproblems import one_angle
-from teleop_core.robots.swivel_arcs import MARGIN, blend, swivels
+from teleop_core.robots.swivel_arcs import ARCS, MARGIN, blend, cut_circle, swivel_of
 
 _F1, _F2, _F3, _F4, _F5 = (39, 51, 63, 75, 87)
 _SPEED = 0.3  # share of a joint's largest step by which psi goes back to its margin in a path
@@ -125,6 +126,14 @@ def _families(G: Array, K: Array, fourth: float, A: Array, work: Array, S: Array
 
 
 @inner
+def _elbow_cost(fourth: float, K: Array, seed: Array, limits: Array, q: Array) -> float:
+    """:func:`cost_of` joint 4 alone, which no branch of its elbow is under; ``q`` is memory."""
+    set_angle(K, 7, 3, fourth, q)
+    turn(q, seed, limits, 3, 4)
+    return cost_of(q, seed, limits, 3, 4, True)
+
+
+@inner
 def _write(
     S: Array, W: Array, psi: float, K: Array, seed: Array, M: Array, angles: Array, q: Array, k: int
 ) -> float:
@@ -145,13 +154,18 @@ def _write(
 @kernel
 def _branches(
     T: Array, geometry: Array, seed: Array, limits: Array, is_free: bool, found: Array, work: Array
-) -> float:
-    """Write eight branches into ``found`` (8, 8): at the seed's swivel, or at legal ones.
+) -> tuple[int, float]:
+    """Write branches into ``found`` (8, 8): at the seed's swivel, or, where free, at legal ones.
 
-    ``work``, (60, 4), holds the families S and W of both elbows for those who go on from there.
+    Where free the elbow of the lesser move comes first, and ends it if a branch of it moves less
+    than joint 4 of the other. ``work``, (60, 4), holds the families S and W of both elbows for
+    those who go on from there.
+
+    Returns:
+        Number of branches, and the least spread of a shoulder or wrist [rad].
     """
     K = geometry[constants_at(7) :]
-    G, N, M, angles, psi = work[:4], work[4:8], work[8:12], work[12:14], work[14]
+    G, N, M, angles, arcs = work[:4], work[4:8], work[8:12], work[12:14], np.empty(ARCS)
     wanted_motion(T, K, 7, N, G)
     for i in range(3):
         for j in range(3):
@@ -163,20 +177,29 @@ def _branches(
         x, y = N[i, 0], N[i, 1]
         N[i, 0], N[i, 1] = c * x + s * y, c * y - s * x
     base, spread, does_reach = _elbow(G, K, angle_of(K, 7, 3, seed))
-    least, memory = math.inf, np.empty((11, 3))
+    least, memory, best, other = math.inf, np.empty((11, 3)), math.inf, 0.0
+    if is_free:
+        near = _elbow_cost(base + spread, K, seed, limits, found[0])
+        other = _elbow_cost(base - spread, K, seed, limits, found[0])
+        if other < near:
+            spread, other = -spread, near
     for elbow in range(2):
+        if best <= other:
+            return 4, least
         S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
         fourth = base + spread if elbow == 0 else base - spread
         _families(G, K, fourth, N, memory, S, W)
         if is_free:
-            swivels(S, W, K, seed, limits, M, angles, psi)
+            cut_circle(S, W, K, limits, arcs)
         for k in range(4):
             q = found[4 * elbow + k]
             set_angle(K, 7, 3, fourth, q)
             q[7] = does_reach
-            at = psi[k] if is_free and math.isfinite(psi[k]) else 0.0
-            least = min(least, _write(S, W, at, K, seed, M, angles, q, k))
-    return least
+            psi = swivel_of(k, S, W, K, seed, limits, arcs) if is_free else 0.0
+            psi = psi if math.isfinite(psi) else 0.0
+            least = min(least, _write(S, W, psi, K, seed, M, angles, q, k))
+            best = min(best, branch_cost(q, seed, limits)) if is_free else best
+    return 8, least
 
 
 @inner
@@ -186,14 +209,15 @@ def _step_to_margin(
     """Let the swivel of a branch in a path go back to the margin of its arc, slowly."""
     elbow, k, trial = best // 4, best % 4, found[8]
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
-    M, angles, psi, step = work[8:12], work[12:14], work[14], math.inf
-    swivels(S, W, K, seed, limits, M, angles, psi)
-    if not math.isfinite(psi[k]) or psi[k] == 0.0:
+    M, angles, arcs, step = work[8:12], work[12:14], np.empty(ARCS), math.inf
+    cut_circle(S, W, K, limits, arcs)
+    psi = swivel_of(k, S, W, K, seed, limits, arcs)
+    if not math.isfinite(psi) or psi == 0.0:
         return
     for i in range(7):
         step = min(step, _SPEED * limits[2, i])
         trial[i] = q[i]
-    _write(S, W, min(max(psi[k], -step), step), K, seed, M, angles, trial, k)
+    _write(S, W, min(max(psi, -step), step), K, seed, M, angles, trial, k)
     turn(trial, seed, limits, 0, 7)
     if is_allowed(trial[:7], seed, limits) or not is_allowed(q, seed, limits):
         for i in range(7):
@@ -239,11 +263,11 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
         if _has_room(q, limits) and _is_beside(q, seed):
             return int(settled(T, seed, limits, geometry, 2, found, 0, q, residual))
         posture = seed if is_free else q.copy()
-    least = _branches(T, geometry, posture, limits, is_free, found, work)
-    reach, best = choose(found, 8, posture, limits, K, least < BESIDE, q)
+    count, least = _branches(T, geometry, posture, limits, is_free, found, work)
+    reach, best = choose(found, count, posture, limits, K, least < BESIDE, q)
     if not is_free and reach == 2:
         _step_to_margin(seed, limits, K, work, found, best, q)
-    return int(settled(T, seed, limits, geometry, reach, found, 8, q, residual))
+    return int(settled(T, seed, limits, geometry, reach, found, count, q, residual))
 
 
 @kernel
