@@ -23,6 +23,7 @@ from teleop_core.robots import IkStatus, dh_kernels, load_robot, swivel
 from teleop_core.robots.branches import turn
 from teleop_core.robots.chains import chain_of
 from teleop_core.robots.closed_form import constants_at
+from teleop_core.robots.dexterity import manipulability
 from teleop_core.robots.swivel_arcs import ARCS, MARGIN, cut_circle, swivel_of
 
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
@@ -310,3 +311,58 @@ def test_seven_axes_use_their_freedom_to_follow_paths_within_speeds_and_limits(l
             assert np.isin(answer.status, REACHED).all()
         assert answer.status[-1] in REACHED
     assert regular > 0
+
+
+@kernel
+def least_move(T, seed, limits, geometry, q):
+    return swivel._least_move(T, seed, limits, geometry, q)
+
+
+def moved_least(arm, tips, q):
+    """Joints (count, n) of a path by the least move alone."""
+    limits, path = arm.limits().copy(), []
+    limits[2] = 1e-3 * arm.drives.speed_limit
+    for tip in tips:
+        path.append(q.copy())
+        assert least_move(tip, q, limits, arm.geometry_row, path[-1])
+        q = path[-1]
+    return np.array(path)
+
+
+def past_singular(rng, flat, beside):
+    """Joint path (5000, 7) past a posture whose shoulder or wrist is flat."""
+    middle, slope = rng.uniform(-1.0, 1.0, 7), rng.uniform(-0.15, 0.15, 7)
+    middle[3], middle[6 - flat] = rng.choice((-1, 1), 2) * rng.uniform(0.8, 1.2, 2)
+    middle[flat], middle[beside] = 0.02, rng.choice((-1, 1)) * 0.5 * math.pi
+    slope[flat] = rng.choice((-1, 1)) * 0.5
+    return middle + slope * np.linspace(-1.0, 1.0, 5000)[:, None]
+
+
+def least_manipulability(arm, joints):
+    reach = arm.geometry["reach"]
+    return min(manipulability(arm, q, reach) for q in joints[::20])
+
+
+@pytest.mark.parametrize(("flat", "beside"), [(1, 2), (5, 4)], ids=["shoulder", "wrist"])
+def test_slow_paths_past_a_singular_posture_keep_more_manipulability(flat, beside, load):
+    arm, rng = load(IIWA14, IIWA14_LIMITS), np.random.default_rng(3)
+    for _ in range(5):
+        joints = past_singular(rng, flat, beside)
+        answer = check_path(arm, joints)
+        assert np.isin(answer.status, REACHED).all()
+        plain = moved_least(arm, arm.fk(joints), joints[0])
+        ours = least_manipulability(arm, answer.q)
+        assert ours > 1.1 * least_manipulability(arm, plain)
+        bends = [abs(np.diff(path, 2, axis=0)).max() for path in (answer.q[:5000], plain)]
+        assert bends[0] < bends[1] + 1e-6  # 1 rad/s²
+        standing = abs(np.diff(answer.q[5000:], axis=0))
+        assert (standing <= 0.3e-3 * arm.drives.speed_limit + 1e-9).all()
+        np.testing.assert_array_equal(arm.follow(arm.fk(joints), joints[0]).q, answer.q[:5000])
+
+
+def test_far_from_singular_postures_the_least_move_alone_is_made(load):
+    arm = load(IIWA14, IIWA14_LIMITS)
+    joints = np.array([0.3, 0.8, -0.4, 1.2, 0.5, -0.9, 0.2]) + 0.1 * np.sin(
+        np.linspace(0.0, 6.0, 3000)[:, None] + np.arange(7))  # fmt: skip
+    plain = moved_least(arm, arm.fk(joints), joints[0])
+    np.testing.assert_array_equal(check_path(arm, joints).q[:3000], plain)

@@ -17,9 +17,8 @@ from teleop_core.robots.branches import turned, wrapped
 from teleop_core.robots.closed_form import joint_of
 from teleop_core.robots.spherical_wrist import wrist_angles
 from teleop_core.robots.subproblems import one_angle
+from teleop_core.robots.swivel_families import F1, F5
 
-FIRST, FIFTH = 39, 87
-"""Places, among the constants, of the transforms after joints 1 and 5."""
 MARGIN = 0.1
 """Angle psi [rad] to the ends of its arc, at most a quarter of the arc."""
 ARCS = (8, 36)
@@ -103,7 +102,7 @@ def _legal(angles: Array, is_exact: float, K: Array, i: int, seed: Array, limits
 @kernel
 def cut_circle(S: Array, W: Array, K: Array, limits: Array, arcs: Array) -> None:
     """Cut the circle of psi at the limits into pieces, in memory of shape :data:`ARCS`."""
-    count = _cuts(W, K, FIFTH, 4, limits, arcs[0], _cuts(S, K, FIRST, 0, limits, arcs[0], 0))
+    count = _cuts(W, K, F5, 4, limits, arcs[0], _cuts(S, K, F1, 0, limits, arcs[0], 0))
     _sort(arcs[0], count)
     if count == 0:
         arcs[0, 0], count = -math.pi, 1
@@ -131,11 +130,11 @@ def _is_legal(
     if arcs[1, k] == _UNKNOWN:
         middle = 0.5 * (_edge(arcs, k) + _edge(arcs, k + 1))
         blend(S, middle, M)
-        is_exact = wrist_angles(M, K, FIRST, 0.0, angles)[1]
+        is_exact = wrist_angles(M, K, F1, 0.0, angles)[1]
         bits = _legal(angles, is_exact, K, 0, seed, limits)
         if bits > 0:
             blend(W, middle, M)
-            is_exact = wrist_angles(M, K, FIFTH, 0.0, angles)[1]
+            is_exact = wrist_angles(M, K, F5, 0.0, angles)[1]
             bits = 4 * bits + _legal(angles, is_exact, K, 4, seed, limits)
         arcs[1, k] = bits
     bits = int(arcs[1, k])
