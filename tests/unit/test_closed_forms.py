@@ -18,8 +18,13 @@ from random_arms import (
     urdf,
     wrist_axes,
 )
+from teleop_core.kernels import kernel
 from teleop_core.robots import IkStatus, dh_kernels, load_robot, swivel
+from teleop_core.robots.branches import turn
 from teleop_core.robots.chains import chain_of
+from teleop_core.robots.closed_form import constants_at
+from teleop_core.robots.dexterity import manipulability
+from teleop_core.robots.swivel_arcs import ARCS, MARGIN, cut_circle, swivel_of
 
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 SIX = [(kind, wrist_axes, "spherical") for kind in SHOULDERS]
@@ -247,10 +252,51 @@ def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(seed, lo
                                   for m, h in zip(middle, half, strict=True)])  # fmt: skip
     found, work = np.empty((13, 8)), np.empty((60, 4))
     for q in rng.uniform(arm.lower, arm.upper, (100, 7)):
-        swivel._branches(arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(), True, found,
-                         work)  # fmt: skip
-        off = (found[:8, :7] - middle + math.pi) % (2.0 * math.pi) - math.pi
-        assert ((abs(off) <= half + 1e-9).all(axis=1) & (found[:8, 7] > 0.5)).any()
+        count, _ = swivel._branches(arm.fk(q), arm.geometry_row, arm.home.copy(), arm.limits(),
+                                    True, found, work)  # fmt: skip
+        off = (found[:count, :7] - middle + math.pi) % (2.0 * math.pi) - math.pi
+        assert ((abs(off) <= half + 1e-9).all(axis=1) & (found[:count, 7] > 0.5)).any()
+
+
+@kernel
+def psi_of(branch, elbow, seed, limits, geometry, work):
+    """Psi [rad] that is taken of a branch; infinity where none is legal."""
+    S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
+    K, arcs = geometry[constants_at(7) :], np.empty(ARCS)
+    cut_circle(S, W, K, limits, arcs)
+    return swivel_of(branch, S, W, K, seed, limits, arcs)
+
+
+@kernel
+def write_at(branch, psi, elbow, seed, limits, geometry, work, q):
+    """Write the joints (8,) of a branch at psi [rad], by whole turns into limits if any are."""
+    S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
+    K, M, angles = geometry[constants_at(7) :], work[8:12], work[12:14]
+    swivel._write(S, W, psi, K, seed, M, angles, q, branch)
+    turn(q, seed, limits, 0, 7)
+
+
+def test_no_legal_swivel_is_nearer_to_the_seed_than_the_answer_less_its_margin(load):
+    rng, scan, legal = np.random.default_rng(6), np.arange(-3.14, 3.14, 0.02), 0
+    for _ in range(4):
+        arm, found, work = (
+            load(swivel_axes(rng), narrow(rng, 7)),
+            np.empty((13, 8)),
+            np.empty((60, 4)),
+        )
+        limits, row, others = arm.limits(), arm.geometry_row, [0, 1, 2, 4, 5, 6]
+        for q in rng.uniform(arm.lower, arm.upper, (15, 7)):
+            seed = rng.uniform(arm.lower, arm.upper)
+            swivel._branches(arm.fk(q), row, seed, limits, False, found, work)
+            for elbow, branch in np.ndindex(2, 4):
+                psi = psi_of(branch, elbow, seed, limits, row, work)
+                legal += math.isfinite(psi)
+                for at in scan[abs(scan) < abs(psi) - MARGIN - 1e-9]:
+                    write_at(branch, at, elbow, seed, limits, row, work, found[8])
+                    joints = found[8, others]
+                    is_in = (joints >= arm.lower[others]) & (joints <= arm.upper[others])
+                    assert not (is_in.all() and found[8, 7] > 0.5)
+    assert legal > 20
 
 
 @pytest.mark.parametrize("limits", [IIWA14_LIMITS, [(-0.9, 0.7)] * 7], ids=["iiwa 14", "narrow"])
@@ -265,3 +311,58 @@ def test_seven_axes_use_their_freedom_to_follow_paths_within_speeds_and_limits(l
             assert np.isin(answer.status, REACHED).all()
         assert answer.status[-1] in REACHED
     assert regular > 0
+
+
+@kernel
+def least_move(T, seed, limits, geometry, q):
+    return swivel._least_move(T, seed, limits, geometry, q)
+
+
+def moved_least(arm, tips, q):
+    """Joints (count, n) of a path by the least move alone."""
+    limits, path = arm.limits().copy(), []
+    limits[2] = 1e-3 * arm.drives.speed_limit
+    for tip in tips:
+        path.append(q.copy())
+        assert least_move(tip, q, limits, arm.geometry_row, path[-1])
+        q = path[-1]
+    return np.array(path)
+
+
+def past_singular(rng, flat, beside):
+    """Joint path (5000, 7) past a posture whose shoulder or wrist is flat."""
+    middle, slope = rng.uniform(-1.0, 1.0, 7), rng.uniform(-0.15, 0.15, 7)
+    middle[3], middle[6 - flat] = rng.choice((-1, 1), 2) * rng.uniform(0.8, 1.2, 2)
+    middle[flat], middle[beside] = 0.02, rng.choice((-1, 1)) * 0.5 * math.pi
+    slope[flat] = rng.choice((-1, 1)) * 0.5
+    return middle + slope * np.linspace(-1.0, 1.0, 5000)[:, None]
+
+
+def least_manipulability(arm, joints):
+    reach = arm.geometry["reach"]
+    return min(manipulability(arm, q, reach) for q in joints[::20])
+
+
+@pytest.mark.parametrize(("flat", "beside"), [(1, 2), (5, 4)], ids=["shoulder", "wrist"])
+def test_slow_paths_past_a_singular_posture_keep_more_manipulability(flat, beside, load):
+    arm, rng = load(IIWA14, IIWA14_LIMITS), np.random.default_rng(3)
+    for _ in range(5):
+        joints = past_singular(rng, flat, beside)
+        answer = check_path(arm, joints)
+        assert np.isin(answer.status, REACHED).all()
+        plain = moved_least(arm, arm.fk(joints), joints[0])
+        ours = least_manipulability(arm, answer.q)
+        assert ours > 1.1 * least_manipulability(arm, plain)
+        bends = [abs(np.diff(path, 2, axis=0)).max() for path in (answer.q[:5000], plain)]
+        assert bends[0] < bends[1] + 1e-6  # 1 rad/s²
+        standing = abs(np.diff(answer.q[5000:], axis=0))
+        assert (standing <= 0.3e-3 * arm.drives.speed_limit + 1e-9).all()
+        np.testing.assert_array_equal(arm.follow(arm.fk(joints), joints[0]).q, answer.q[:5000])
+
+
+def test_far_from_singular_postures_the_least_move_alone_is_made(load):
+    arm = load(IIWA14, IIWA14_LIMITS)
+    joints = np.array([0.3, 0.8, -0.4, 1.2, 0.5, -0.9, 0.2]) + 0.1 * np.sin(
+        np.linspace(0.0, 6.0, 3000)[:, None] + np.arange(7))  # fmt: skip
+    plain = moved_least(arm, arm.fk(joints), joints[0])
+    np.testing.assert_array_equal(check_path(arm, joints).q[:3000], plain)

@@ -11,21 +11,21 @@ Source:
 
 import math
 
-import numpy as np
-
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.branches import turned, wrapped
 from teleop_core.robots.closed_form import joint_of
 from teleop_core.robots.spherical_wrist import wrist_angles
 from teleop_core.robots.subproblems import one_angle
+from teleop_core.robots.swivel_families import F1, F5
 
-FIRST, FIFTH = 39, 87
-"""Places, among the constants, of the transforms after joints 1 and 5."""
 MARGIN = 0.1
 """Angle psi [rad] to the ends of its arc, at most a quarter of the arc."""
+ARCS = (8, 36)
+"""Shape of the memory of a cut circle: where pieces begin, which branches are legal in them."""
+_ENOUGH = 4.0 * MARGIN  # length [rad] from which on an arc keeps its whole margin
 _SLACK = 1e-10  # rounding of a joint on its limit [rad]
-_MOST = 36  # ends of arcs, and room
+_UNKNOWN = -1.0
 
 
 @inner
@@ -99,67 +99,88 @@ def _legal(angles: Array, is_exact: float, K: Array, i: int, seed: Array, limits
     return bits
 
 
+@kernel
+def cut_circle(S: Array, W: Array, K: Array, limits: Array, arcs: Array) -> None:
+    """Cut the circle of psi at the limits into pieces, in memory of shape :data:`ARCS`."""
+    count = _cuts(W, K, F5, 4, limits, arcs[0], _cuts(S, K, F1, 0, limits, arcs[0], 0))
+    _sort(arcs[0], count)
+    if count == 0:
+        arcs[0, 0], count = -math.pi, 1
+    for k in range(count):
+        arcs[1, k] = _UNKNOWN
+    arcs[2, 0] = count
+
+
+@inner
+def _edge(arcs: Array, j: int) -> float:
+    """Psi [rad] where piece j begins; numbers of pieces go on, a round to either side."""
+    count = int(arcs[2, 0])
+    if j < 0:
+        return arcs[0, j + count] - 2.0 * math.pi
+    return arcs[0, j] if j < count else arcs[0, j - count] + 2.0 * math.pi
+
+
+@inner
+def _is_legal(
+    j: int, branch: int, S: Array, W: Array, K: Array, seed: Array, limits: Array, arcs: Array
+) -> bool:
+    """Whether a branch of shoulder and wrist is legal in piece j; what is found out is kept."""
+    count, M, angles = int(arcs[2, 0]), arcs[3:6, :3], arcs[6:8, :3]
+    k = j + count if j < 0 else (j if j < count else j - count)
+    if arcs[1, k] == _UNKNOWN:
+        middle = 0.5 * (_edge(arcs, k) + _edge(arcs, k + 1))
+        blend(S, middle, M)
+        is_exact = wrist_angles(M, K, F1, 0.0, angles)[1]
+        bits = _legal(angles, is_exact, K, 0, seed, limits)
+        if bits > 0:
+            blend(W, middle, M)
+            is_exact = wrist_angles(M, K, F5, 0.0, angles)[1]
+            bits = 4 * bits + _legal(angles, is_exact, K, 4, seed, limits)
+        arcs[1, k] = bits
+    bits = int(arcs[1, k])
+    return (bits & (4 * (1 + branch // 2))) != 0 and (bits & (1 + branch % 2)) != 0
+
+
 @inner
 def _nearest(low: float, high: float) -> float:
     """Angle nearest to 0 in an arc less its margins [rad]."""
     margin = min(MARGIN, 0.25 * (high - low))
-    best = math.inf
-    for k in range(-1, 2):
-        shift = 2.0 * math.pi * k
-        psi = min(max(0.0, low + margin + shift), high - margin + shift)
-        if abs(psi) < abs(best):
-            best = psi
-    return best
-
-
-@inner
-def _has(bits: float, shoulder: int, wrist: int) -> bool:
-    """Whether the bits of a branch of the shoulder and of one of the wrist are set."""
-    return (int(bits) & shoulder) != 0 and (int(bits) & wrist) != 0
-
-
-@inner
-def _psi_of(edges: Array, legal: Array, count: int, shoulder: int, wrist: int) -> float:
-    """Psi of a branch next to 0 in its legal arcs; infinity where there is none."""
-    first, psi, low, is_in = -1, math.inf, 0.0, False
-    for k in range(count):
-        if not _has(legal[k], shoulder, wrist):
-            first = k
-    if first < 0:
-        return 0.0
-    for step in range(1, count + 1):  # once round, from an arc that is not legal
-        k = (first + step) % count
-        is_legal = _has(legal[k], shoulder, wrist)
-        if is_legal and not is_in:
-            low = edges[k]
-        elif is_in and not is_legal:
-            high = edges[k] if edges[k] >= low else edges[k] + 2.0 * math.pi
-            found = _nearest(low, high)
-            psi = found if abs(found) < abs(psi) else psi
-        is_in = is_legal
-    return psi
+    return min(max(0.0, low + margin), high - margin)
 
 
 @kernel
-def swivels(
-    S: Array, W: Array, K: Array, seed: Array, limits: Array, M: Array, angles: Array, psi: Array
-) -> None:
-    """Write the psi (4,) of each branch of shoulder and wrist; infinity where no arc is legal."""
-    edges, legal = np.empty(_MOST), np.empty(_MOST)
-    count = _cuts(W, K, FIFTH, 4, limits, edges, _cuts(S, K, FIRST, 0, limits, edges, 0))
-    _sort(edges, count)
-    if count == 0:
-        edges[0], count = -math.pi, 1
-    for k in range(count):
-        high = edges[k + 1] if k + 1 < count else edges[0] + 2.0 * math.pi
-        middle = 0.5 * (edges[k] + high)
-        blend(S, middle, M)
-        is_exact = wrist_angles(M, K, FIRST, 0.0, angles)[1]
-        bits = _legal(angles, is_exact, K, 0, seed, limits)
-        if bits > 0:
-            blend(W, middle, M)
-            is_exact = wrist_angles(M, K, FIFTH, 0.0, angles)[1]
-            bits = 4 * bits + _legal(angles, is_exact, K, 4, seed, limits)
-        legal[k] = bits
-    for branch in range(4):
-        psi[branch] = _psi_of(edges, legal, count, 4 * (1 + branch // 2), 1 + branch % 2)
+def swivel_of(
+    branch: int, S: Array, W: Array, K: Array, seed: Array, limits: Array, arcs: Array
+) -> float:
+    """Psi [rad] of a branch next to 0 in its legal arcs; infinity where no arc is legal.
+
+    ``arcs`` is what :func:`cut_circle` wrote. Pieces are tested from psi = 0 outwards, until all
+    that are left lie farther off than the answer; an arc is followed until its margin is sure.
+    """
+    count, psi = int(arcs[2, 0]), math.inf
+    up = count - 1
+    while up >= 0 and arcs[0, up] > 0.0:
+        up -= 1
+    down = up - 1
+    while up - down <= count:
+        above, below = max(_edge(arcs, up), 0.0), -_edge(arcs, down + 1)
+        if min(above, below) >= abs(psi):
+            break
+        first = last = up if above <= below else down
+        if _is_legal(first, branch, S, W, K, seed, limits, arcs):
+            far = max(_edge(arcs, first), 0.0) + _ENOUGH
+            while last - first < count and _edge(arcs, last + 1) < far:
+                if not _is_legal(last + 1, branch, S, W, K, seed, limits, arcs):
+                    break
+                last += 1
+            far = min(_edge(arcs, last + 1), 0.0) - _ENOUGH
+            while last - first < count and _edge(arcs, first) > far:
+                if not _is_legal(first - 1, branch, S, W, K, seed, limits, arcs):
+                    break
+                first -= 1
+            if last - first >= count:
+                return 0.0
+            found = _nearest(_edge(arcs, first), _edge(arcs, last + 1))
+            psi = found if abs(found) < abs(psi) else psi
+        up, down = max(up, last + 1), min(down, first - 1)
+    return psi
