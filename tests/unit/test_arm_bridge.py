@@ -1,5 +1,6 @@
 """Arm bridge without ROS: names, what is believed of an arm, when it is commanded and how far."""
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,6 +10,7 @@ import yaml
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
+from teleop_core.session.configuration import configure
 from teleop_core.slave.bridges import BRIDGES, Command
 from teleop_core.slave.bridges.arm_bridge import RATES, ArmBridge, ArmBridgeParameters
 from teleop_core.slave.bridges.hearing import Hearing, Sample, Wrong
@@ -19,7 +21,8 @@ from teleop_core.slave.slave import SlaveParameters
 
 MS = 1_000_000
 SPEED = np.array([1.0, 2.0])
-ARMS = sorted((Path(__file__).resolve().parents[2] / "config/arms").glob("*.yaml"))
+ROOT = Path(__file__).resolve().parents[2]
+ARMS, UR5E = sorted((ROOT / "config/arms").glob("*.yaml")), ROOT / "examples/ur5e.urdf"
 
 
 def hearing(oldest=0.1):
@@ -234,3 +237,14 @@ def test_the_configuration_of_each_arm_has_parameters_that_exist(file):
     led = build(SlaveParameters, common | groups["slave"])
     assert not made.order or len(made.order) == len(led.start)
     assert not led.operation.starts_enabled
+
+
+@pytest.mark.parametrize("file", ARMS, ids=lambda path: path.stem)
+def test_a_session_takes_the_file_of_each_arm_and_leaves_the_bridge_its_own(file, tmp_path):
+    text = file.read_text()
+    robot = yaml.safe_load(text)["/**"]["ros__parameters"]["robot"]
+    (tmp_path / "arm.yaml").write_text(re.sub(rf"{re.escape(robot)}.*", str(UR5E), text))
+    said = [] if file.stem == "ur5e" else ["geometry=[tip=tool0]", "slave.start=[]"]
+    session = configure(files=[tmp_path / "arm.yaml"], settings=said)
+    assert session.groups["slave"].robot == session.groups["slave_sim"].robot == str(UR5E)
+    assert not session.groups["slave"].operation.starts_enabled

@@ -203,6 +203,17 @@ def test_unknown_name_in_a_file_is_refused_with_its_stage(tmp_path):
     assert "command_timeout" in error.value.alternatives
 
 
+def test_what_stands_under_every_node_holds_for_those_that_have_it_and_say_nothing_else(tmp_path):
+    own = {"slave": {"ros__parameters": {"robot": "mma"}}}
+    every = {"/**": {"ros__parameters": {"robot": "puma560", "command_timeout": 0.3}}}
+    layer = load_file(write(tmp_path / "mine.yaml", own | every))
+    assert layer["slave"] == {"robot": "mma", "command_timeout": 0.3}
+    assert layer["inverse_kinematics"]["robot"] == layer["slave_sim"]["robot"] == "puma560"
+    wrong = write(tmp_path / "wrong.yaml", {"/**": {"ros__parameters": {"robto": "mma"}}})
+    with pytest.raises(UnknownNameError, match=r"/\*\* is 'robto'.*robot"):
+        configure(files=[wrong])
+
+
 def test_parameter_files_lie_where_the_package_finds_them():
     assert (config_folder() / "teleop.yaml").is_file()
 

@@ -58,6 +58,7 @@ class SessionParameters:
 
 
 SESSION = "teleop"
+_EVERY = "/**"  # in ROS 2 parameter files, every node
 """Name of the group of the session as a whole."""
 RENAMED = {
     "haptic_master.path.": "operator.",
@@ -147,19 +148,27 @@ def parse_text(text: str, where: str) -> Layer:
 def parse_layer(content: object, where: str) -> Layer:
     """Values of a parsed ROS 2 parameter file.
 
+    What stands under ``/**`` holds for every stage that has it, unless the stage's own says more.
+
     Raises:
         TeleopError: It has another shape than stage / ros__parameters / name / value.
+        UnknownNameError: There is no such stage, or none has what stands under ``/**``.
     """
     layer: Layer = {}
     if not isinstance(content, Mapping):
         raise TeleopError(f"{where}: must hold stages, each with ros__parameters")
-    for key, inner in content.items():
+    for key, inner in sorted(content.items(), key=lambda item: item[0] != _EVERY):
         name = str(key).removeprefix("/").removeprefix("**/")
         stage = name.rpartition("/")[2]
-        if stage != SESSION and stage not in STAGES.names():
+        if key != _EVERY and stage != SESSION and stage not in STAGES.names():
             raise UnknownNameError(f"{where}: stage", key, (SESSION, *STAGES))
         if not isinstance(inner, Mapping) or not isinstance(inner.get("ros__parameters"), Mapping):
             raise TeleopError(f"{where}: {key} must hold ros__parameters with names and values")
+        if key == _EVERY:
+            for own, value in _flat(inner["ros__parameters"]):
+                for stage in _owners(own, where):
+                    layer.setdefault(stage, {})[own] = value
+            continue
         arm = name.removesuffix(stage)
         layer.setdefault(name, {})
         for own, value in _flat(inner["ros__parameters"]):
@@ -169,6 +178,21 @@ def parse_layer(content: object, where: str) -> Layer:
     if isinstance(delays := layer.get(SESSION, {}).get("delays"), list | tuple):
         layer[SESSION]["delays"] = [str(one).replace(*_READER) for one in delays]
     return layer
+
+
+def _owners(name: str, where: str) -> list[str]:
+    """Stages that have a parameter of this name.
+
+    Raises:
+        UnknownNameError: None has.
+    """
+    names = {
+        stage: {spec.name for spec in specs(group)} for stage, group in declared_groups().items()
+    }
+    if not (owners := [stage for stage, own in names.items() if name in own]):
+        known = sorted(set[str]().union(*names.values()))
+        raise UnknownNameError(f"{where}: parameter of {_EVERY}", name, known)
+    return owners
 
 
 def _current(full: str) -> str:

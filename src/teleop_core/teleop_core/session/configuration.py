@@ -123,23 +123,26 @@ def _values_for(member: Member, merged: Layer, graph: Graph) -> dict[str, object
 
 
 def _check_names(merged: Layer, graph: Graph) -> None:
-    """Refuse groups that nobody has.
+    """Refuse groups that nobody has, but for those of nodes that stand in place of the session's.
+
+    A file for a whole machine speaks of its bridge too, which is a node of its own.
 
     Raises:
         UnknownNameError: An arm or stage that is not in the graph.
     """
     stages = [stage.name for stage in graph.stages]
+    written = {topic for stage in graph.stages for topic in stage.writes}
     for name in merged:
         arm, _, stage = name.rpartition("/")
         if arm and arm not in graph.arms:
             raise UnknownNameError(f"arm of {name}", arm, [a for a in graph.arms if a] or ["none"])
         if stage not in {SESSION, RECORDER_NAME, *stages} and stage in STAGES.names():
-            own = [key for key in merged[name] if key not in _SAID_TO_ALL]
-            if not own:
+            own = {key: v for key, v in merged[name].items() if key not in _SAID_TO_ALL}
+            if not own or not written.isdisjoint(STAGES.find(stage).writes):
                 continue
             keys = ", ".join(f"{name}.{key}" for key in own)
             needed = f"left out: this session has no stage {stage}; add stages=[{stage}]"
-            raise ParameterError(keys, tuple(merged[name].values()), needed)
+            raise ParameterError(keys, tuple(own.values()), needed)
         if stage not in {SESSION, RECORDER_NAME, *stages}:
             raise UnknownNameError("stage of teleop.stages", stage, (*stages, RECORDER_NAME))
 
