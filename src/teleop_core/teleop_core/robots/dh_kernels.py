@@ -245,28 +245,18 @@ def _search(T: Array, seed: Array, box: Array, geometry: Array, q: Array) -> Non
 
 
 @inner
-def pivots(q: Array, geometry: Array) -> tuple[float, float]:
-    """Least and product of the pivots of the weighted Jacobian at ``q`` (n,).
-
-    The product is the manipulability, with lengths over the reach (Yoshikawa 1985, eq. 6).
-    """
+def is_hardly_moving(q: Array, geometry: Array) -> bool:
+    """Whether small moves of the tip need large joint moves at ``q`` (n,)."""
     J, A = np.empty((6, q.shape[0])), np.empty((6, 6))
     _weighted_jacobian(q, geometry, J)
     gram(J, np.ones(q.shape[0]), 0.0, A)
     for r in range(6):
         A[r, r] += 1.0 - geometry[q.shape[0] + 1 + r]
     factorise(A)
-    least = product = A[0, 0]
+    pivot = A[0, 0]
     for r in range(1, 6):
-        least = min(least, A[r, r])
-        product *= A[r, r]
-    return least, product
-
-
-@inner
-def is_hardly_moving(q: Array, geometry: Array) -> bool:
-    """Whether small moves of the tip need large joint moves at ``q`` (n,)."""
-    return pivots(q, geometry)[0] < _NEAR
+        pivot = min(pivot, A[r, r])
+    return pivot < _NEAR
 
 
 @inner

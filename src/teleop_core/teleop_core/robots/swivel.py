@@ -7,8 +7,8 @@ so the limits of all joints cut the circle of psi into arcs, exactly: an arc is 
 not at all, however narrow it is. Of the legal psi the nearest to the seed's posture is taken that
 keeps a margin to the ends of its arc; psi = 0 is the seed's. In a path the arm makes the least move
 that follows, and the swivel goes back to its margin where a joint is near a limit. Where instead
-the axes of shoulder or wrist come to lie in a plane, the swivel goes slowly to the side where
-manipulability grows, with the speed that the path leaves: faster the flatter they are.
+the axes of shoulder or wrist come to lie in a plane, the swivel goes slowly, with speed that the
+path leaves, to the side where the manipulability of both grows: the volumes that unit axes span.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), sections on joint limits;
@@ -35,7 +35,7 @@ from teleop_core.robots.closed_form import (
     wanted_motion,
 )
 from teleop_core.robots.damped import ZERO
-from teleop_core.robots.dh_kernels import descend, pivots
+from teleop_core.robots.dh_kernels import descend
 from teleop_core.robots.kinematics import is_askable
 from teleop_core.robots.spherical_wrist import wrist_angles
 from teleop_core.robots.swivel_arcs import ARCS, MARGIN, blend, cut_circle, swivel_of
@@ -53,9 +53,9 @@ _SPEED = 0.3  # share of a joint's largest step by which psi goes back to its ma
 _ROUNDS = 8  # of the search for the least move
 _BESIDE = 0.3  # [rad] from the seed up to which that is the answer
 _FLAT = 0.3  # volume of three unit axes under which manipulability counts
-_ASIDE = 0.05  # psi [rad] to either side where it is compared
-_GAIN = 4.0  # of the relative difference, up to full speed
-_NONE = 1e-6  # sum of two manipulabilities that counts as none
+_ASIDE = 1e-3  # psi [rad] to either side where it is compared
+_GAIN = 200.0  # of the relative difference, up to full speed
+_NONE = 1e-9  # sum of two manipulabilities that counts as none
 
 
 @inner
@@ -186,19 +186,24 @@ def _room(q: Array, limits: Array) -> float:
 
 
 @inner
+def _width(q: Array, K: Array, i: int) -> float:
+    """Manipulability of the shoulder (i = 1) or wrist (5): the volume that their axes span."""
+    return abs(triple_product(K, F1 if i == 1 else F5, angle_of(K, 7, i, q)))
+
+
+@inner
 def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
     """How much manipulability counts, from 0 to 1, without a jump at either end.
 
-    Nothing where axes are far from a plane, within a margin and another of a limit, or where a
-    joint needs a quarter of its speed.
+    Nothing where axes are far from a plane or pass through it, within the margin of a limit, or
+    where a joint needs a quarter of its speed.
     """
     most, room = 0.0, _room(q, limits) / MARGIN - 1.0
     for i in range(7):
         most = max(most, abs(q[i] - seed[i]) / max(limits[2, i], 1e-300))
-    shoulder = abs(triple_product(K, F1, angle_of(K, 7, 1, q)))
-    wrist = abs(triple_product(K, F5, angle_of(K, 7, 5, q)))
-    flat = 1.0 - min(shoulder, wrist) / _FLAT
-    return max(flat, 0.0) * min(max(room, 0.0), 1.0) * max(1.0 - 4.0 * most, 0.0)
+    share = min(_width(q, K, 1), _width(q, K, 5)) / _FLAT
+    urge = 6.75 * share * share * max(1.0 - share, 0.0) * max(1.0 - 4.0 * most, 0.0)
+    return urge * min(max(room, 0.0), 1.0)
 
 
 @inner
@@ -214,10 +219,10 @@ def _step_to_width(
     k = choose(found, 8, q, limits, K, False, near)[1]
     S, W = work[16 + 20 * (k // 4) : 25 + 20 * (k // 4)], work[25 + 20 * (k // 4) :]
     M, angles, change, total, step = work[8:12], work[12:14], 0.0, _NONE, math.inf
+    trial[3] = near[3]
     for side in (-1.0, 1.0):
         _write(S, W, side * _ASIDE, K, q, M, angles, trial, k % 4)
-        trial[3] = near[3]
-        width = pivots(trial[:7], geometry)[1]
+        width = _width(trial, K, 1) * _width(trial, K, 5)
         change, total = change + side * width, total + width
     for i in range(7):
         step = min(step, _SPEED * limits[2, i])
