@@ -9,7 +9,7 @@ from teleop_core.bags.messages import Refusal, read_values
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.graph.topics import Kind
-from teleop_core.nodes.base import NodeParameters
+from teleop_core.nodes.tuned import NodeParameters
 
 
 def joy(*pressed):

@@ -4,35 +4,28 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.task import Future
 
-from teleop_core.bags.messages import BUTTONS
 from teleop_core.bags.reports import read_reports
-from teleop_core.base.errors import ParameterError, SessionError, TeleopError
-from teleop_core.base.parameters import build, parameter, specs, values_of
-from teleop_core.graph.layers import RealTimeParameters
+from teleop_core.base.errors import SessionError, TeleopError
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.stage import Runner, Stage, joints_of
+from teleop_core.graph.stage import Stage, joints_of
 from teleop_core.graph.topics import Kind, Topic
-from teleop_core.nodes.declaration import declare, plain, typed
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
-from teleop_core.nodes.quality import PREFIX, QualityOverrides, profile
+from teleop_core.nodes.quality import profile
 from teleop_core.nodes.rate import Recent, Schedule, TickCounts
 from teleop_core.nodes.real_time import apply_options
-from teleop_core.nodes.sender import Sender
 from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.taking import Unattended
+from teleop_core.nodes.tuned import TunedNode
 from teleop_core.session.runner import report_of
 
 SUCCESS, FAILURE, ERROR = (
@@ -41,81 +34,10 @@ SUCCESS, FAILURE, ERROR = (
 )  # fmt: skip
 
 _GATE_PATIENCE = 1.0  # a tick of a whole session takes a hundredth of it on a busy machine
-_LOCK_PATIENCE = 1.0
 _NEWS = {"active": "at work", "finalized": "ended"}  # others: the state itself
 
 
-@dataclass(frozen=True, kw_only=True)
-class NodeParameters:
-    """Parameters that every node has beside those of its stage."""
-
-    autostart: bool = parameter(
-        True, fixed=True, doc="node configures and activates itself; false: a supervisor does"
-    )
-    max_catch_up: int = parameter(
-        1000, unit="ticks", lower=0, upper=10_000, fixed=True,
-        doc="missed ticks that one late wake-up makes up for; beyond them time is dropped",
-    )  # fmt: skip
-    links: tuple[str, ...] = parameter(
-        (), fixed=True,
-        doc="what feeds a port in place of the topic of its name, port=topic or port=topic@delay, "
-        "with the delay in seconds; topics of one port are added",
-    )  # fmt: skip
-    joy_buttons: tuple[int, ...] = parameter(
-        BUTTONS, lower=-1, upper=255, length=3, fixed=True,
-        doc="which buttons of an incoming Joy are clutch, fixture and mode, counted from 0; "
-        "-1: it has none",
-    )  # fmt: skip
-    second_publisher: str = parameter(
-        "refuse", choices=("refuse", "fault"), fixed=True,
-        doc="when a second publisher sends on a topic that is read: its messages are refused and "
-        "counted, or that is a fault too",
-    )  # fmt: skip
-    owner_silence: float = parameter(
-        0.5, unit="s", lower=0.0, upper=60.0, fixed=True, source="assumed",
-        doc="who owns a topic must be silent for longer before another publisher may take it",
-    )  # fmt: skip
-    flood_rate: int = parameter(
-        5000, unit="1/s", lower=1, upper=1_000_000, fixed=True, source="assumed",
-        doc="messages of one topic beyond so many a second are refused",
-    )  # fmt: skip
-    real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
-
-    def sender(self) -> Sender:
-        """Check of the sender of one topic that is read."""
-        return Sender(self.flood_rate, self.owner_silence)
-
-    def feeds(self, port: str) -> list[tuple[str, float]]:
-        """Topics that feed a port, each with its delay [s].
-
-        Raises:
-            ParameterError: A link has another form.
-        """
-        found = []
-        for text in self.links:
-            own, equals, feed = text.partition("=")
-            topic, at, delay = feed.partition("@")
-            try:
-                seconds = float(delay) if at else 0.0
-            except ValueError:
-                seconds = -1.0
-            if not (equals and topic) or seconds < 0.0:
-                raise ParameterError("links", text, "port=topic or port=topic@seconds")
-            if own == port:
-                found.append((topic, seconds))
-        return found or [(port, 0.0)]
-
-
-def _sim_time(node: str) -> ParameterError:
-    """Refusal of a clock that others set: a step is a millisecond, of drives too."""
-    requirement = (
-        "false: nodes step in real time; teleop sim and replay go as fast as the machine can, "
-        "teleop play --clock publishes /clock"
-    )
-    return ParameterError(f"{node}.use_sim_time", True, requirement)
-
-
-class CoreNode(LifecycleNode):  # type: ignore[misc]
+class CoreNode(TunedNode):
     """Lifecycle node around one stage: fills its signals, steps it, publishes its signals.
 
     A subclass makes the stage in :meth:`setup` and does one round of work in :meth:`turn`, which
@@ -131,25 +53,12 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
     """
 
     def __init__(self, stage: Stage, group: type | None = None, **options: Any) -> None:
-        super().__init__(stage.name, **options)
-        if self.get_parameter("use_sim_time").value:
-            raise _sim_time(self.member_name)
-        self.description, self._groups = stage, (NodeParameters, group or stage.parameters)
-        self._specs = {spec.name: spec for entry in self._groups for spec in specs(entry)}
-        given = {name: entry.value for name, entry in self._parameter_overrides.items()}
-        self.overrides = QualityOverrides(given)
-        self.options, self.parameters = self._built(self._overrides())
-        declare(self, self._specs.values(), values_of(self.options) | values_of(self.parameters))
-        self.add_pre_set_parameters_callback(self._type_empty_lists)
-        self.add_on_set_parameters_callback(self._accept)
-        self._shows_present = False
-        self._present = self.create_guard_condition(self._show_present)
-        self.runner: Runner | None = None
-        """The stage at work, which :attr:`stage` is too; None for a node without one."""
+        super().__init__(stage, group, **options)
+        self.description = stage
         self.stage: Any = None
+        """The stage at work, which :attr:`runner` is too; None for a node without one."""
         self.row: Any = None
         """The stage's signals, by the names of their fields."""
-        self.lock = threading.Lock()  # held while the stage works or takes parameters
         self.gate = threading.Lock()  # held by a session while the node works in its thread
         self.ended, self.exit_code = Future(), 0
         self.has_ended = False
@@ -245,16 +154,6 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
 
     # -- topics ----------------------------------------------------------------------------------
 
-    @property
-    def arm(self) -> str:
-        """Namespace of the node, without the slash before it."""
-        return str(self.get_namespace()).strip("/")
-
-    @property
-    def member_name(self) -> str:
-        """Name of the node with its namespace, without the slash before it."""
-        return f"{self.arm}/{self.get_name()}" if self.arm else str(self.get_name())
-
     def open_publisher(self, topic: Topic) -> Any:
         """Publisher that is silent unless the node is active, and closed at cleanup."""
         kind = message_type(topic.ros_type)
@@ -290,8 +189,7 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         self._reported = bits, parameters
         described = self.runner.described()
         self._report_publisher.publish(report_of(self._report, stamp_ns, self._state, described))
-        if self.runner.changes_itself:
-            self._present.trigger()  # the executor shows it: setting parameters takes long
+        self.show_present()
 
     def input(self, port: Topic) -> Input:
         """What the node reads at a port, of several the one that others are added to."""
@@ -446,85 +344,6 @@ class CoreNode(LifecycleNode):  # type: ignore[misc]
         for entry in tuple(super().subscriptions):
             if not isinstance(entry.callback_group, Unattended):
                 yield entry
-
-    # -- parameters ------------------------------------------------------------------------------
-
-    def _overrides(self) -> dict[str, Any]:
-        """What the command line and parameter files say, less what rclpy itself has declared."""
-        given = self._parameter_overrides.items()
-        return {
-            name: plain(self._specs.get(name), entry.value)
-            for name, entry in given
-            if not self.has_parameter(name) and not name.startswith(PREFIX)
-        }
-
-    def _built(self, values: dict[str, Any]) -> tuple[NodeParameters, Any]:
-        options, group = self._groups
-        own = {spec.name for spec in specs(options)}
-        prefix = f"{self.member_name}."
-        return (
-            build(options, {k: v for k, v in values.items() if k in own}, prefix),
-            build(group, {k: v for k, v in values.items() if k not in own}, prefix),
-        )
-
-    def _type_empty_lists(self, changes: list[Parameter]) -> list[Parameter]:
-        return [typed(self._specs.get(change.name), change) for change in changes]
-
-    def _accept(self, changes: list[Parameter]) -> SetParametersResult:
-        """Take all changes or none: the group is built anew, and the stage must take it."""
-        if self._shows_present:
-            return SetParametersResult(successful=True)
-        if any(change.name == "use_sim_time" and change.value for change in changes):
-            return SetParametersResult(successful=False, reason=str(_sim_time(self.member_name)))
-        self._take_present()
-        own = [change for change in changes if change.name in self._specs]
-        values = values_of(self.options) | values_of(self.parameters)
-        values |= {c.name: plain(self._specs[c.name], c.value) for c in own}
-        try:
-            _, parameters = self._built(values)
-            self._retune(parameters)
-        except TeleopError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        self.parameters = parameters
-        return SetParametersResult(successful=True)
-
-    def _take_present(self) -> None:
-        """Take parameters that the stage has changed by itself, as the mode button does."""
-        if self._changes_itself() and self.lock.acquire(timeout=_LOCK_PATIENCE):
-            assert self.runner is not None
-            self.parameters = self.runner.present()
-            self.lock.release()
-
-    def _changes_itself(self) -> bool:
-        return self.runner is not None and self.runner.changes_itself
-
-    def _show_present(self) -> None:
-        """Show parameters that the stage has changed by itself, without setting them again."""
-        if not self._changes_itself():
-            return
-        before = values_of(self.parameters)
-        self._take_present()
-        changed = {k: v for k, v in values_of(self.parameters).items() if v != before[k]}
-        if changed:
-            self._shows_present = True
-            try:
-                self.set_parameters([Parameter(k, value=v) for k, v in changed.items()])
-            finally:
-                self._shows_present = False
-
-    def _retune(self, parameters: Any) -> None:
-        if self.runner is None:
-            return
-        self.runner.examine(parameters)  # takes long: beside the loop, which goes on meanwhile
-        if not self.lock.acquire(timeout=_LOCK_PATIENCE):
-            raise SessionError(f"{self.member_name} is in a step that takes too long; try again")
-        try:
-            self.runner.retune(parameters)
-        except TeleopError:
-            self.runner.retune(self.parameters)
-            raise
-        finally:
-            self.lock.release()
 
     # -- diagnostics -----------------------------------------------------------------------------
 
