@@ -1,5 +1,6 @@
 """Drill: the short form of the fault matrix, as the command that people run."""
 
+import shlex
 import subprocess
 import sys
 
@@ -58,6 +59,15 @@ def test_a_composed_session_stops_where_nobody_presses_and_pauses_where_it_stood
     assert found == {"heartbeat": ("FAULT", "heartbeat"), "freeze_session": ("PAUSED", "stall")}, (
         text
     )
+
+
+def test_drives_that_end_are_named_with_what_they_wrote_last():
+    drives = shlex.join([sys.executable, "-c", "import sys; sys.exit('no arm on this cable')"])
+    command = [sys.executable, "-m", "teleop_core.cli", "drill", "--drives", drives, "stop_topic"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=200)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "slave_sim ended with exit code 1" in done.stderr
+    assert "no arm on this cable" in done.stderr
 
 
 def test_a_fault_that_there_is_not_is_refused_in_one_line_before_anything_starts():

@@ -28,6 +28,7 @@ ELSEWHERE = {
     "robots/mobility.py": "asks for a rank alone",
     "robots/rps3_modes.py": "all ways to assemble it, which no session asks for",
     "robots/stewart.py": "asks for ranks and signs alone",
+    "session/exchange/orientation.py": "turns what a file says, once, before it is recorded",
 }
 """Files of these rooms that decide no bits of a session, and why."""
 BLAS = {"linalg", "dot", "matmul", "inner", "vdot", "tensordot", "einsum", "cov", "corrcoef"}

@@ -177,6 +177,7 @@ class _Drill:
                 steady += 1
             else:
                 steady = 0
+                rig.session.check()
                 help_on(rig)  # a busy machine may have paused it already
             rig.wait(0.1)
             if time.monotonic() > deadline:

@@ -121,11 +121,19 @@ class DrillSession:
         deadline = time.monotonic() + START_TIMEOUT
         while not all(self._observer.is_active(name) for name in nodes):
             self._observer.listen(0.05)
-            for child in self._children.values():
-                if not child.is_running:
-                    child.check()
+            self.check()
             if time.monotonic() > deadline:
                 raise SessionError(f"{', '.join(nodes)}: not at work after {START_TIMEOUT:g} s")
+
+    def check(self) -> None:
+        """Make sure that all processes run, those of foreign commands too.
+
+        Raises:
+            SessionError: One has ended; says how, with what it wrote last.
+        """
+        for child in self._children.values():
+            if not child.is_running:
+                child.check()
 
     def close(self) -> None:
         """End all, in order."""
