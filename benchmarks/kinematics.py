@@ -94,7 +94,7 @@ def judge(robot: Any, joints: Any, answers: Any) -> tuple[float, float]:
         turn = reached[:3, :3].T @ wanted[:3, :3]
         angle = np.linalg.norm(turn - np.eye(3)) / np.sqrt(2.0)
         distance = np.linalg.norm(reached[:3, 3] - wanted[:3, 3])
-        is_solved = distance <= TOLERANCE and angle <= TOLERANCE
+        is_solved = bool(distance <= TOLERANCE and angle <= TOLERANCE)
         solved += is_solved
         legal += is_solved and bool(((q >= robot.lower - 1e-9) & (q <= robot.upper + 1e-9)).all())
     return 100.0 * solved / len(joints), 100.0 * legal / len(joints)

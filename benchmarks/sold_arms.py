@@ -15,7 +15,7 @@ import os
 import sys
 import tempfile
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,8 @@ SIDE = 0.3  # [rad] from either end of a wrist path to the middle, and of joints
 REACHED = (int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR))
 TASK_OF_FIVE = "x y z rx ry"
 HEAD = "home % | near % | too fast | late % | at the end % | unexplained | past the wrist %"
-WORST = (min, min, sum, max, min, sum, min)  # of each column, over the arms of a class
+WORST: tuple[Callable[..., Any], ...] = (min, min, sum, max, min, sum, min)
+"""What counts of each column, over the arms of a class."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,6 +13,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -140,8 +141,7 @@ def mink_loop(path: Path, robot: Any) -> Solver:
 
 def rtb_lm(path: Path, robot: Any) -> Solver:
     """Roboticstoolbox's compiled Levenberg-Marquardt, with its restarts."""
-    import roboticstoolbox as rtb
-
+    rtb: Any = import_module("roboticstoolbox")
     chain = rtb.ETS()
     last = (0, 0.0)  # the tip is the frame of joint 7
     links = [*zip(QUARTERS[:6], LENGTHS[:6], strict=True), last]
