@@ -93,8 +93,8 @@ class Rig(Protocol):
     def setpoint(self) -> Array:
         """Newest joint setpoint (n,) of the slave [rad or m]."""
 
-    def way_to_limit(self) -> Array:
-        """Way (n,) of one joint, that which moves the tip least, to its nearer limit [rad or m]."""
+    def way_to_limit(self) -> tuple[Array, float]:
+        """Way (n,) of one joint to its nearer limit [rad or m], and that of the tip [m]."""
 
     def drive(self, speeds: Array, seconds: float) -> None:
         """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""

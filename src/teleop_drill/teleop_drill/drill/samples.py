@@ -24,6 +24,7 @@ _WATCH = 0.5  # for which an arm that goes on is watched afterwards [s]
 _SLOW = 0.05  # tool speed under which the hand shakes [m/s]
 _SHAKE, _SHAKES = 0.02, 3.0  # amplitude [m] and frequency [Hz] of a hand that shakes
 _PRESS, _STAY = 1.0, 1.5  # times in which a joint goes to its limit, and is pressed into it [s]
+_SHARE = 0.5  # of the hand's speed at which the tip goes there
 _SHAKEN = hand.SPEED + 2.0 * math.pi * _SHAKE * _SHAKES
 
 
@@ -67,7 +68,10 @@ def _press_limit(rig: Rig) -> None:
     """Drive a joint into the end of its range, keep on, and go back."""
     rig.distort(hand.silent)
     rig.wait(0.3)  # after which others may drive the arm
-    speeds = rig.way_to_limit() / _PRESS
+    ways, tip = rig.way_to_limit()
+    seconds = max(_PRESS, tip / (_SHARE * hand.SPEED))
+    speeds = ways / seconds
+    rig.drive(speeds, seconds - _PRESS)  # a long way is gone as slowly as the hand goes
     rig.mark()
     rig.drive(speeds, _PRESS + _STAY)
     rig.drive(-speeds, _PRESS)

@@ -150,15 +150,18 @@ class LiveRig:
         rows = self.tap.recent(SLAVE_SETPOINT_JS, 1)
         return np.array(rows[-1] if len(rows) else self._robot.home)
 
-    def way_to_limit(self) -> Array:
-        """Way (n,) of one joint, that which moves the tip least, to its nearer limit [rad or m]."""
+    def way_to_limit(self) -> tuple[Array, float]:
+        """Way (n,) of one joint, that which moves the tip least, to its nearer limit [rad or m].
+
+        With it the way of the tip, as it sets out [m].
+        """
         q, robot = self.setpoint(), self._robot
         up, down = robot.upper - q, robot.lower - q
         ways = np.where(up < -down, up, down)
         moved = np.linalg.norm(robot.jacobian(q)[:3], axis=0) * np.abs(ways)
         fastest = np.abs(ways) / np.array(robot.drives.speed_limit)  # type: ignore[union-attr]
         joint = int(np.argmin(moved + fastest))
-        return np.where(np.arange(robot.n) == joint, ways, 0.0)
+        return np.where(np.arange(robot.n) == joint, ways, 0.0), float(moved[joint])
 
     def drive(self, speeds: Array, seconds: float) -> None:
         """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
