@@ -66,12 +66,12 @@ format: $(VENV)/.tested
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# Live tests come last, when the kernels are compiled. They wait most of the time, so that two run at
-# once; those marked `alone` need both processors. In a worker a crash of the middleware inside a
-# test costs that test, not the run; it is run again, which files that stay together would not allow:
-# stolen work allows it, and keeps nearly all tests of a file, and the session they share, in one
-# process. Elsewhere the tests of a file stay together: what they compile, one process does. All
-# parts run, whatever fails: one run tells all that is wrong.
+# Live tests come last, when the kernels are compiled. Quick ones wait most of the time, so that two
+# run at once; slow ones run sessions of many processes, which need both processors. In a worker a
+# crash of the middleware inside a test costs that test, not the run; it is run again, which files
+# that stay together would not allow: stolen work allows it, and keeps nearly all tests of a file,
+# and the session they share, in one process. Elsewhere the tests of a file stay together: what they
+# compile, one process does. All parts run, whatever fails: one run tells all that is wrong.
 CORE := $(BIN)/pytest -n 2 --dist loadfile
 LIVE := $(BIN)/pytest -n 2 --dist worksteal tests/ros
 ALONE := $(BIN)/pytest -n 1 tests/ros
@@ -85,8 +85,7 @@ test: lint crtk_msgs
 test-slow: $(VENV)/.tested crtk_msgs
 	@code=0; set -x; \
 	$(CORE) -m "slow and not ros and not soak" || code=1; \
-	$(LIVE) -m "ros and slow and not alone and not soak" || code=1; \
-	$(ALONE) -m "ros and alone and not soak" || code=1; \
+	$(ALONE) -m "ros and (slow or alone) and not soak" || code=1; \
 	exit $$code
 
 # Long tests whose law a shorter one tests in CI with another case; a quarter of an hour.
