@@ -14,7 +14,7 @@ from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_SETPOINT_JS
 from teleop_core.nodes.children import environment
 from teleop_core.robots import load_robot
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]  # steps by the clock
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 CONTROLLER = Path(__file__).resolve().parents[1] / "plain_controller.py"
 KINDS = ("joint_state", "forward_command", "joint_trajectory", "crtk")

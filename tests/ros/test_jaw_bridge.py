@@ -16,7 +16,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.nodes.children import environment
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]  # steps by the clock
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 CONTROLLER = Path(__file__).resolve().parents[1] / "plain_controller.py"
 TOPICS = {
