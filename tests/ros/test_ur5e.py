@@ -4,6 +4,7 @@ import shlex
 import subprocess
 import sys
 from contextlib import contextmanager
+from itertools import chain, repeat
 
 import numpy as np
 import pytest
@@ -13,12 +14,14 @@ from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import Float64MultiArray
 
 import teleop_core as tc
-from browser import Tab
-from console_process import STARTS, ConsoleProcess
 from drill_runs import run_drill
-from driven_page import PATIENT, SIZE, pull, ready, rest
+from driven_page import PATIENT
+from live_process import wait_until
 from mutants import ROOT
+from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
 from teleop_core.nodes.children import environment, free_domain
+from teleop_core.nodes.console_session import ConsoleSession
+from teleop_core.session import api
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
 
@@ -27,6 +30,7 @@ URDF = ROOT / "examples/ur5e.urdf"
 START = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 ARM = [f"robot={URDF}", "geometry=[tip=tool0]", f"start={list(START)}"]
 BRIDGE = [sys.executable, "-m", "teleop_core.nodes", "arm_bridge", "--ros-args"]
+_PULLED = 0.03  # m
 STEP = 2.5  # 1.2 of a rated speed, over two periods at most, in steps of one at the rated speed
 
 
@@ -130,25 +134,28 @@ def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path, br
     assert sorted(np.ptp(hand, axis=0))[1] > 0.02  # round and round in a plane
 
 
-@pytest.mark.soak
-@pytest.mark.browser
-def test_a_person_at_the_page_leads_it_without_a_jump(tmp_path, bridge):
-    pytest.importorskip("viser")
+def test_a_person_at_the_console_leads_it_without_a_jump(tmp_path, bridge, monkeypatch):
+    remote = ["operator=remote", "operator.patience=0.0", "teleop.duration=3600.0", PATIENT]
+    configured = api.configuration(None, texts=[*remote, *ARM])
     with arm([*CONTROLLER, "1"], bridge) as (env, newest):
-        out = tmp_path / "bag"
-        texts = ["--without", "slave_sim", "--out", out, "--set", *ARM, PATIENT]
-        console = ConsoleProcess(tmp_path, *texts, env=env)
-        try:
-            with Tab(tmp_path / "browser", *SIZE) as tab:
-                tab.visit(console.url)
-                tab.shows("ENABLED", STARTS)
-                ready(tab)
-                tab.mouse("mouseReleased", *pull(tab, 0))
-                rest(tab)
-        finally:
-            assert console.end() == 0, console.text
+        monkeypatch.setenv("ROS_DOMAIN_ID", env["ROS_DOMAIN_ID"])
+        with (
+            ConsoleSession(configured, tmp_path / "bag", print, without=["slave_sim"]) as session,
+            session.link() as link,
+        ):
+            seen = link.view().arms[""]
+            wait_until(lambda: link.view() and "ENABLED, homed" in seen.operation_text, "homed")
+            tip, stylus = seen.get(SLAVE_MEASURED_CP)[:3], seen.get(MASTER_MEASURED_CP)[:7]
+            ways = chain(np.linspace(0.0, _PULLED, 100), repeat(_PULLED))  # a grip moves nothing
+
+            def is_pulled():
+                link.hold("", stylus + next(ways) * np.eye(7)[0])
+                link.view()
+                return np.linalg.norm(seen.get(SLAVE_MEASURED_CP)[:3] - tip) > 0.5 * _PULLED
+
+            wait_until(is_pulled, "an arm that is pulled")
         first, largest = newest()
-    goes_home_and_follows(tc.open_recording(out), first, largest)
+    goes_home_and_follows(tc.open_recording(tmp_path / "bag"), first, largest)
 
 
 @pytest.mark.soak
