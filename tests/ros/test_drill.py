@@ -61,6 +61,11 @@ def test_a_composed_session_stops_where_nobody_presses_and_pauses_where_it_stood
     )
 
 
+def test_joints_that_are_held_fast_are_told_in_a_process_of_their_own(tmp_path):
+    _, text, outcomes = run_drill(tmp_path, "stuck_tip")
+    assert (outcomes["stuck_tip"]["state"], outcomes["stuck_tip"]["told"]) == ("FAULT", "tip"), text
+
+
 def test_drives_that_end_are_named_with_what_they_wrote_last():
     drives = shlex.join([sys.executable, "-c", "import sys; sys.exit('no arm on this cable')"])
     command = [sys.executable, "-m", "teleop_core.cli", "drill", "--drives", drives, "stop_topic"]

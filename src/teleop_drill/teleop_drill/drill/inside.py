@@ -101,7 +101,7 @@ class _Joints:
     def __init__(self, control: Control) -> None:
         self._control = control
         self._slaves: WeakKeyDictionary[SlaveSim, Array | None] = WeakKeyDictionary()
-        self._make = SlaveSim.__init__
+        self._make, self._owner = SlaveSim.__init__, 0
 
     def follow(self) -> None:
         """Know every slave that is made from now on."""
@@ -110,9 +110,15 @@ class _Joints:
         def make(slave: SlaveSim, *arguments: Any, **options: Any) -> None:
             joints._make(slave, *arguments, **options)
             joints._slaves[slave] = None
+            joints._start()
 
         SlaveSim.__init__ = make  # type: ignore[method-assign, assignment]
-        threading.Thread(target=self._run, name="joints", daemon=True).start()
+
+    def _start(self) -> None:
+        """Start the thread in the process that has a slave: no thread outlives a fork."""
+        if self._owner != os.getpid():
+            self._owner = os.getpid()
+            threading.Thread(target=self._run, name="joints", daemon=True).start()
 
     def _run(self) -> None:
         while True:
