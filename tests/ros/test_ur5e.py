@@ -124,6 +124,7 @@ def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(tmp_path, bri
     goes_home_and_follows(*led(tmp_path, bridge, 1))
 
 
+@pytest.mark.soak
 def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path, bridge):
     pytest.importorskip("pygame")
     pad = [sys.executable, str(ROOT / "tests/padded_operator.py"), "operator"]
@@ -134,6 +135,7 @@ def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path, br
     assert sorted(np.ptp(hand, axis=0))[1] > 0.02  # round and round in a plane
 
 
+@pytest.mark.soak
 def test_a_person_at_the_console_leads_it_without_a_jump(tmp_path, bridge, monkeypatch):
     remote = ["operator=remote", "operator.patience=0.0", "teleop.duration=3600.0", PATIENT]
     configured = api.configuration(None, texts=[*remote, *ARM])
