@@ -4,7 +4,6 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 
 from browser import until
@@ -16,22 +15,15 @@ ENDS = 120.0  # s; a session gives its nodes 35 to end in order, then its record
 class ConsoleProcess:
     """The command as a process; what it says is in ``text``, where its page is in ``url``.
 
-    Works in ``folder``; ``arguments`` are those of the command, ``env`` its environment: ours, if
-    nothing is said.
+    Works in ``folder``; ``arguments`` are those of the command.
     """
 
-    def __init__(
-        self, folder: Path, *arguments: object, env: Mapping[str, str] | None = None
-    ) -> None:
+    def __init__(self, folder: Path, *arguments: object) -> None:
         self.folder, self._log = folder, folder / "console.log"
         command = [sys.executable, "-m", "teleop_core.cli", "console", *map(str, arguments)]
         with self._log.open("wb") as log:
             self.process = subprocess.Popen(
-                [*command, "--port", "0", "--no-browser"],
-                stdout=log,
-                stderr=log,
-                cwd=folder,
-                env=env,
+                [*command, "--port", "0", "--no-browser"], stdout=log, stderr=log, cwd=folder
             )
         told = until(lambda: re.search(r"http://\S+?/(?=;)", self.text), "an address", STARTS)
         self.url = told[0]

@@ -10,7 +10,6 @@ pytest.importorskip("viser")
 import teleop_core as tc
 from browser import Tab, until
 from console_process import STARTS, ConsoleProcess
-from driven_page import PATIENT, PULLED, SIZE, STILL, TIP, arrow, pull, ready, rest
 from teleop_core.bags.reader import Bag
 from teleop_core.console.recorded_arms import configuration_of
 from teleop_core.evaluation.origin import read_origin
@@ -19,8 +18,16 @@ from teleop_core.slave.operation import State
 pytestmark = [pytest.mark.ros, pytest.mark.browser, pytest.mark.slow, pytest.mark.alone]
 
 ROOT = Path(__file__).parents[2]
+TIP = "/arm/robot/tip"
+GRIP, ARROW = "/arm/master/grip", 0.07  # the stylus' gizmo, and the heads of its arrows [m]
 DRIVER = "/browser [0-9]+ drives/.exec(document.body.innerText)?.[0]"
-SHARE = 0.15  # the hand's mass swings a little
+PULLED = 0.012  # m
+# Software draws the page with the processors that the session needs: a small one.
+SIZE = (1000, 560)  # px
+# A browser that waits for a processor sends late, which is no reason to let go of the stylus.
+PATIENT = "operator.remote.timeout=1.5"  # s
+# The hand's mass swings a little.
+SHARE, STILL = 0.15, 2e-4  # m
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +49,47 @@ def page(console, tmp_path_factory):
         tab.shows("ENABLED", STARTS)
         tab.shows("drives")
         yield tab
+
+
+def ready(tab):
+    """Wait until the slave follows; where it paused because this machine stood still, resume.
+
+    A session begins enabled, on its way to where it starts: it follows nobody until it is there.
+    """
+    tab.until("/ENABLED|PAUSED/.test(document.body.innerText)")
+    if tab.value("document.body.innerText.includes('PAUSED')"):
+        tab.click("Start")
+    tab.shows("ENABLED, homed", 120)
+
+
+def arrow(tab, axis, way=PULLED):
+    """Where an arrow of the stylus is seen, and where it would be a way farther [px]."""
+    begin, end = np.zeros(3), np.zeros(3)
+    begin[axis], end[axis] = ARROW, ARROW + way
+    return tab.seen_at(GRIP, begin), tab.seen_at(GRIP, end)
+
+
+def pull(tab, axis, way=PULLED):
+    """Take an arrow of the stylus and pull it along itself; the button stays down."""
+    grip, goal = arrow(tab, axis, way)
+    tab.mouse("mouseMoved", *grip)
+    tab.value("new Promise((done) => setTimeout(done, 200))")
+    tab.pull(grip, goal, steps=10)
+    return goal
+
+
+def rest(tab):
+    """Wait until the slave is drawn in one place for half a second."""
+    tab.value(f"""new Promise((done) => {{
+        let last = [], since = 0;
+        const look = () => {{
+            const now = performance.now(), place = {tab.place_of(TIP)};
+            if (!last.length || Math.hypot(...place.map((x, i) => x - last[i])) > {STILL})
+                [last, since] = [place, now];
+            now - since > 500 ? done() : setTimeout(look, 20);
+        }};
+        look();
+    }})""")
 
 
 def saved(page, console, name):

@@ -15,7 +15,6 @@ from std_msgs.msg import Float64MultiArray
 
 import teleop_core as tc
 from drill_runs import run_drill
-from driven_page import PATIENT
 from live_process import wait_until
 from mutants import ROOT
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
@@ -137,7 +136,8 @@ def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path, br
 
 @pytest.mark.soak
 def test_a_person_at_the_console_leads_it_without_a_jump(tmp_path, bridge, monkeypatch):
-    remote = ["operator=remote", "operator.patience=0.0", "teleop.duration=3600.0", PATIENT]
+    remote = ["operator=remote", "operator.patience=0.0", "teleop.duration=3600.0"]
+    remote += ["operator.remote.timeout=1.5"]  # a busy console is no reason to let go
     configured = api.configuration(None, texts=[*remote, *ARM])
     with arm([*CONTROLLER, "1"], bridge) as (env, newest):
         monkeypatch.setenv("ROS_DOMAIN_ID", env["ROS_DOMAIN_ID"])

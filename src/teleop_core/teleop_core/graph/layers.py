@@ -58,8 +58,8 @@ class SessionParameters:
 
 
 SESSION = "teleop"
-_EVERY = "/**"  # in ROS 2 parameter files, every node
 """Name of the group of the session as a whole."""
+_EVERY = "/**"  # in ROS 2 parameter files, every node
 RENAMED = {
     "haptic_master.path.": "operator.",
     "haptic_master.operator.": "operator.",

@@ -41,15 +41,8 @@ class CoreNode(TunedNode):
     """Lifecycle node around one stage: fills its signals, steps it, publishes its signals.
 
     A subclass makes the stage in :meth:`setup` and does one round of work in :meth:`turn`, which
-    runs in a thread of its own while the node is active.
-
-    Args:
-        stage: What the node is in the graph.
-        group: Parameters in place of the stage's own.
-        options: Options of :class:`rclpy.lifecycle.LifecycleNode`.
-
-    Raises:
-        TeleopError: A given parameter is unknown or not allowed.
+    runs in a thread of its own while the node is active. Arguments and errors are those of
+    :class:`~teleop_core.nodes.tuned.TunedNode`.
     """
 
     def __init__(self, stage: Stage, group: type | None = None, **options: Any) -> None:

@@ -32,6 +32,9 @@ def environment(domain: int | None = None) -> dict[str, str]:
 
     What concerns this process as well is set here too, but for the domain: one process may lead
     several sessions.
+
+    Args:
+        domain: ROS domain; None for that of ``ROS_DOMAIN_ID``, or else a free one.
     """
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     choose_transport()
