@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,9 +10,10 @@ import pytest
 from code_mutants import CODE_MUTANTS
 from mutants import MUTANTS, ROOT, changed
 from teleop_core.bags.reader import Bag
+from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import UnknownNameError
-from teleop_core.graph.topics import SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
+from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
 from teleop_core.robots import load_robot
 from teleop_core.session import api
 from teleop_core.slave.operation import Fault, State
@@ -29,7 +31,7 @@ from teleop_drill.drill.drill_table import drill_table, markdown, rows, summary
 from teleop_drill.drill.hand import Sample
 from teleop_drill.drill.judging import Measured, Seen, judge
 from teleop_drill.drill.numbers import Numbers, Scheduling
-from teleop_drill.drill.recordings import check_recording, missing
+from teleop_drill.drill.recordings import check_recording, missing, told_lost
 
 MS = 1_000_000
 DT = 1e-3
@@ -407,6 +409,20 @@ def test_the_tables_have_a_row_for_each_fault():
     found = [outcome(), outcome(measures={}), outcome(recovered=math.nan)]
     assert drill_table(found).row_count == 3
     assert len(markdown(found).splitlines()) == 5
+
+
+def test_what_the_recorder_tells_that_it_lost_is_counted_by_topic_and_time(tmp_path):
+    second, name = 1_000_000_000, SLAVE_SETPOINT_JS.name
+    with BagWriter(tmp_path / "bag", (DIAGNOSTICS,), {}) as writer:
+        for at, lost in ((1, 5), (2, 5), (3, 40), (4, 40), (8, 90)):
+            data = report(at * second, "recorder", 1, "lost", {f"lost.{name}": str(lost)})
+            writer.write(DIAGNOSTICS, at * second, data, at * second)
+    told = partial(told_lost, Bag(tmp_path / "bag"))
+    assert told(name, 2 * second, 3 * second) == 35  # what was lost before does not count
+    assert told(name, 1 * second, int(1.6 * second)) == 35  # told up to 1.5 s later
+    assert told(name, 3 * second, 5 * second) == 0
+    assert told(name, 0, 9 * second) == 90
+    assert told(SLAVE_TRUE_CP.name, 0, 9 * second) == 0
 
 
 def test_a_recording_that_is_none_is_not_intact(tmp_path):

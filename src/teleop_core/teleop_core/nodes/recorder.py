@@ -37,6 +37,8 @@ DEPTH = 2000
 HOLD_NS = 100_000_000
 """Longest time for which messages wait before they go to the disk [ns]: what a loss of power or the
 end of the process costs is this time and that of writing one chunk, together below 0.2 s."""
+DISCOVERY_NS = 3_000_000_000
+"""Time within which two nodes that are there have found each other [ns]; most take a tenth."""
 _PAUSE = 5e-3
 
 
@@ -59,6 +61,7 @@ class _Channel:
         self.topic, self._node = topic, node
         self.received = self.lost = 0
         self._numbers: dict[bytes, int] = {}  # the last one of each publisher
+        self._since_ns = 0  # since when it listens
         self._given: deque[Arrival] = deque()
         self._subscription: Subscription | None = None
         self._inside_ns: int | None = None
@@ -95,6 +98,7 @@ class _Channel:
         elif self._subscription is None:
             depth = 10 if self.topic.quality is Quality.LATCHED else DEPTH
             self._numbers.clear()
+            self._since_ns = time.monotonic_ns()
             self._subscription = Subscription(self._node, self.topic, f"/{self.topic.name}", depth)
 
     def close(self) -> None:
@@ -104,11 +108,21 @@ class _Channel:
             self._subscription = None
 
     def count(self, sender: bytes, number: int) -> None:
-        """Note a message by its publisher and its number in that one's sequence."""
+        """Note a message by its publisher and its number in that one's sequence.
+
+        A node that starts again sends before the middleware has told the recorder of it: for 0.1 s,
+        seldom for 1 s. So of a publisher that comes later, what it sent until then was lost.
+        """
         self.received += 1
-        last = self._numbers.get(sender, number)
+        if (last := self._numbers.get(sender)) is None:
+            last = 0 if self._numbers and self._is_new_there() else number - 1
         self._numbers[sender] = max(last, number)
         self.lost += max(0, number - last - 1)
+
+    def _is_new_there(self) -> bool:
+        """Whether a publisher that was not heard yet cannot have sent before the recorder came."""
+        listens_ns = time.monotonic_ns() - self._since_ns
+        return self.topic.quality is Quality.STREAM and listens_ns > DISCOVERY_NS
 
 
 class RecorderNode(CoreNode):

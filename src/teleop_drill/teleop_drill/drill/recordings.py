@@ -10,7 +10,8 @@ from mcap.reader import make_reader
 from teleop_core.bags.finding import mcap_files
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.base.errors import TeleopError
-from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION
+from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_JS, SLAVE_OPERATION
+from teleop_drill.drill.exercise import Cure
 from teleop_drill.drill.measure import Stamps
 from teleop_drill.drill.outcome import Outcome
 
@@ -18,6 +19,9 @@ Counted = dict[str, tuple[Stamps, Stamps]]
 """Names of streams to the times at which messages were sent, and their stamps [ns]."""
 LONGEST_LOSS = 0.2
 """What the end of a process may cost at most [s]."""
+DISCOVERY = 1.5
+"""Time after which the middleware has told all of a node that starts again [s]."""
+_REPORT_NS = 1_500_000_000  # after which a node has reported what it counted
 
 
 @dataclass(frozen=True)
@@ -95,6 +99,16 @@ def missing(bag: Bag, name: str, heard: tuple[Stamps, Stamps]) -> Stamps:
     return sent_ns[_repeats(stamps) >= have]
 
 
+def told_lost(bag: Bag, name: str, begin_ns: int, end_ns: int) -> int:
+    """How many messages of a topic the recorder itself told that it lost in a time [ns]."""
+    reports = bag.reports(DIAGNOSTICS) if DIAGNOSTICS.name in bag.topics else []
+    key = f"lost.{name}"
+    counts = [(one.stamp_ns, int(one.values[key])) for one in reports if key in one.values]
+    before = [count for ns, count in counts if ns <= begin_ns]
+    until = [count for ns, count in counts if ns <= end_ns + _REPORT_NS]
+    return (until[-1] if until else 0) - (before[-1] if before else 0)
+
+
 def within(heard: Counted, begin_ns: int, end_ns: int) -> Counted:
     """Messages that were sent in a time [ns], its end left out."""
     chosen = {name: (sent >= begin_ns) & (sent < end_ns) for name, (sent, _) in heard.items()}
@@ -127,16 +141,21 @@ def judge_recording(one: Recorded, tick: float) -> None:
     if one.killed_ns is not None:
         until_ns = one.killed_ns - round(1e9 * LONGEST_LOSS)
     begins = [begin_ns for begin_ns, _ in one.outcomes]
-    gone = []
+    gone: dict[str, Stamps] = {}
     if verdict.bag is not None:
         heard = within(one.heard, begins[0], until_ns)
-        gone = [missing(verdict.bag, name, two) for name, two in heard.items()]
+        gone = {name: missing(verdict.bag, name, two) for name, two in heard.items()}
     for (begin_ns, outcome), end_ns in zip(one.outcomes, [*begins[1:], until_ns], strict=True):
         outcome.recording, outcome.is_recorded = verdict.text, verdict.is_good
         if verdict.is_saved and not outcome.exercise.cuts_recording:
             outcome.recording, outcome.is_recorded = "intact", True
-        lost = [int(np.sum((ns >= begin_ns) & (ns < end_ns))) for ns in gone]
-        outcome.note_loss(max(lost, default=0) * tick)
+        lost = {name: int(np.sum((ns >= begin_ns) & (ns < end_ns))) for name, ns in gone.items()}
+        if Cure.RESTART in outcome.exercise.cures and verdict.bag is not None:
+            # What a node says before its listeners have found it, if the recorder tells of it.
+            for name, count in lost.items():
+                told = told_lost(verdict.bag, name, begin_ns, end_ns) if count else 0
+                lost[name] = count - min(told, round(DISCOVERY / tick))
+        outcome.note_loss(max(lost.values(), default=0) * tick)
 
 
 def _repeats(stamps: Stamps) -> Stamps:
