@@ -40,6 +40,8 @@ _YIELD = "chain/architectures/impedance.py"
 _PID, _WAY = "slave/controllers/pid.py", "slave/interpolation.py"
 _HAND, _OBSERVER = "chain/master/hand_mechanics.py", "slave/force_observer.py"
 CODE_MUTANTS = (
+    _mutant("buttons_paused", "a pause of the poses makes single presses of a stream of buttons",
+            "chain/mapping/plausibility.py", "max(s.in_row - _STREAM, 0)", "0", "plausible_hand"),
     # kernels and robots
     _mutant("far_turn", "a turn beyond half a turn goes the long way", "kernels/geometry.py",
             "sign = -1.0 if turn[0] < 0.0 else 1.0", "sign = 1.0", "geometry"),

@@ -126,3 +126,31 @@ def test_masters_that_send_buttons_where_they_change_only_are_followed():
     for k in range(2000):
         last = hand.give(moved(REST, [1e-5 * k, 0.0, 0.0]))
     assert not np.allclose(first, last)
+
+
+def way(hand, ticks):
+    """Way of the command while the hand goes on, 0.1 m/s [m]."""
+    places = [hand.give(moved(REST, [1e-4 * k, 0.0, 0.0]))[:3] for k in range(ticks)]
+    return np.linalg.norm(np.ptp(places, axis=0))
+
+
+def test_buttons_that_fall_silent_just_after_a_pause_of_the_hand_hold_as_a_clutch_does():
+    hand = Hand()
+    hand.rest()
+    hand.now_ns += 2_000_000_000  # in which no pose could be used, while buttons came
+    hand.row["master_buttons_ns"] = hand.now_ns
+    hand.has_buttons = False
+    assert way(hand, 400) > 0.03
+    hand.rest(ticks=200)
+    assert way(hand, 1000) < 1e-4
+    assert hand.row["teleop_state"][1] == 1.0
+
+
+def test_a_master_that_comes_to_send_buttons_where_they_change_only_is_followed_then():
+    hand = Hand()
+    hand.rest()
+    hand.has_buttons = False
+    for _ in range(2):
+        hand.rest(ticks=800)
+        hand.row["master_buttons_ns"] = hand.now_ns
+    assert way(hand, 2000) > 0.1

@@ -20,7 +20,13 @@ from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import layout
 from teleop_core.graph.layers import SESSION
-from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION, SLAVE_SETPOINT_JS, Topic
+from teleop_core.graph.topics import (
+    SLAVE_MEASURED_JS,
+    SLAVE_OPERATION,
+    SLAVE_SETPOINT_JS,
+    TELEOP_STATE,
+    Topic,
+)
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.observer import WARNING, Observer
 from teleop_core.nodes.operation import STOP_TOPIC
@@ -176,8 +182,13 @@ class LiveRig:
         return reports[-1][1] if reports else {}
 
     def is_following(self) -> bool:
-        """Whether the slave is at work, enabled and homed, and its arm goes where it leads it."""
-        operation = self.operation()
+        """Whether the slave is at work, enabled and homed, and its arm goes where the hand leads.
+
+        An arm that makes up slowly for what it lags behind moves too, while nothing leads it.
+        """
+        operation, told = self.operation(), self.tap.reports(TELEOP_STATE)
+        if told and not told[-1][1]["is_following"]:
+            return False
         if not operation or operation["state"] != State.ENABLED or operation["is_busy"]:
             return False
         if self.tap.age(SLAVE_SETPOINT_JS) > _FRESH or not self.session.is_running("slave"):

@@ -73,7 +73,8 @@ class PlausibilityState(Fields):
 
 # Samples that come faster than this [s] are taken to be so far apart: stamps may be uneven.
 _SHORTEST = 1e-3
-# So many messages no farther apart than this are a stream [ns].
+# So many messages no farther apart than this are a stream [ns]. A pause takes so many away from at
+# most twice as many: the one in which the poses were silent too leaves a stream one, two do not.
 _STREAM, _STREAM_NS = 20, 100_000_000
 
 
@@ -135,7 +136,8 @@ def has_lost_buttons(p: PlausibilityNumbers, s: PlausibilityState, row: Row) -> 
     """
     stamp_ns = row.master_buttons_ns
     if stamp_ns != s.buttons_ns:
-        s.in_row = s.in_row + 1 if stamp_ns - s.buttons_ns <= _STREAM_NS else 0
+        is_next = stamp_ns - s.buttons_ns <= _STREAM_NS
+        s.in_row = min(s.in_row + 1, 2 * _STREAM) if is_next else max(s.in_row - _STREAM, 0)
         s.buttons_ns = stamp_ns
     silence_ns = row.master_measured_cp_ns - stamp_ns
     s.is_lost = 1 if s.in_row >= _STREAM and 0 < p.silence_ns < silence_ns else 0
