@@ -20,9 +20,9 @@ from teleop_core.chain.passivity.port import (
     hear_energy,
 )
 from teleop_core.chain.passivity.slave_side import PASSIVITY, PassivityParameters
-from teleop_core.chain.passivity.tank import tank_hand
+from teleop_core.chain.passivity.tank import tank_hand, tank_slave
 from teleop_core.chain.passivity.tdpa import tdpa_hand, tdpa_slave
-from teleop_core.graph.topics import ENERGY
+from teleop_core.graph.topics import ENERGY, OPERATION
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -225,6 +225,55 @@ def test_a_touch_that_is_over_leaves_nothing_in_the_tank():
     assert sample(1.0, -2.0, 1e-2) == 1.0  # the hand pushed 20 mJ in
     assert sample(0.0, 0.0, 0.0) == 0.0
     assert sample(1.0, 0.0, 1e-3) < 0.01
+
+
+def test_a_tank_lets_a_command_go_against_the_force_the_slower_the_larger_that_is_and_stops_it():
+    stops = PassivityParameters().stop_force
+    for size in (0.5, 2.0, stops, 3.0 * stops):
+        numbers = np.array([0.2, 5e-3, 0.01, 0.0, 1.0, stops])
+        port, last = np.zeros(len(ENERGY)), moved(2, 0.0)
+        force = np.array([0.0, 0.6 * size, 0.8 * size, 0.0, 0.0, 0.0])
+        still = np.zeros(3)
+        for count in range(100):
+            command = moved(2, -1e-3 * count)
+            tank_slave(numbers, np.zeros(12), still, force, last, port, port, command, 1e-3)
+            against = -force[:3] @ (command[:3] - last[:3]) / size
+            fastest = 1e-3 * 0.05 * max(stops - size, 0.0) / size
+            assert -1e-12 < against <= fastest + 1e-12
+            assert np.allclose(command[:3] + port[DRIFT : DRIFT + 3], [0, 0, -1e-3 * count])
+            last = command
+
+
+def test_drift_of_a_tank_is_gone_once_the_hand_is_back_where_the_arm_waits():
+    numbers, still = np.array([0.2, 5e-3, 0.01, 0.0, 1.0, 5.0]), np.zeros(3)
+    port, last = np.zeros(len(ENERGY)), moved(2, 0.0)
+    for place, force in [*((-1e-4 * k, 9.0) for k in range(100)), *((-1e-2, 9.0),) * 9,
+                         *((-1e-2 + 1e-4 * k, 0.0) for k in range(101))]:  # fmt: skip
+        command, pushes = moved(2, place), np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
+        tank_slave(numbers, np.zeros(12), still, pushes, last, port, port, command, 1e-3)
+        assert command[2] > -6e-4  # in the air drift fades, 5 mm/s at most
+        last = command
+    assert np.linalg.norm(port[DRIFT : DRIFT + 3]) < 1e-12
+
+
+def presses(rows):
+    """Stretches in which the tip is pressed, breaks of 50 ms and less left out."""
+    force = np.linalg.norm(rows["slave_measured_cf"][:, :3], axis=1)
+    on = np.flatnonzero(force > 0.05)
+    return 1 + int(np.sum(np.diff(on) > 50))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [0.0, 0.35])
+def test_a_hand_with_a_tank_rests_on_steel_without_bouncing_near_and_far(late):
+    """The hand of the scenario presses four or five times in 20 s."""
+    rows = pressing(
+        "reflection.passivity=tank", "world.material=steel", f"network.there.least_delay={late}",
+        f"network.back.least_delay={late}", ticks=20_000,
+    )  # fmt: skip
+    assert presses(rows) <= 5
+    assert not rows["slave_operation"][:, OPERATION.index("fault")].any()
+    assert gained(rows) < 0.3e-3
 
 
 def test_what_the_arm_lent_is_paid_back_before_the_hand_gets_any():

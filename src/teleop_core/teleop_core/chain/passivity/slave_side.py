@@ -68,6 +68,12 @@ class PassivityParameters:
         "nothing, and what an arm that ran into something hard overdrew is given back",
         source="assumed: a gentle touch",
     )  # fmt: skip
+    stop_force: float = parameter(
+        5.0, unit="N", lower=0.1, upper=1000.0,
+        doc="force on the tip at which a tank stops a command that goes against it; the arm, which "
+        "comes behind its command, presses harder",
+        source="assumed: below what RCRT-1's drives give for long",
+    )  # fmt: skip
 
 
 class Laws(NamedTuple):
@@ -175,7 +181,7 @@ class SlaveSide(RunningStage):
         slaves = tuple(PASSIVITIES.find(name).slave_pointer for name in PASSIVITIES)
         self._laws = Laws(
             slaves,
-            np.zeros(5),
+            np.zeros(6),
             np.zeros(MEMORY),
             np.zeros(3),
             np.zeros(3),
@@ -198,7 +204,7 @@ class SlaveSide(RunningStage):
         """Take new parameters from the next command on."""
         self._laws.numbers[:] = (
             parameters.recovery, parameters.recovery_speed, parameters.least_force,
-            parameters.credit, parameters.credit_force,
+            parameters.credit, parameters.credit_force, parameters.stop_force,
         )  # fmt: skip
 
 

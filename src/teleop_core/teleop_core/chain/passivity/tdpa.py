@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.passivity import Passivity
-from teleop_core.chain.passivity.port import DRIFT, IN, MARGIN, TOLD, WITHHELD
+from teleop_core.chain.passivity.held_back import hold_back, make_up, met_way, norm
+from teleop_core.chain.passivity.port import DRIFT, IN, MARGIN, TOLD
 from teleop_core.chain.passivity.tank import READING, SPARE
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
@@ -90,7 +91,7 @@ def tdpa_slave(
     Args:
         numbers: Time constant [s] and largest speed [m/s] with which drift goes away, a force below
             which nothing is touched [N], what the arm may lend in a touch [J], and up to which
-            force all of it; none from twice that force on [N].
+            force all of it; none from twice that force on [N]; the last is not used.
         memory: Written.
         flow: Heard, in, out [J].
         force: On the tip (6,).
@@ -130,54 +131,12 @@ def pay_command(
 
     Arguments are those of :func:`tdpa_slave`.
     """
-    size, inwards = norm(force), 0.0
-    for i in range(3):
-        inwards -= force[i] * (command[i] - last[i])
+    size = norm(force)
     lent = numbers[3] * min(max(2.0 - size / numbers[4], 0.0), 1.0)
     # What is overdrawn is given back by going back, no faster than drift goes away.
     left = max(min(port[MARGIN], memory[0]) + lent, -size * numbers[1] * period)
-    if inwards > left and size > numbers[2]:
-        for i in range(3):
-            back = force[i] * (inwards - left) / (size * size)
-            command[i] += back
-            port[DRIFT + i] -= back
-        port[WITHHELD] += max(inwards, 0.0) - max(left, 0.0)
-        inwards = left
+    inwards = hold_back(force, size, last, left, numbers[2], port, command)
     memory[0] -= max(inwards, 0.0)
-
-
-@inner
-def norm(force: Array) -> float:
-    """Size of a force, of its first three numbers."""
-    return math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-
-
-@inner
-def met_way(command: Array, last: Array, drift: Array) -> float:
-    """Way [m] on which the command (7,), as it came, went back towards the one given before.
-
-    Drift that goes away by it moves nothing: the command that is given waits until it is met.
-    """
-    size, way = norm(drift), 0.0
-    if size == 0.0:
-        return 0.0
-    for i in range(3):
-        way -= drift[i] * (command[i] - last[i] - drift[i]) / size
-    return max(way, 0.0)
-
-
-@inner
-def make_up(numbers: Array, drift: Array, met: float, period: float) -> None:
-    """Let drift (3,) [m] fade, no faster than it may, and by the way ``met`` [m] besides."""
-    square = 0.0
-    for i in range(3):
-        square += drift[i] * drift[i]
-    size = math.sqrt(square)
-    if size == 0.0:
-        return
-    step = min(met + min(size * period / (numbers[0] + period), numbers[1] * period), size)
-    for i in range(3):
-        drift[i] *= 1.0 - step / size
 
 
 TDPA = Passivity("tdpa", TdpaParameters, tdpa_hand, tdpa_slave)

@@ -12,6 +12,7 @@ import numpy as np
 
 from teleop_core.base.parameters import parameter
 from teleop_core.chain.passivity import Passivity
+from teleop_core.chain.passivity.held_back import make_up, norm
 from teleop_core.chain.passivity.port import (
     DRIFT,
     HEARD,
@@ -21,7 +22,7 @@ from teleop_core.chain.passivity.port import (
     TOLD,
     WAVE,
 )
-from teleop_core.chain.passivity.tdpa import make_up, norm, pay_command, pay_push
+from teleop_core.chain.passivity.tdpa import pay_command, pay_push
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 
