@@ -39,7 +39,7 @@ crtk_msgs: setup
 	    $(BIN)/python src/crtk_msgs/build_without_ament.py || true
 
 # A block of silicone over 200 ms there and back, without and with an energy tank.
-FAR := --scenario palpation --set teleop.stages=[network] network.there.least_delay=0.1 \
+FAR := --scenario palpation --set teleop.stages=[network,passivity] network.there.least_delay=0.1 \
     network.back.least_delay=0.1 feedback_timeout=1.0 world.material=silicone
 
 demo: setup
