@@ -15,7 +15,7 @@ import numpy as np
 
 from teleop_core.bags import compression as compressions
 from teleop_core.bags import ending, rosbag2
-from teleop_core.bags.chunks import Messages, Single, Stretch, assemble, split
+from teleop_core.bags.chunks import Assembly, Messages, Single, Stretch
 from teleop_core.bags.layouts import SECOND_NS, Layout, Stamps, Values, layout
 from teleop_core.bags.mcap_file import McapFile
 from teleop_core.bags.recording import RecordingParameters
@@ -238,12 +238,12 @@ class BagWriter:
     # -- the writing thread ----------------------------------------------------------------------
 
     def _work(self) -> None:
-        jobs = iter(self._jobs.get, None)
+        jobs, assembly = iter(self._jobs.get, None), Assembly(CHUNK_BYTES)
         stopped: OSError | None = None
         try:
             for stretches, singles in jobs:
-                for part in split(stretches, singles, CHUNK_BYTES):
-                    self._mcap.append(assemble(*part))
+                for chunk in assembly.chunks(stretches, singles):
+                    self._mcap.append(chunk)
                 if self._hold_ns < SECOND_NS and self._jobs.empty():
                     self._mcap.sync()
         except OSError as error:
