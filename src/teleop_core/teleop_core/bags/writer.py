@@ -22,7 +22,7 @@ from teleop_core.bags.recording import RecordingParameters
 from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.graph.topics import Kind, Topic
 
-CHUNK_BYTES = 1 << 20
+CHUNK_BYTES = 2 << 20
 QUEUE_LENGTH = 8
 """Seconds of a session that wait for a slow disk, before callers wait too."""
 METADATA_NAME = "teleop_core"
