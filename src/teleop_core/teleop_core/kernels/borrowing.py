@@ -11,7 +11,10 @@ from typing import Any
 from numba.core import ir, types
 from numba.core.compiler import Compiler, DefaultPassBuilder
 from numba.core.compiler_machinery import AnalysisPass, register_pass
+from numba.core.errors import TypingError
 from numba.core.typed_passes import AnnotateTypes
+
+from teleop_core.kernels.room import room
 
 _LOOKS = frozenset({
     "getattr", "static_getitem", "getitem", "build_tuple", "exhaust_iter", "getiter", "iternext",
@@ -31,6 +34,8 @@ class _Borrowing(AnalysisPass):
 
     def run_pass(self, state: Any) -> bool:
         """Look at the typed function, before code is made of it."""
+        if _is_held(state, state.return_type) and _takes_room(state):
+            raise TypingError("its room ends with it: it must return no array")
         if state.targetctx.enable_nrt and _borrows(state):
             state.targetctx.enable_nrt = False  # of this function's own context
         return False
@@ -45,6 +50,14 @@ class Pipeline(Compiler):
         steps.add_pass_after(_Borrowing, AnnotateTypes)
         steps.finalize()
         return [steps]
+
+
+def _takes_room(state: Any) -> bool:
+    """Whether a function has room of its own."""
+    calls = (
+        call for block in state.func_ir.blocks.values() for call in block.find_exprs(op="call")
+    )
+    return any(_called(state, call) is room for call in calls)
 
 
 def _borrows(state: Any) -> bool:
@@ -63,10 +76,16 @@ def _is_plain(state: Any, line: Any) -> bool:
         return True
     made, expression = state.typemap[line.target.name], line.value
     if expression.op == "call":
-        return not _is_held(state, made) and _is_plain_call(state, expression)
+        is_room = _called(state, expression) is room
+        return is_room or (not _is_held(state, made) and _is_plain_call(state, expression))
     if expression.op == "getitem" and not _is_index(state.typemap[expression.index.name]):
         return False
     return expression.op in _LOOKS or not _is_held(state, made)
+
+
+def _called(state: Any, call: Any) -> object:
+    """Python function that is called, if it is one that numba knows by itself."""
+    return getattr(state.typemap[call.func.name], "typing_key", None)
 
 
 def _is_plain_call(state: Any, call: Any) -> bool:
@@ -75,7 +94,7 @@ def _is_plain_call(state: Any, call: Any) -> bool:
     if isinstance(function, types.Dispatcher | types.FunctionType):
         return True
     arguments = [*call.args, *(value for _, value in call.kws)]
-    is_length = getattr(function, "typing_key", None) is len
+    is_length = _called(state, call) is len
     return is_length or not any(_is_held(state, state.typemap[one.name]) for one in arguments)
 
 
