@@ -95,6 +95,57 @@ def test_messages_of_one_time_stand_in_the_order_of_their_topics(tmp_path, rng):
     assert all(there == order for there in found.values())
 
 
+@settings(max_examples=30, deadline=None)
+@given(
+    begin_ns=st.sampled_from([0, 1_764_000_000_123_456_789]),
+    missing=st.lists(st.sets(st.integers(0, 5)), min_size=4, max_size=4),
+    late=st.sampled_from([0, 1, MS // 2]),
+    at=st.lists(st.integers(0, 6), max_size=4),
+)
+def test_streams_out_of_step_stand_at_their_times_among_the_others(
+    tmp_path_factory, begin_ns, missing, late, at
+):
+    path, rng = tmp_path_factory.mktemp("steps") / "bag", np.random.default_rng(5)
+    chosen, samples, expected = topics.STREAMS[:4], {}, []
+    for place, (topic, holes) in enumerate(zip(chosen, missing, strict=True)):
+        ticks = np.array([i for i in range(6) if i not in holes], np.int64)
+        logs = begin_ns + ticks * MS + late * (place == 2)
+        samples[topic] = (logs, rng.integers(0, 2, (len(logs), topic.width(3))) * 1.0, logs)
+        expected += [(log, place, topic.name) for log in logs.tolist()]
+    with BagWriter(path, topics.ALL, JOINTS, compression="none") as writer:
+        for number, tick in enumerate(sorted(at)):
+            log = begin_ns + tick * MS
+            writer.write(topics.DIAGNOSTICS, log, report(log, "a", 0, str(number), {}))
+            expected.append((log, len(chosen), "diagnostics"))
+        writer.write_block(samples)
+    if not expected:
+        return
+    with mcap_file(path).open("rb") as file:
+        records = list(StreamReader(file).records)
+    names = {r.id: r.topic.removeprefix("/") for r in records if isinstance(r, Channel)}
+    found = [(r.log_time, names[r.channel_id]) for r in records if isinstance(r, Message)]
+    assert found == [(log, name) for log, _, name in sorted(expected)]
+    bag = Bag(path)
+    for topic, (stamps, values, _) in samples.items():
+        if len(stamps):
+            np.testing.assert_array_equal(bag.read(topic).stamp_ns, stamps)
+            np.testing.assert_array_equal(bag.read(topic).values, values)
+
+
+@pytest.mark.parametrize("begin_ns", [0, 1_764_000_000_123_456_789])
+def test_chunks_are_cut_between_times_whatever_the_clock(tmp_path, rng, begin_ns):
+    samples = block(rng, 0, 9000)
+    samples = {t: (s, v, begin_ns + log) for t, (s, v, log) in samples.items()}
+    stamps, values, logs = samples[topics.STREAMS[0]]
+    samples[topics.STREAMS[0]] = (stamps[::7], values[::7], logs[::7])
+    with BagWriter(tmp_path / "bag", topics.ALL, JOINTS) as writer:
+        writer.write_block(samples)
+    with mcap_file(tmp_path / "bag").open("rb") as file:
+        chunks = make_reader(file).get_summary().chunk_indexes
+    assert len(chunks) > 5
+    assert all(a.message_end_time < b.message_start_time for a, b in pairwise(chunks))
+
+
 @EVERY_COMPRESSION
 def test_the_mcap_library_decodes_and_validates_the_file(tmp_path, rng, compression):
     counts = record(tmp_path / "bag", rng, compression=compression, metadata={"seed": "7"})

@@ -237,11 +237,14 @@ def _add_lookups(commands: Any) -> None:
 
 
 def _sim(arguments: argparse.Namespace) -> int:
-    from teleop_core.session import api
+    from teleop_core.session.notes import notes_of
+    from teleop_core.session.runner import simulate
 
     configuration = configured(arguments)
+    for note in notes_of(configuration):
+        warnings.warn(note, stacklevel=2)
     with shown_progress("simulating") as progress:
-        api.run(configuration, out=arguments.out, progress=progress)
+        simulate(configuration, arguments.out, progress)
     print(done(arguments.out, f"{progress.seconds:g} s recorded"))
     return 0
 

@@ -1,13 +1,16 @@
-"""Chunks: messages of one stretch of time as the bytes of an MCAP chunk, with their index.
+"""Chunks: messages of one stretch of time as the bytes of MCAP chunks, with their index.
 
 Messages stand in the order of their log times, whatever topic they belong to; of equal times, in
 the order of the streams. So readers that ignore the index see them in the right order too.
+
+Most streams of a session have one message in every tick. These *streams in step* are laid out as a
+table, with one row of bytes for each tick; the records of all other messages are put in between.
 """
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +31,9 @@ _HEADER = np.dtype(
 )
 
 
+Entries = np.ndarray[tuple[int, int], np.dtype[np.uint64]]
+
+
 @dataclass(frozen=True, eq=False)
 class Chunk:
     """Uncompressed records, and per channel where its messages are.
@@ -38,7 +44,7 @@ class Chunk:
     data: Bytes
     start_ns: int
     end_ns: int
-    index: dict[int, "np.ndarray[tuple[int, int], np.dtype[np.uint64]]"]
+    index: dict[int, Entries]
 
 
 # One message of any size on its way into a chunk: channel, sequence, log and publish time [ns],
@@ -46,13 +52,22 @@ class Chunk:
 Single = tuple[int, int, int, int, bytes]
 
 
-def _records(singles: Sequence[Single]) -> list[bytes]:
-    """Whole MCAP records."""
-    pack = HEADER.pack
-    return [
-        pack(Opcode.MESSAGE, _LENGTH_OF_REST + len(data), channel, sequence, log, publish) + data
-        for channel, sequence, log, publish, data in singles
-    ]
+def _record(channel: int, sequence: int, log_ns: int, publish_ns: int, data: bytes) -> bytes:
+    """Whole MCAP record of a single message."""
+    length = _LENGTH_OF_REST + len(data)
+    return HEADER.pack(Opcode.MESSAGE, length, channel, sequence, log_ns, publish_ns) + data
+
+
+class _Loose(NamedTuple):
+    """A record that is in no table; ``begin`` is the byte of a row where it would stand."""
+
+    log_ns: int
+    begin: int
+    channel: int
+    record: bytes
+
+
+_order = itemgetter(0, 1)
 
 
 class Stretch(NamedTuple):
@@ -80,89 +95,166 @@ class Stretch(NamedTuple):
         fields["log"] = fields["publish"] = self.log_ns
         self.layout.encode_into(rows[:, HEADER.size :], self.stamp_ns, self.values)
 
-    def between(self, begin_ns: int, end_ns: int) -> "Stretch":
-        """The samples logged from ``begin_ns`` on and before ``end_ns``."""
-        first, last = np.searchsorted(self.log_ns, (begin_ns, end_ns))
-        part = slice(first, last)
-        return self._replace(
-            sequence=self.sequence + int(first), stamp_ns=self.stamp_ns[part],
-            values=self.values[part], log_ns=self.log_ns[part],
-        )  # fmt: skip
+    def loose(self, begin: int) -> "list[_Loose]":
+        """The records one by one, each with the byte of a row where it would stand."""
+        rows = np.empty((len(self.log_ns), self.size), np.uint8)
+        self.fill(rows)
+        return [
+            _Loose(log_ns, begin, self.channel, row.tobytes())
+            for log_ns, row in zip(self.log_ns.tolist(), rows, strict=True)
+        ]
 
 
 Messages = tuple[list[Stretch], list[Single]]
 
 
-def split(stretches: list[Stretch], singles: list[Single], size: int) -> list[Messages]:
-    """Messages in parts of about ``size`` bytes of streams that follow each other in time."""
-    total = sum(s.size * len(s.log_ns) for s in stretches)
-    if total <= 2 * size:
-        return [(stretches, singles)]
-    logs = np.sort(np.concatenate([s.log_ns for s in stretches]))
+class _Room:
+    """Memory that is used again: to get fresh memory takes longer than to fill it."""
+
+    def __init__(self) -> None:
+        self._bytes: Bytes = np.empty(0, np.uint8)
+
+    def take(self, size: int) -> Bytes:
+        """Bytes (size,), the same ones each time."""
+        if len(self._bytes) < size:
+            self._bytes = np.empty(size, np.uint8)
+        return self._bytes[:size]
+
+
+class Assembly:
+    """Maker of the chunks of one file.
+
+    Args:
+        size: Bytes of a chunk, about.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._size, self._table, self._data = size, _Room(), _Room()
+
+    def chunks(self, stretches: Sequence[Stretch], singles: Sequence[Single]) -> Iterator[Chunk]:
+        """All these messages as chunks that follow each other in time.
+
+        Their bytes hold until the next ones are made.
+        """
+        stretches = [stretch for stretch in stretches if len(stretch.log_ns)]
+        if not stretches and not singles:
+            return
+        data, index = self._merged(_Table(stretches, self._table), singles)
+        first, begin = dict.fromkeys(index, 0), 0
+        for cut_ns in (*_cuts(stretches, len(data), self._size), _FOREVER):
+            cut = np.uint64(cut_ns)  # of another type, all times would be converted
+            last = {c: int(np.searchsorted(rows[:, 0], cut)) for c, rows in index.items()}
+            nexts = [int(rows[last[c], 1]) for c, rows in index.items() if last[c] < len(rows)]
+            end = min(nexts, default=len(data))
+            own = {c: rows[first[c] : last[c]] for c, rows in index.items() if first[c] < last[c]}
+            if own:
+                yield _chunk(data[begin:end], begin, own)
+            first, begin = last, end
+
+    def _merged(
+        self, table: "_Table", singles: Sequence[Single]
+    ) -> tuple[Bytes, dict[int, Entries]]:
+        """Records of all messages in their order, and for each channel where its own are."""
+        loose = table.loose + [_Loose(s[2], table.width, s[0], _record(*s)) for s in singles]
+        loose.sort(key=_order)
+        places = table.places(loose)
+        before = np.cumsum([0, *(len(one.record) for one in loose)])
+        index = table.index(places, before)
+        logs, channels = (np.array([one[i] for one in loose], np.int64) for i in (0, 2))
+        offsets = places + before[:-1]
+        for channel in np.unique(channels).tolist():
+            own = _entries(logs[channels == channel], offsets[channels == channel])
+            if channel in index:
+                own = np.concatenate((index[channel], own))
+                own = own[np.argsort(own[:, 1])]
+            index[channel] = own
+        return self._joined(table, loose, places.tolist()), index
+
+    def _joined(self, table: "_Table", loose: Sequence[_Loose], places: Sequence[int]) -> Bytes:
+        """Bytes of the table with each record at its place."""
+        rows = table.rows.reshape(-1)
+        if not loose:
+            return rows
+        data = self._data.take(len(rows) + sum(len(one.record) for one in loose))
+        source, view, begin, at = rows.data, data.data, 0, 0
+        for one, end in zip(loose, places, strict=True):
+            middle = at + end - begin
+            view[at:middle] = source[begin:end]
+            begin, at = end, middle + len(one.record)
+            view[middle:at] = one.record
+        view[at:] = source[begin:]
+        return data
+
+
+def _cuts(stretches: Sequence[Stretch], total: int, size: int) -> list[int]:
+    """Log times [ns] at which ``total`` bytes are cut; none for up to two chunks."""
+    if total <= 2 * size or not stretches:
+        return []
+    logs = max((stretch.log_ns for stretch in stretches), key=len)
     count = -(-total // size)
-    cuts = np.unique(logs[[len(logs) * i // count for i in range(1, count)]]).tolist()
-    parts = []
-    for begin, end in pairwise([-_FOREVER, *cuts, _FOREVER]):
-        stretched = [s.between(begin, end) for s in stretches]
-        single = [s for s in singles if begin <= s[2] < end]
-        if single or any(len(s.log_ns) for s in stretched):
-            parts.append((stretched, single))
-    return parts
+    return sorted({int(logs[len(logs) * i // count]) for i in range(1, count)})
 
 
-def assemble(stretches: Sequence[Stretch], singles: Sequence[Single] = ()) -> Chunk:
-    """Chunk of all these messages, of which there is at least one."""
-    stretches = [stretch for stretch in stretches if len(stretch.log_ns)]
-    records = _records(singles)
-    logs = np.concatenate(
-        [s.log_ns for s in stretches] + [np.array([log for _, _, log, _, _ in singles], np.int64)]
-    )
-    sizes = np.concatenate(
-        [np.full(len(s.log_ns), s.size) for s in stretches]
-        + [np.array([len(record) for record in records], np.int64)]
-    )
-    order = np.argsort(logs, kind="stable")
-    offsets, sorted_sizes = np.empty(len(logs), np.int64), sizes[order]
-    offsets[order] = np.cumsum(sorted_sizes) - sorted_sizes
-    data = np.empty(int(sizes.sum()), np.uint8)
-    begin = 0
-    for stretch in stretches:
-        end = begin + len(stretch.log_ns)
-        _place(data, offsets[begin:end], stretch)
-        begin = end
-    view = data.data
-    for record, offset in zip(records, offsets[begin:].tolist(), strict=True):
-        view[offset : offset + len(record)] = record
-    index = _index(stretches, singles, logs, offsets)
-    return Chunk(data, int(logs[order[0]]), int(logs[order[-1]]), index)
+def _chunk(data: Bytes, begin: int, index: Mapping[int, Entries]) -> Chunk:
+    """Chunk of bytes that stood at ``begin``, and their part of the index."""
+    base = np.array((0, begin), np.uint64)
+    start_ns = min(int(rows[0, 0]) for rows in index.values())
+    end_ns = max(int(rows[-1, 0]) for rows in index.values())
+    return Chunk(data, start_ns, end_ns, {c: rows - base for c, rows in index.items()})
 
 
-def _place(data: Bytes, offsets: Stamps, stretch: Stretch) -> None:
-    """Write the records at their offsets; without a copy if these are evenly spaced."""
-    shape, step = (len(offsets), stretch.size), 0
-    if len(offsets) > 1:
-        steps = np.diff(offsets)
-        step = int(steps[0]) if (steps == steps[0]).all() else -1
-    if step >= 0:
-        rows: Bytes = np.ndarray(shape, np.uint8, data, int(offsets[0]), (step, 1))
-        stretch.fill(rows)
-        return
-    copy = np.empty(shape, np.uint8)
-    stretch.fill(copy)
-    data[offsets[:, np.newaxis] + np.arange(stretch.size)] = copy
+class _Table:
+    """Streams in step as a table of bytes, and the records of the others.
+
+    Attributes:
+        times: Log times of the rows, shape (n,), [ns]; they increase.
+        width: Bytes of a row.
+        rows: Records of the streams in step, shape (n, width).
+        begins: Channel of each stream in step, to the byte of the row where it stands.
+        loose: Records of the other streams.
+    """
+
+    def __init__(self, stretches: Sequence[Stretch], room: _Room) -> None:
+        longest = max((s.log_ns for s in stretches), key=len, default=np.empty(0, np.int64))
+        self.times = longest if (longest[1:] > longest[:-1]).all() else longest[:0]
+        is_in_step = [np.array_equal(stretch.log_ns, self.times) for stretch in stretches]
+        self.width = sum(s.size * own for s, own in zip(stretches, is_in_step, strict=True))
+        shape = (len(self.times), self.width)
+        self.rows: Bytes = room.take(shape[0] * shape[1]).reshape(shape)
+        self.begins: dict[int, int] = {}
+        self.loose: list[_Loose] = []
+        begin = 0
+        for stretch, own in zip(stretches, is_in_step, strict=True):
+            if own:
+                self.begins[stretch.channel] = begin
+                stretch.fill(self.rows[:, begin : begin + stretch.size])
+                begin += stretch.size
+            else:
+                self.loose += stretch.loose(begin)
+
+    def places(self, loose: Sequence[_Loose]) -> Stamps:
+        """Byte of the table before which each record stands, shape (n,)."""
+        logs = np.array([one.log_ns for one in loose], np.int64)
+        begins = np.array([one.begin for one in loose], np.int64)
+        rows = np.searchsorted(self.times, logs)
+        has_row = np.append(self.times, _FOREVER)[rows] == logs
+        places: Stamps = rows * self.width + begins * has_row
+        return places
+
+    def index(self, places: Stamps, before: Stamps) -> dict[int, Entries]:
+        """Where the records of the streams in step are, for each channel.
+
+        Args:
+            places: Bytes of the table before which other records stand, shape (n,).
+            before: Bytes of those that stand before each of them, and of all, shape (n + 1,).
+        """
+        rows, index = np.arange(len(self.times)) * self.width, {}
+        for channel, begin in self.begins.items():
+            at = rows + begin
+            index[channel] = _entries(self.times, at + before[np.searchsorted(places, at, "right")])
+        return index
 
 
-def _index(
-    stretches: Sequence[Stretch], singles: Sequence[Single], logs: Stamps, offsets: Stamps
-) -> dict[int, "np.ndarray[tuple[int, int], np.dtype[np.uint64]]"]:
-    entries = np.column_stack((logs, offsets)).astype("<u8")
-    index, begin = {}, 0
-    for stretch in stretches:
-        end = begin + len(stretch.log_ns)
-        index[stretch.channel] = entries[begin:end]
-        begin = end
-    channels = np.array([channel for channel, *_ in singles], np.int64)
-    for channel in np.unique(channels).tolist():
-        own = entries[begin:][channels == channel]
-        index[channel] = np.concatenate((index[channel], own)) if channel in index else own
-    return index
+def _entries(logs: Stamps, offsets: Stamps) -> Entries:
+    entries: Entries = np.column_stack((logs, offsets)).astype("<u8")
+    return entries

@@ -85,7 +85,7 @@ class McapFile:
         self._end = len(start)
         self._write(start)
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, data: bytes | bytearray) -> None:
         view = memoryview(data)
         while view:
             view = view[self._file.write(view) :]
@@ -109,16 +109,12 @@ class McapFile:
         size = len(chunk.data)
         head = _CHUNK_HEAD.pack(Opcode.CHUNK, length, chunk.start_ns, chunk.end_ns, size, crc)
         offsets: dict[int, int] = {}
-        indexes: list[bytes] = []
-        at = begin + 9 + length
+        index, at = bytearray(), begin + 9 + length
         for channel, entries in chunk.index.items():
-            offsets[channel] = at + sum(len(other) for other in indexes)
+            offsets[channel] = at + len(index)
             count = entries.nbytes
-            indexes.append(
-                _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + count, channel, count)
-                + entries.tobytes()
-            )
-        index = b"".join(indexes)
+            index += _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + count, channel, count)
+            index += entries.tobytes()
         self._write(head + tail)
         self._write(data)
         self._write(index)

@@ -105,14 +105,18 @@ class Bag:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        self._sources = [McapSource(file) for file in mcap_files(self.path)]
+        # Of each file the channels of each topic; several publishers may have made several.
+        self._numbers: dict[McapSource, dict[str, list[int]]] = {
+            McapSource(file): {} for file in mcap_files(self.path)
+        }
         counts: Counter[str] = Counter()
         types: dict[str, str] = {}
         self.metadata: dict[str, str] = {}
-        for source in self._sources:
+        for source, numbers in self._numbers.items():
             found = source.contents
             for number, channel in found.channels.items():
                 name = _name(channel.topic)
+                numbers.setdefault(name, []).append(number)
                 counts[name] += found.counts[number]
                 schema = found.schemas.get(channel.schema_id)
                 types[name] = printable(schema.name) if schema else ""
@@ -120,7 +124,7 @@ class Bag:
                 if record.name == METADATA_NAME:
                     self.metadata |= {n: printable(text) for n, text in record.metadata.items()}
         self.topics = {name: TopicInfo(types[name], counts[name]) for name in types}
-        places = [place for source in self._sources for place in source.contents.places]
+        places = [place for source in self._numbers for place in source.contents.places]
         if not counts.total() or not places:
             raise RecordingError(self.path, "holds no messages; record it again")
         self.start_ns = min(place.start_ns for place in places)
@@ -202,7 +206,7 @@ class Bag:
         for source, records in self._records(columns):
             block = {}
             for name, column in columns.items():
-                numbers = _numbers(source, name)
+                numbers = self._numbers[source].get(name, [])
                 is_own = records.channel == numbers[0] if numbers else np.False_
                 for number in numbers[1:]:  # np.isin would cost as much as reading
                     is_own = is_own | (records.channel == number)
@@ -223,8 +227,8 @@ class Bag:
                 warnings.warn(f"{self.path.name}: {note}", stacklevel=4)
 
     def _records(self, names: Iterable[str]) -> Iterator[tuple[McapSource, Records]]:
-        for source in self._sources:
-            numbers = {number for name in names for number in _numbers(source, name)}
+        for source, channels in self._numbers.items():
+            numbers = {number for name in names for number in channels.get(name, [])}
             places = [
                 place
                 for place in source.contents.places
@@ -266,13 +270,8 @@ class Bag:
         """
         wanted = list(self.topics) if topics is None else [_name(topic) for topic in topics]
         self.require(wanted if topics is not None else ())
-        for source in self._sources:
-            names = {number: name for name in wanted for number in _numbers(source, name)}
+        for source, channels in self._numbers.items():
+            names = {number: name for name in wanted for number in channels.get(name, [])}
             for number, log_ns, data in in_order(source, frozenset(names)):
                 name = names[number]
                 yield name, self.topics[name].type, log_ns, data
-
-
-def _numbers(source: McapSource, name: str) -> list[int]:
-    """Channels of a topic in one file; several publishers may have made several."""
-    return [n for n, channel in source.contents.channels.items() if _name(channel.topic) == name]

@@ -15,14 +15,14 @@ import numpy as np
 
 from teleop_core.bags import compression as compressions
 from teleop_core.bags import ending, rosbag2
-from teleop_core.bags.chunks import Messages, Single, Stretch, assemble, split
+from teleop_core.bags.chunks import Assembly, Messages, Single, Stretch
 from teleop_core.bags.layouts import SECOND_NS, Layout, Stamps, Values, layout
 from teleop_core.bags.mcap_file import McapFile
 from teleop_core.bags.recording import RecordingParameters
 from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.graph.topics import Kind, Topic
 
-CHUNK_BYTES = 1 << 20
+CHUNK_BYTES = 2 << 20
 QUEUE_LENGTH = 8
 """Seconds of a session that wait for a slow disk, before callers wait too."""
 METADATA_NAME = "teleop_core"
@@ -238,12 +238,12 @@ class BagWriter:
     # -- the writing thread ----------------------------------------------------------------------
 
     def _work(self) -> None:
-        jobs = iter(self._jobs.get, None)
+        jobs, assembly = iter(self._jobs.get, None), Assembly(CHUNK_BYTES)
         stopped: OSError | None = None
         try:
             for stretches, singles in jobs:
-                for part in split(stretches, singles, CHUNK_BYTES):
-                    self._mcap.append(assemble(*part))
+                for chunk in assembly.chunks(stretches, singles):
+                    self._mcap.append(chunk)
                 if self._hold_ns < SECOND_NS and self._jobs.empty():
                     self._mcap.sync()
         except OSError as error:

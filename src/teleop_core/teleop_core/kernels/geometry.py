@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.portable import arctangent, dot, length
+from teleop_core.kernels.room import room
 
 Array = NDArray[np.float64]
 
@@ -81,7 +82,7 @@ def rotate_by_vector(quaternion: Array, rx: float, ry: float, rz: float, rotated
     half = 0.5 * angle
     # sin(x)/x loses no digits above this bound; below it 1 is exact to rounding.
     s = 0.5 * (math.sin(half) / half if half > 1e-8 else 1.0)
-    turn = np.empty(4)
+    turn = room(4)
     turn[0], turn[1], turn[2], turn[3] = math.cos(half), s * rx, s * ry, s * rz
     multiply_quaternions(quaternion, turn, rotated)
 
@@ -135,7 +136,7 @@ def rotation_vector_between(a: Array, b: Array, vector: Array) -> None:
 
     Half a turn, whose axis has two directions, comes out about either of them.
     """
-    qa, qb = np.empty(4), np.empty(4)
+    qa, qb = room(4), room(4)
     quaternion_from_rotation(a, qa)
     quaternion_from_rotation(b, qb)
     turn_between(qa, qb, vector)
@@ -144,7 +145,7 @@ def rotation_vector_between(a: Array, b: Array, vector: Array) -> None:
 @kernel
 def turn_between(a: Array, b: Array, vector: Array) -> None:
     """Write the rotation vector (3,) [rad], in the base, that turns quaternion a to b."""
-    turn = np.empty(4)
+    turn = room(4)
     invert_quaternion(a, turn)
     multiply_quaternions(b, turn, turn)
     _vector_of(turn, vector)
@@ -153,7 +154,7 @@ def turn_between(a: Array, b: Array, vector: Array) -> None:
 @kernel
 def turn_within(a: Array, b: Array, vector: Array) -> None:
     """Write the rotation vector (3,) [rad], in the frame of a, that turns quaternion a to b."""
-    turn = np.empty(4)
+    turn = room(4)
     invert_quaternion(a, turn)
     multiply_quaternions(turn, b, turn)
     _vector_of(turn, vector)
@@ -173,7 +174,7 @@ def _vector_of(turn: Array, vector: Array) -> None:
 @kernel
 def turn_by(vector: Array, quaternion: Array) -> None:
     """Turn a quaternion by a rotation vector (3,) [rad] in the base."""
-    turn, unit = np.empty(4), np.zeros(4)
+    turn, unit = room(4), np.zeros(4)
     unit[0] = 1.0
     rotate_by_vector(unit, vector[0], vector[1], vector[2], turn)
     multiply_quaternions(turn, quaternion, quaternion)

@@ -1,4 +1,4 @@
-"""Everything taken from inside numba, which it may change in any version: here and nowhere else.
+"""Everything taken from inside numba, which may change in any version: here and in ``borrowing``.
 
 The public part of numba has no way to stamp a cache, to compile without a wrapper for Python, to
 count literals as plain numbers, or to say in one line what is wrong with a function.
@@ -35,7 +35,8 @@ from numba.extending import overload
 from numba.np import arrayobj
 
 from teleop_core import __version__
-from teleop_core.kernels import store
+from teleop_core.kernels import borrowing, store
+from teleop_core.kernels.borrowing import Pipeline
 from teleop_core.kernels.callables import entry_of
 from teleop_core.kernels.dependencies import digest, source_digest
 from teleop_core.kernels.mistakes import kernel_error
@@ -167,8 +168,9 @@ class InnerDispatcher(Dispatcher):
 def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Any:
     """Kernel that is compiled when it is first called."""
     if is_inner:
-        return InnerDispatcher(function, targetoptions={**_OPTIONS, "no_cpython_wrapper": True})
-    return Dispatcher(function, targetoptions=_OPTIONS)
+        options = {**_OPTIONS, "no_cpython_wrapper": True}
+        return InnerDispatcher(function, targetoptions=options, pipeline_class=Pipeline)
+    return Dispatcher(function, targetoptions=_OPTIONS, pipeline_class=Pipeline)
 
 
 def generated_dispatcher(function: FunctionType) -> Any:
@@ -204,7 +206,9 @@ def c_function(function: Any, signature: Any) -> Any:
     if (arguments, result) in made:
         return made[arguments, result]
     target = function.py_func if is_compiled else entry_of(function, arguments, result)
-    callback: Any = Pointer(target, (arguments, result), locals={}, options=_ERRORS)
+    callback: Any = Pointer(
+        target, (arguments, result), locals={}, options=_ERRORS, pipeline_class=Pipeline
+    )
     if is_compiled:
         callback._cache = _cache(target)
     try:
@@ -302,7 +306,8 @@ class _Cache(FunctionCache):
 
 def _cache(function: Any) -> Any:
     """Cache on disk of a function; none where it has no source file to stand beside."""
-    own = [source_digest(file) for file in (__file__, digest.__code__.co_filename)]
+    files = (__file__, borrowing.__file__, digest.__code__.co_filename)
+    own = [source_digest(file) for file in files]
     config: Any = numba.config
     checked = str(config.BOUNDSCHECK)  # NUMBA_BOUNDSCHECK=1 makes other code
     versions = (numba.__version__, np.__version__, __version__)

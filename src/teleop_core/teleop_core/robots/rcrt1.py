@@ -16,6 +16,7 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 from teleop_core.robots import rcrt1_dynamics, rcrt1_hardware
 from teleop_core.robots.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped
 from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
@@ -78,13 +79,13 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 
     Its determinant is d3² sin(q2) sin(q5) for d2 = 0.
     """
-    T = np.empty((4, 4))
+    T = room(4, 4)
     fk(q, geometry, T)
     c1, s1 = math.cos(q[0]), math.sin(q[0])
     c2, s2 = math.cos(q[1]), math.sin(q[1])
     c4, s4 = math.cos(q[3]), math.sin(q[3])
     L6 = geometry[0]
-    axes = np.empty((6, 3))
+    axes = room(6, 3)
     axes[0] = (0.0, 0.0, 1.0)
     axes[1] = (-s1, c1, 0.0)
     axes[2] = (c1 * s2, s1 * s2, c2)
@@ -192,7 +193,7 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
     The wrist of the arm behind is solved only if that arm can still win. In a path, which never
     leads there, the wrist is solved from where the arm can be.
     """
-    best, is_reachable, trial = math.inf, True, np.empty(6)
+    best, is_reachable, trial = math.inf, True, room(6)
     is_path = math.isfinite(limits[2, 0])
     for arm in range(1 if is_path else 2):
         is_reachable = _arm_branch(T, geometry, arm == 0, seed[0], trial)
@@ -253,7 +254,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """
     if not is_askable(T, seed):
         return -1
-    reached = np.empty((4, 4))  # until the end its corner holds the rotation left to the wrist
+    reached = room(4, 4)  # until the end its corner holds the rotation left to the wrist
     is_reachable = _choose(T, seed, limits, geometry, reached, q)
     is_slowed = abs(q[4]) < _NEAR and math.isfinite(limits[2, 3])
     if is_slowed or not is_allowed(q, seed, limits):
@@ -271,7 +272,7 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
 
     On a singularity, where a joint is free, it is zero and branches may coincide.
     """
-    M = np.empty((3, 3))
+    M = room(3, 3)
     for arm in range(2):
         for wrist in range(2):
             q = solutions[2 * arm + wrist]

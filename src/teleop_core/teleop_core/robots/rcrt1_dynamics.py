@@ -23,6 +23,7 @@ import numpy as np
 from teleop_core.kernels import kernel
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kernels.portable import product
+from teleop_core.kernels.room import room
 from teleop_core.robots.drives import Drives, Dynamics
 from teleop_core.robots.inertias import LinkInertia
 
@@ -156,7 +157,7 @@ def acceleration(q: Array, dq: Array, effort: Array, p: Array, ddq: Array) -> No
 
     Axes 1 and 3 act on each other through axis 2 alone, which is solved first.
     """
-    D, h, c = np.empty((3, 3)), np.empty(3), np.empty(6)
+    D, h, c = room(3, 3), room(3), room(6)
     inertia_matrix(q, p, D)
     velocity_effort(q, dq, p, h)
     gravity_effort(q, p, c)

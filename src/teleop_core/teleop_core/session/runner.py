@@ -63,9 +63,11 @@ def session_ticks(configuration: Configuration, session: VirtualTime) -> int:
 
 
 def run_blocks(session: VirtualTime, ticks: int) -> Iterator[Any]:
-    """Rows of the next ticks, a block at a time."""
+    """Rows of the next ticks, a block at a time; each block takes the place of the one before."""
+    rows = session.rows(min(BLOCK, ticks))
     for done in range(0, ticks, BLOCK):
-        yield session.run(min(BLOCK, ticks - done))
+        count = min(BLOCK, ticks - done)
+        yield session.run(count, rows[:count])
 
 
 def replay(
@@ -271,7 +273,9 @@ class NewSamples:
         stamps, values = block[f"{topic.field}_ns"], block[topic.field]
         if topic.stamp.is_in_force:
             return stamps, values, log_ns
-        is_new = np.diff(stamps, prepend=self._last.get(topic.name, 0)) != 0
+        is_new = np.empty(len(stamps), np.bool_)
+        is_new[0] = stamps[0] != self._last.get(topic.name, 0)
+        np.not_equal(stamps[1:], stamps[:-1], out=is_new[1:])
         self._last[topic.name] = int(stamps[-1])
         if topic.is_seldom:
             is_new &= self._is_due(topic, values, stamps)

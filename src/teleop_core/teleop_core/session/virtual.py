@@ -106,8 +106,12 @@ class VirtualTime:
         rows: NDArray[np.void] = records(self._dtype, count)
         return rows
 
-    def run(self, ticks: int) -> NDArray[np.void]:
+    def run(self, ticks: int, out: NDArray[np.void] | None = None) -> NDArray[np.void]:
         """Next ``ticks`` ticks of the session.
+
+        Args:
+            ticks: How many.
+            out: Rows (ticks,) to fill, of :meth:`rows`; None for new ones.
 
         Returns:
             Rows (ticks,): ``now_ns``, the fields and stamps of all topics, and the stages' notes.
@@ -117,11 +121,11 @@ class VirtualTime:
         Raises:
             TeleopError: A part cannot go on, or writes NaN.
         """
-        return self._run(ticks, None)
+        return self._run(self.rows(ticks) if out is None else out, None)
 
     def step(self) -> np.void:
         """Next tick: its row, as of :meth:`run`, to the same bits."""
-        row: np.void = self._run(1, None)[0]
+        row: np.void = self._run(self.rows(1), None)[0]
         return row
 
     def reset(self) -> None:
@@ -148,13 +152,12 @@ class VirtualTime:
             Rows (N,) as :meth:`run` gives them.
         """
         self.now_ns = int(samples["now_ns"][0]) - self._tick_ns
-        return self._run(len(samples), samples)
+        return self._run(self.rows(len(samples)), samples)
 
-    def _run(self, ticks: int, samples: NDArray[np.void] | None) -> NDArray[np.void]:
-        block = self.rows(ticks)
+    def _run(self, block: NDArray[np.void], samples: NDArray[np.void] | None) -> NDArray[np.void]:
         if self._is_stale():
             self._tick = self._composed()
-        for begin in range(0, ticks, self._ahead):
+        for begin in range(0, len(block), self._ahead):
             part = block[begin : begin + self._ahead]
             for stage in self.stages.values():
                 stage.prepare(len(part))

@@ -13,6 +13,7 @@ from teleop_core.graph.signals import copy
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Fields, PerJoint
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 from teleop_core.robots.rigid_body import invert_positive, write_model
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.friction import FrictionNumbers
@@ -156,7 +157,7 @@ def estimate(
         wrench: Written (6,) [N, N·m].
     """
     n = arm.q.shape[0]
-    model, residual, scale, force = np.empty(n + n * n), np.empty(n), np.empty(n), np.empty(3)
+    model, residual, scale, force = np.empty(n + n * n), np.empty(n), np.empty(n), room(3)
     copy(s.measured, arm.measured)
     copy(s.speed, arm.joints)
     write_model(arm.acceleration, arm.model, arm.measured, arm.joints, model)

@@ -8,8 +8,6 @@ beyond which the limit is dragged along; that is what the hand feels and what th
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from teleop_core.graph.row import Row
 from teleop_core.graph.topics import SLAVE_REACH, Limit
 from teleop_core.kernels import inner
@@ -23,6 +21,7 @@ from teleop_core.kernels.geometry import (
     turn_by,
     turn_within,
 )
+from teleop_core.kernels.room import room
 
 SENT = 8192
 """Commands that are remembered until the answer comes how far they could be followed."""
@@ -138,7 +137,7 @@ def draw_back(s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> Non
 
 @inner
 def _move_back(s: LimitState, entry: Sent, gain: float, reach: Array) -> None:
-    cut, square = np.empty(3), 0.0
+    cut, square = room(3), 0.0
     for i in range(3):
         cut[i] = entry.moved[i] + reach[_CUT + i] - s.moved[i]
         square += cut[i] * cut[i]
@@ -157,7 +156,7 @@ def _move_back(s: LimitState, entry: Sent, gain: float, reach: Array) -> None:
 
 @inner
 def _turn_back(s: LimitState, entry: Sent, reach: Array) -> None:
-    wanted, cut = np.empty(4), np.empty(3)
+    wanted, cut = room(4), room(3)
     for i in range(4):
         wanted[i] = entry.turned[i]
     turn_by(reach[_CUT + 3 : _CUT + 6], wanted)
@@ -168,7 +167,7 @@ def _turn_back(s: LimitState, entry: Sent, reach: Array) -> None:
     if s.turn_depth <= 0.0:
         s.turn_depth = min(length, _MOST_TURN)
     s.turn_met = s.turn_depth
-    before = np.empty(4)
+    before = room(4)
     for i in range(4):
         before[i], s.turned[i] = s.command[3 + i], wanted[i]
     turn_by(cut, s.command[3:7])
@@ -182,7 +181,7 @@ def _turn_back(s: LimitState, entry: Sent, reach: Array) -> None:
 @inner
 def align(s: LimitState) -> None:
     """Let the hand's present orientation mean that of the command."""
-    inverse = np.empty(4)
+    inverse = room(4)
     invert_quaternion(s.tool, inverse)
     multiply_quaternions(s.command[3:7], inverse, s.alignment)
 
@@ -215,7 +214,7 @@ def measure_depth(s: LimitState, most: float, now_ns: int) -> None:
             for i in range(3):
                 s.anchor[i] = s.hand[i] - most * s.out[i]
     if s.turn_depth > 0.0:
-        turn = np.empty(3)
+        turn = room(3)
         turn_within(s.turn_anchor, s.tool, turn)
         s.turn_depth = turn[0] * s.turn_out[0] + turn[1] * s.turn_out[1] + turn[2] * s.turn_out[2]
         if s.turn_depth > s.turn_met + _TURN_PAST:

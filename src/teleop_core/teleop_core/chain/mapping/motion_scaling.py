@@ -92,6 +92,7 @@ from teleop_core.kernels.geometry import (
     rotate_by_vector,
     turn_within,
 )
+from teleop_core.kernels.room import room
 
 
 class ScalingNumbers(
@@ -155,7 +156,7 @@ def _take_tool(p: ScalingNumbers, s: ScalingState, pose: Array, turn: Array) -> 
     if p.rotation_gain == 1.0:
         mapped_orientation(p, pose[3:7], s.tool)
         return
-    tool = np.empty(4)
+    tool = room(4)
     mapped_orientation(p, pose[3:7], tool)
     turn_within(s.tool, tool, turn)
     for i in range(4):
@@ -196,7 +197,7 @@ def _move(
     p: ScalingNumbers, s: ScalingState, fixture: Shape, gain: float, position: Array, turn: Array
 ) -> None:
     """Add the scaled step of the hand to the command; turn the tool as the stylus."""
-    step = np.empty(3)
+    step = room(3)
     for i in range(3):
         step[i] = position[i] - s.master[i]
     if s.is_fixture_on and p.holds_slave:
@@ -258,7 +259,7 @@ def _report(p: ScalingNumbers, s: ScalingState, gain: float, is_following: bool,
     for i in range(6):
         state[_CENTER + i] = 0.0
     if s.is_fixture_on:
-        offset = np.empty(3)
+        offset = room(3)
         for i in range(3):
             offset[i] = s.center[i] - s.master[i] + s.beyond[i]
         to_slave_axes(p, offset, offset)
@@ -327,7 +328,7 @@ def motion_scaling_step(
     Source:
         Vongbunyong 2008, sections 6.2-6.3.
     """
-    pose, buttons, stylus = row.master_measured_cp, row.master_buttons, np.empty(3)
+    pose, buttons, stylus = row.master_measured_cp, row.master_buttons, room(3)
     for i in range(3):
         stylus[i] = pose[i] + row.master_filtered_out[i]
     period = 1e-9 * (row.master_measured_cp_ns - s.last_ns)
@@ -341,7 +342,7 @@ def motion_scaling_step(
     clutch = 1.0 if has_lost_buttons(p, s, row) else buttons[0]
     _toggle_mode(s, buttons)
     gain = p.gain[s.is_fine]
-    turn = np.empty(3)
+    turn = room(3)
     _take_tool(p, s, pose, turn)
     to_slave_axes(p, pose, s.hand)
     if not (is_following and s.is_engaged):

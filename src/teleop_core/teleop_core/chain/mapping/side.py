@@ -15,11 +15,10 @@ Source:
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from teleop_core.kernels import inner
 from teleop_core.kernels.fields import Fields, Vector3
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 
 SIDES = ("hand", "slave", "both")
 """Whom a fixture holds."""
@@ -122,7 +121,7 @@ def hold_slave(s: SideState, fixture: Shape, step: Array) -> None:
         fixture: Its shape.
         step: From the hand's last place to its present one; written.
     """
-    last, aim, most = np.empty(3), fixture.offset, 0.0
+    last, aim, most = room(3), fixture.offset, 0.0
     for i in range(3):
         last[i] = s.master[i] - s.center[i] - s.beyond[i]
         aim[i] = last[i] + s.beyond[i] + step[i]

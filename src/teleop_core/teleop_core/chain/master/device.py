@@ -17,6 +17,7 @@ from teleop_core.kernels.geometry import (
     transform_from_pose,
 )
 from teleop_core.kernels.portable import inverse_motion, product
+from teleop_core.kernels.room import room
 from teleop_core.robots import load_robot_set
 
 _OMNI = "published: Vongbunyong 2008, table 5.1"
@@ -119,7 +120,7 @@ def read_phantom(
     p: ReadingNumbers, position: Array, attitude: Array, noise: Array, pose: Array
 ) -> None:
     """Write the pose (7,) that the Phantom reads: place in steps, attitude with noise (3,)."""
-    wobble = np.empty(3)
+    wobble = room(3)
     for i in range(3):
         pose[i] = position[i]
         if p.resolution > 0.0:
@@ -160,7 +161,7 @@ def measure_twist(s: ReadingState, pose: Array, twist: Array, dt: float) -> None
         s.rate[i] += ((pose[i] - s.reading[i]) / dt - s.rate[i]) * share
         s.reading[i] = pose[i]
         twist[i] = s.rate[i]
-    back = np.empty(4)
+    back = room(4)
     back[0] = s.attitude[0]
     for i in range(1, 4):
         back[i] = -s.attitude[i]

@@ -3,12 +3,11 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from teleop_core.base.parameters import parameter
 from teleop_core.kernels import inner
 from teleop_core.kernels.fields import Fields, Vector3
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 
 _STEPS = 2
 
@@ -75,7 +74,7 @@ def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: flo
         Kikuuwe, Takesue, Sano, Mochiyama and Fujimoto 2006 for Coulomb friction, a set of forces,
         by the implicit Euler step; Moreau 1988 for the scheme.
     """
-    h, aim_speed = dt / _STEPS, np.empty(3)
+    h, aim_speed = dt / _STEPS, room(3)
     for i in range(3):
         aim_speed[i] = (wanted[i] - s.wanted[i]) / dt
     for step in range(_STEPS):
@@ -95,7 +94,7 @@ def _push_on(
     p: HandNumbers, s: HandState, aim_speed: Array, force: Array, h: float, time: float
 ) -> None:
     """Make one step of ``h`` [s] that ends ``time`` [s] after the tick's begin."""
-    free, pulled = np.empty(3), np.empty(3)
+    free, pulled = room(3), room(3)
     square = 0.0
     for i in range(3):
         pull = p.stiffness * (s.wanted[i] + time * aim_speed[i] - s.hand[i])

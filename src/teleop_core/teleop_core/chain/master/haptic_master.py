@@ -51,6 +51,7 @@ from teleop_core.kernels.geometry import (
     rotation,
     transform,
 )
+from teleop_core.kernels.room import room
 from teleop_core.slave.operation.states import State
 
 _DOUBT_NS = 1_000_000_000
@@ -164,9 +165,9 @@ def haptic_master_step(
         for i in range(row.master_servo_cf.shape[0]):
             row.master_servo_cf[i] = 0.0
     is_held = _holds(p, s, row)
-    noise, force = noises[s.next_noise], np.empty(3)
+    noise, force = noises[s.next_noise], room(3)
     s.next_noise += 1
-    before, place = np.empty(3), np.empty(3)
+    before, place = room(3), room(3)
     row.master_contact[_MOST] = render(p, s, row.master_servo_cf, force)
     for i in range(3):
         before[i] = s.position[i]

@@ -30,6 +30,7 @@ from teleop_core.graph.topics import (
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.fields import Fields, Vector3, record, record_array
 from teleop_core.kernels.geometry import Array, rotate_by_vector
+from teleop_core.kernels.room import room
 
 
 class OperatorNumbers(Fields):
@@ -107,7 +108,7 @@ def operator_step(
     """
     if _begins(p, s, row):
         s.next += 1
-    now, tremor = wanted[s.next], np.empty(3)
+    now, tremor = wanted[s.next], room(3)
     tremble(p, s, noises[s.next_noise], tremor, dt)
     s.next_noise += 1
     for i in range(3):

@@ -276,7 +276,10 @@ def tremor(size: float, rng: np.random.Generator) -> Motion:
     amplitude = size * math.sqrt(2.0 / (3 * _LINES * share))
 
     def motion(times: Array) -> Array:
-        found: Array = amplitude * np.sin(times[:, None, None] * rates + phases).sum(axis=2)
+        sines = times[:, None, None] * rates
+        sines += phases
+        np.sin(sines, out=sines)  # in its place: fresh memory would take as long as the sines
+        found: Array = amplitude * sines.sum(axis=2)
         return found
 
     return motion

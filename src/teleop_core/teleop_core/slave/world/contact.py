@@ -17,6 +17,7 @@ import numpy as np
 from teleop_core.kernels import inner
 from teleop_core.kernels.fields import PerJoint, Vector3
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.room import room
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.world.button import (
     ButtonNumbers,
@@ -112,7 +113,7 @@ def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: A
 @inner
 def _add_push(p: WorldNumbers, s: ContactState, q: Array, dq: Array, effort: Array) -> None:
     """Add what the push on one point does to the joints; see :func:`add_push`."""
-    moved, speed, force = np.zeros(3), np.zeros(3), np.empty(3)
+    moved, speed, force = np.zeros(3), np.zeros(3), room(3)
     for i in range(q.shape[0]):
         for k in range(3):
             moved[k] += s.touch_J[k, i] * (q[i] - s.touch_q[i])
@@ -249,7 +250,7 @@ def touch(p: WorldNumbers, contacts: Any, arm: Arm, q: Array, dq: Array, felt: A
         dq: Their speeds (n,).
         felt: Sum of the forces along the slave's base, and of their torques about the tip; written.
     """
-    lever, force, has_jacobian = np.empty(3), np.empty(3), False
+    lever, force, has_jacobian = room(3), room(3), False
     for k in range(6):
         felt[k] = 0.0
     for point in range(contacts.shape[0]):
