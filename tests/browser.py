@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import socket
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -52,28 +53,28 @@ class Tab(Headless):
     ``answers`` the status of each answer.
     """
 
-    def __init__(self, folder, width=1400, height=900):
+    def __init__(self, folder, width: int = 1400, height: int = 900) -> None:
         self.errors, self.asked, self.answers = [], [], {}
         super().__init__(chromium(), folder, width, height, FLAGS)
         for domain in ("Network", "Log"):
             self.call(f"{domain}.enable")
 
-    def visit(self, url):
+    def visit(self, url) -> None:
         """Open a page of a server and wait until its scene is there."""
         self.call("Page.navigate", url=url)
         self.until("document.querySelector('canvas')")
 
-    def reload(self):
+    def reload(self) -> None:
         """Load the page again."""
         self.value("window.isOld = true")
         self.call("Page.reload")
         self.until("!window.isOld && document.querySelector('canvas')")
 
-    def shows(self, text, seconds=60):
+    def shows(self, text, seconds: int = 60) -> None:
         """Wait until a text can be read on the page."""
         self.until(f"document.body.innerText.includes({json.dumps(text)})", seconds)
 
-    def click(self, text):
+    def click(self, text) -> None:
         """Click what has this text: a button, a tab, a label."""
         self.shows(text)
         x, y = self.place(text)
@@ -107,7 +108,7 @@ class Tab(Headless):
             throw new Error('nothing that can be clicked says ' + {json.dumps(text)});
         }})()""")
 
-    def fill(self, label, text):
+    def fill(self, label, text) -> None:
         """Write a text, in place of what stands there, into the field beside a label."""
         self.shows(label)
         self.value(f"""(() => {{
@@ -120,7 +121,7 @@ class Tab(Headless):
         }})()""")
         self.call("Input.insertText", text=text)
 
-    def key(self, name):
+    def key(self, name) -> None:
         """Press and release a key."""
         code, number = KEYS.get(name, (f"Key{name.upper()}", ord(name.upper()[0])))
         text = {"text": name} if len(name) == 1 else {}
@@ -129,7 +130,7 @@ class Tab(Headless):
                       windowsVirtualKeyCode=number, **text)  # fmt: skip
             text = {}
 
-    def pull(self, begin, end, steps=20):
+    def pull(self, begin, end, steps: int = 20) -> None:
         """Drag slowly, as a hand does, from one point to another [px]; the button stays down."""
         self.mouse("mouseMoved", *begin)
         self.mouse("mousePressed", *begin)
@@ -137,7 +138,7 @@ class Tab(Headless):
             self.mouse("mouseMoved", *point)
             self.value("new Promise(requestAnimationFrame)")
 
-    def swipe(self, begin, end, steps=20):
+    def swipe(self, begin, end, steps: int = 20) -> None:
         """The same by a finger, which is lifted at the end."""
         points = np.linspace(begin, end, steps + 1)
         for kind, where in zip(["Start"] + ["Move"] * steps, points, strict=True):
@@ -181,7 +182,7 @@ class Tab(Headless):
         addresses = [url for url in self.asked if not url.startswith(("data:", "blob:"))]
         return {url.split("/")[2] for url in addresses}
 
-    def _note(self, event):
+    def _note(self, event) -> None:
         super()._note(event)
         method, told = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown" or told.get("type") in {"error", "assert"}:
@@ -196,12 +197,12 @@ class Tab(Headless):
             self.answers[told["response"]["url"]] = told["response"]["status"]
 
 
-def until(condition, what, seconds=60.0):
+def until(condition: Callable[..., object], what: str, seconds: float = 60.0) -> bool:
     """Result of a condition as soon as it is true; for what happens outside of the browser."""
     return wait_until(condition, what, seconds)
 
 
-def handshake(port, path="/", **headers):
+def handshake(port, path: str = "/", **headers: object):
     """First line of the answer to the opening of a WebSocket, and the socket it came on."""
     opened = socket.create_connection(("127.0.0.1", port), timeout=20)
     told = {

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 
-def run_drill(tmp_path, *arguments):
+def run_drill(tmp_path, *arguments: object):
     """Exit code, output and outcomes by name of ``teleop drill``."""
     file = tmp_path / "drill.json"
     command = [sys.executable, "-m", "teleop_core.cli", "drill", *arguments, "--json", str(file)]

@@ -20,10 +20,10 @@ SILENCE = 200.0
 class Headless:
     """One tab; everything it says on the console is in ``said``."""
 
-    def __init__(self, browser, folder, width=1200, height=900, flags=FLAGS):
+    def __init__(self, browser, folder, width: int = 1200, height: int = 900, flags=FLAGS) -> None:
         (read_here, write_there), (read_there, write_here) = os.pipe(), os.pipe()
 
-        def connect():  # Chromium reads descriptor 3 and writes descriptor 4
+        def connect() -> None:  # Chromium reads descriptor 3 and writes descriptor 4
             one, other = os.dup(read_there), os.dup(write_there)
             os.dup2(one, 3)
             os.dup2(other, 4)
@@ -50,14 +50,14 @@ class Headless:
     def __enter__(self):
         return self
 
-    def __exit__(self, *error):
+    def __exit__(self, *error: object) -> None:
         self._session = None
         self.call("Browser.close")
         self._process.wait(30)
         os.close(self._in)
         self._out.close()
 
-    def call(self, method, **parameters):
+    def call(self, method, **parameters: object):
         """Answer to a command of the DevTools protocol."""
         number = next(self._numbers)
         message = {"id": number, "method": method, "params": parameters}
@@ -81,7 +81,7 @@ class Headless:
         message, _, self._heard = self._heard.partition(b"\0")
         return message
 
-    def _note(self, event):
+    def _note(self, event) -> None:
         if event.get("method") == "Runtime.exceptionThrown":
             details = event["params"]["exceptionDetails"]
             self.said.append(details.get("exception", {}).get("description", details["text"]))
@@ -89,7 +89,7 @@ class Headless:
             texts = [str(a.get("value", a.get("description"))) for a in event["params"]["args"]]
             self.said.append(" ".join(texts))
 
-    def resize(self, width, height):
+    def resize(self, width, height) -> None:
         """Size of the window, [px]."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
                   deviceScaleFactor=1, mobile=False)  # fmt: skip
@@ -101,14 +101,14 @@ class Headless:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
-    def open(self, file):
+    def open(self, file) -> None:
         """Open a report page and wait until it has drawn everything."""
         self.call("Page.navigate", url=file.as_uri())
         self.until(
             "document.body && (document.body.dataset.finished || document.body.dataset.errors)"
         )
 
-    def until(self, condition, seconds=60):
+    def until(self, condition, seconds: int = 60) -> None:
         """Wait until an expression is true, but not for ever."""
         self.value(
             "new Promise((done, fail) => { const end = performance.now() + "
@@ -117,17 +117,17 @@ class Headless:
             "look(); })"
         )
 
-    def settled(self):
+    def settled(self) -> None:
         """Wait until no plot is behind the visible time."""
         self.until("[...document.querySelectorAll('.times')].every((bar) => !bar.dataset.busy)")
 
-    def mouse(self, kind, x, y, clicks=1):
+    def mouse(self, kind, x, y, clicks: int = 1) -> None:
         """Move, press or release the left button, in pixels of the window."""
         button = "none" if kind == "mouseMoved" else "left"
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button,
                   buttons=int(kind != "mouseReleased"), clickCount=clicks)  # fmt: skip
 
-    def drag(self, begin, end):
+    def drag(self, begin, end) -> None:
         """Drag from one point to another."""
         self.mouse("mouseMoved", *begin)
         self.mouse("mousePressed", *begin)
@@ -136,7 +136,7 @@ class Headless:
             self.mouse("mouseMoved", *point)
         self.mouse("mouseReleased", *end)
 
-    def picture(self, file, clip=None):
+    def picture(self, file, clip=None) -> None:
         """Screenshot of the page, or of a part of it: left, top, width and height [px]."""
         size = self.call("Page.getLayoutMetrics")["cssContentSize"]
         left, top, width, height = clip or (0, 0, size["width"], size["height"])

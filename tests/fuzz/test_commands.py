@@ -73,12 +73,12 @@ def _bytes(text: str) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("commands")
 
 
 @pytest.fixture(scope="module")
-def session(folder) -> bytes:
+def session(folder: Path) -> bytes:
     """A recording of ours, of 60 ms."""
     path = folder / "whole"
     tc.run("coarse_box", duration=0.06, out=path, settings={"recorder.compression": "none",
@@ -157,7 +157,7 @@ READERS = {
 
 
 @pytest.mark.parametrize("command", READERS)
-def test_any_recording_is_taken_or_refused(folder, session, command):
+def test_any_recording_is_taken_or_refused(folder: Path, session: bytes, command: str) -> None:
     file, out = folder / "broken.mcap", folder / command
     run = READERS[command]
 
@@ -189,7 +189,7 @@ MAKERS = {
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_any_file_of_others_is_imported_or_refused(folder, name):
+def test_any_file_of_others_is_imported_or_refused(folder: Path, name: str) -> None:
     whole, out = MAKERS[name](folder / name), folder / f"{name}_imported"
     broken_file = folder / f"broken_{name}"
 
@@ -203,7 +203,7 @@ def test_any_file_of_others_is_imported_or_refused(folder, name):
 
 
 @pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
-def test_any_compressed_recording_is_imported_or_refused(folder, mode):
+def test_any_compressed_recording_is_imported_or_refused(folder: Path, mode) -> None:
     path, out = folder / f"packed_{mode.name}", folder / "unpacked"
     whole = bag2(path, StoragePlugin.MCAP, mode)
     file = next(file for file in path.iterdir() if file.suffix != ".yaml")
@@ -239,7 +239,7 @@ def rests_table(robot) -> bytes:
     return table.to_csv(index=False).encode()
 
 
-def test_any_table_of_measured_poses_is_taken_or_refused(folder):
+def test_any_table_of_measured_poses_is_taken_or_refused(folder: Path) -> None:
     file, whole = folder / "poses.csv", poses_table(load_robot("rcrt1"))
 
     def attempt(data: bytes) -> None:
@@ -250,7 +250,7 @@ def test_any_table_of_measured_poses_is_taken_or_refused(folder):
     fuzz("command calibrate", data=broken(whole))(attempt)()
 
 
-def test_any_table_of_rests_is_taken_or_refused(folder):
+def test_any_table_of_rests_is_taken_or_refused(folder: Path) -> None:
     robot = load_robot("rcrt1")
     file, whole = folder / "rests.csv", rests_table(robot)
 
@@ -262,7 +262,7 @@ def test_any_table_of_rests_is_taken_or_refused(folder):
     fuzz("table of rests", data=broken(whole))(attempt)()
 
 
-def test_any_table_of_a_robot_is_taken_or_refused(folder):
+def test_any_table_of_a_robot_is_taken_or_refused(folder: Path) -> None:
     file = folder / "robot.yaml"
     tables = [path.read_bytes() for path in sorted((config_folder() / "robots").glob("*.yaml"))]
     entries = st.sampled_from(
@@ -270,7 +270,7 @@ def test_any_table_of_a_robot_is_taken_or_refused(folder):
     )
 
     @st.composite
-    def texts(draw) -> bytes:
+    def texts(draw: st.DrawFn) -> bytes:
         whole = draw(st.sampled_from(tables))
         if draw(st.booleans()):
             return whole.replace(b"q", _bytes(draw(entries)), draw(st.integers(1, 4)))

@@ -16,7 +16,7 @@ WORDS = st.one_of(
 """A command, or what is none; a fault; the stop button; ticks; a place for all joints."""
 
 
-def arm(standstill):
+def arm(standstill: str) -> SimulatedArm:
     return SimulatedArm(ArmParameters(
         robot="planar_3r", starts_at_home=True,
         operation=OperationParameters(standstill=standstill, longest_outage=0.15),
@@ -26,7 +26,7 @@ def arm(standstill):
 ARMS = {standstill: arm(standstill) for standstill in ("hold", "brake")}
 
 
-def play(slave, words):
+def play(slave, words) -> None:
     """Send words one by one; after each the flags must agree and the setpoint keep its limits."""
     row, ns = slave.signals, 10**9
     reach = slave.robot.drives.speed_limit * 1e-3
@@ -55,7 +55,9 @@ def play(slave, words):
 
 @pytest.mark.slow
 @fuzz("state commands", words=st.lists(WORDS, max_size=12), standstill=st.sampled_from(list(ARMS)))
-def test_any_words_leave_flags_that_agree_and_a_setpoint_within_its_limits(words, standstill):
+def test_any_words_leave_flags_that_agree_and_a_setpoint_within_its_limits(
+    words, standstill
+) -> None:
     slave = ARMS[standstill]
     slave.reset()
     play(slave, words)

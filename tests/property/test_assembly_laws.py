@@ -27,7 +27,7 @@ def platform_gaps(x, legs):
     return np.linalg.norm(ends - PAIRED.base, axis=1) - legs
 
 
-def ball_joint_gaps(angles, legs, b=1.0, a=0.5):
+def ball_joint_gaps(angles, legs, b: float = 1.0, a: float = 0.5):
     headings = 2.0 * math.pi / 3.0 * np.arange(3)
     out = b - legs * np.cos(angles)
     S = np.column_stack((out * np.cos(headings), out * np.sin(headings), legs * np.sin(angles)))
@@ -62,7 +62,7 @@ def finds(name, legs, rng):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:The iteration is not making good progress")
 @pytest.mark.parametrize("name", SEARCHES)
-def test_what_is_called_open_is_closed_by_no_other_search(name):
+def test_what_is_called_open_is_closed_by_no_other_search(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(21)
     share = SEARCHES[name][2]
     lower = np.maximum(robot.home + share * (robot.lower - robot.home), 0.05)

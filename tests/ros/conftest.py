@@ -32,6 +32,7 @@ from rich.console import Console
 import patience
 from live_process import has_recorded
 from middleware_faults import MiddlewareLossError, check_end
+from present import present
 from teleop_core.bags.messages import discover, layout
 from teleop_core.bags.reader import Bag
 from teleop_core.base.parameters import specs
@@ -163,7 +164,7 @@ class NodeProcess:
             MiddlewareCrashError: That is how it ended.
         """
         wait_until(lambda: self.process.poll() is not None, f"end of {self.name}", timeout)
-        code = self.process.returncode
+        code = present(self.process.returncode)
         check_end(self.name, code, self.stderr.read_text(errors="replace"))
         return code
 
@@ -430,7 +431,7 @@ def _composed(
 
 
 @pytest.fixture
-def compose(peer, tmp_path):
+def compose(peer: Peer, tmp_path: Path):
     """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
     with ExitStack() as stack:
 
@@ -443,7 +444,7 @@ def compose(peer, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def composed_session(tmp_path_factory):
+def composed_session(tmp_path_factory: pytest.TempPathFactory):
     """Composed session that tests of a file share, as a context: peer, process, recording."""
 
     @contextmanager

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,6 +14,9 @@ from std_msgs.msg import Float64MultiArray, String
 from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_SETPOINT_JS
 from teleop_core.nodes.children import environment
 from teleop_core.robots import load_robot
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
@@ -31,17 +35,17 @@ NAMED = {
 class RealArm:
     """A controller, its bridge and the server that leads it."""
 
-    def __init__(self, peer, kind):
+    def __init__(self, peer, kind) -> None:
         self.peer, self.kind = peer, kind
         self.measured, self.setpoint = map(peer.listen, (SLAVE_MEASURED_JS, SLAVE_SETPOINT_JS))
         self.witnessed = [math.nan, 0.0]
         peer.node.create_subscription(Float64MultiArray, "witness", self._see, 10)
         self._misbehave = peer.node.create_publisher(String, "misbehave", 10)
 
-    def _see(self, message):
+    def _see(self, message) -> None:
         self.witnessed = list(message.data)
 
-    def misbehave(self, how):
+    def misbehave(self, how) -> None:
         self.peer.wait(self._misbehave.get_subscription_count, "the controller")
         self._misbehave.publish(String(data=how))
 
@@ -54,11 +58,11 @@ class RealArm:
         """Joints as the server hears them, or None."""
         return self.measured.values[-1][:6] if self.measured.take() else None
 
-    def is_at(self, goal, tolerance=1e-3):
+    def is_at(self, goal, tolerance: float = 1e-3):
         where = self.where()
         return where is not None and np.abs(where - goal).max() < tolerance
 
-    def goes_on(self):
+    def goes_on(self) -> None:
         self.measured.forget()
         self.peer.wait(lambda: self.measured.take() > 10, "samples that are passed on")
         self.peer.wait(lambda: not self.says("not believed") and not self.says("nothing"), "news")
@@ -70,7 +74,7 @@ class RealArm:
         status = self.peer.status("arm_bridge")
         return status is not None and text in status.message
 
-    def holds(self, text):
+    def holds(self, text) -> None:
         """Wait until the bridge says why, and the server that it holds."""
         self.peer.wait(lambda: self.says(text), f"the bridge to say {text!r}")
         self.peer.wait(self._server_holds, "a server that holds")
@@ -81,7 +85,7 @@ class RealArm:
 
 
 @contextmanager
-def real_arm(peer, kind="joint_state", **parameters):
+def real_arm(peer, kind: str = "joint_state", **parameters: object):
     """A real arm of a kind that stands off its home, led from there."""
     env = environment() | {"ROS_DOMAIN_ID": peer.domain}
     controller = subprocess.Popen([sys.executable, str(CONTROLLER), kind], env=env)
@@ -109,7 +113,7 @@ def is_led_home_without_a_jump(arm):
 
 
 @pytest.mark.parametrize("kind", KINDS[1:])
-def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer, kind):
+def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer: "Peer", kind) -> None:
     with real_arm(peer, kind) as arm:
         assert is_led_home_without_a_jump(arm)
 
@@ -117,7 +121,7 @@ def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer, kind):
 # Five processes share two cores here, and an arm that stands still for a tenth of a second in the
 # middle of a motion does not agree with its setpoint: CI tests the bridge and conformance apart.
 @pytest.mark.soak
-def test_conformance_passes_unchanged_through_the_bridge(peer):
+def test_conformance_passes_unchanged_through_the_bridge(peer: "Peer") -> None:
     pytest.importorskip("crtk_msgs")
     with real_arm(peer) as arm:
         peer.wait(lambda: arm.is_at(ROBOT.home), "an arm at home")
@@ -129,7 +133,9 @@ def test_conformance_passes_unchanged_through_the_bridge(peer):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(peer):
+def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(
+    peer: "Peer",
+) -> None:
     with real_arm(peer) as arm:
         peer.wait(lambda: arm.is_at(ROBOT.home), "an arm at home")
         arm.misbehave("jump")
@@ -150,13 +156,13 @@ def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(
 
 
 @pytest.fixture(scope="module")
-def led_arm(common_peer):
+def led_arm(common_peer: "Peer"):
     """An arm that is led home."""
     with real_arm(common_peer) as arm:
         yield arm
 
 
-def test_an_arm_that_says_joint_states_is_led_home_without_a_jump_too(led_arm):
+def test_an_arm_that_says_joint_states_is_led_home_without_a_jump_too(led_arm) -> None:
     assert is_led_home_without_a_jump(led_arm)
 
 
@@ -171,8 +177,8 @@ def test_an_arm_that_says_joint_states_is_led_home_without_a_jump_too(led_arm):
     ],
 )
 def test_an_answer_that_cannot_be_believed_holds_the_arm_until_it_is_sound_again(
-    led_arm, how, words
-):
+    led_arm, how: str, words: str
+) -> None:
     arm = led_arm
     arm.misbehave(how)
     arm.holds(words)
@@ -183,7 +189,7 @@ def test_an_answer_that_cannot_be_believed_holds_the_arm_until_it_is_sound_again
     arm.goes_on()
 
 
-def test_another_order_of_names_changes_nothing(led_arm):
+def test_another_order_of_names_changes_nothing(led_arm) -> None:
     led_arm.misbehave("order")
     led_arm.measured.forget()
     led_arm.peer.wait(lambda: led_arm.measured.take() > 100, "samples in another order")

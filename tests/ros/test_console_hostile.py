@@ -1,5 +1,7 @@
 """Hostile pages at a real session: its arm gets no other command, and the stop stops it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -27,7 +29,9 @@ def saved(driver, console, name):
     return tc.open_recording(folder)
 
 
-def test_arm_of_a_real_session_gets_no_other_command_and_stops_when_the_driver_says_so(tmp_path):
+def test_arm_of_a_real_session_gets_no_other_command_and_stops_when_the_driver_says_so(
+    tmp_path: Path,
+) -> None:
     console = ConsoleProcess(tmp_path, "--out", tmp_path / "session")
     port = int(console.url.split(":")[2].strip("/"))
     try:

@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from present import present
+
 pytest.importorskip("viser")
 
 import teleop_core as tc
@@ -31,7 +33,7 @@ SHARE, STILL = 0.15, 2e-4  # m
 
 
 @pytest.fixture(scope="module")
-def console(tmp_path_factory):
+def console(tmp_path_factory: pytest.TempPathFactory):
     folder = tmp_path_factory.mktemp("console")
     own = ("--parts", ROOT / "examples" / "own_control.py")
     started = ConsoleProcess(folder, *own, "--out", folder / "session", "--set", PATIENT)
@@ -42,7 +44,7 @@ def console(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def page(console, tmp_path_factory):
+def page(console, tmp_path_factory: pytest.TempPathFactory):
     """The page in a browser that drives."""
     with Tab(tmp_path_factory.mktemp("browser"), *SIZE) as tab:
         tab.visit(console.url)
@@ -51,7 +53,7 @@ def page(console, tmp_path_factory):
         yield tab
 
 
-def ready(tab):
+def ready(tab) -> None:
     """Wait until the slave follows; where it paused because this machine stood still, resume.
 
     A session begins enabled, on its way to where it starts: it follows nobody until it is there.
@@ -78,7 +80,7 @@ def pull(tab, axis, way=PULLED):
     return goal
 
 
-def rest(tab):
+def rest(tab) -> None:
     """Wait until the slave is drawn in one place for half a second."""
     tab.value(f"""new Promise((done) => {{
         let last = [], since = 0;
@@ -106,19 +108,21 @@ def way(stream):
     return stream[["x", "y", "z"]][-1] - stream[["x", "y", "z"]][0]
 
 
-def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(page, console):
+def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(page, console) -> None:
     assert not page.faults()
     assert page.hosts() == {console.url.split("/")[2]}
 
 
-def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page):
+def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page) -> None:
     for told in ("at most 20 mm/s", "at most what its joints make"):
         page.click("Gentle")
         page.shows(told)
 
 
 @pytest.mark.parametrize(("axis", "by"), [(0, "mouse"), (1, "mouse"), (1, "finger")])
-def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(page, console, axis, by):
+def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(
+    page, console, axis: int, by: str
+) -> None:
     ready(page)
     saved(page, console, f"before_{axis}_{by}")
     if by == "mouse":
@@ -137,7 +141,9 @@ def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(page, console, a
 
 
 @pytest.mark.parametrize("way_in", ["button", "key"])
-def test_emergency_stop_stops_by_button_and_key_until_it_is_released(page, console, way_in):
+def test_emergency_stop_stops_by_button_and_key_until_it_is_released(
+    page, console, way_in: str
+) -> None:
     ready(page)
     if way_in == "button":
         page.click("EMERGENCY STOP")
@@ -153,7 +159,7 @@ def test_emergency_stop_stops_by_button_and_key_until_it_is_released(page, conso
     page.shows("ENABLED", 60)
 
 
-def test_page_that_is_loaded_again_goes_on_driving(page):
+def test_page_that_is_loaded_again_goes_on_driving(page) -> None:
     page.reload()
     page.shows("drives", 60)
     ready(page)
@@ -163,7 +169,9 @@ def test_page_that_is_loaded_again_goes_on_driving(page):
     assert not page.faults()
 
 
-def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page, console, tmp_path):
+def test_browser_that_is_closed_in_motion_leaves_the_slave_still(
+    page, console, tmp_path: Path
+) -> None:
     ready(page)
     begin = page.value(page.place_of(TIP))
     saved(page, console, "before_close")
@@ -189,7 +197,7 @@ def test_browser_that_is_closed_in_motion_leaves_the_slave_still(page, console, 
     assert after["teleop/state"]["is_clutched"][-1] == 1.0
 
 
-def test_recording_that_was_saved_is_scored_by_a_button(page, console):
+def test_recording_that_was_saved_is_scored_by_a_button(page, console) -> None:
     ready(page)
     page.mouse("mouseReleased", *pull(page, 0))
     saved(page, console, "to_score")
@@ -199,7 +207,7 @@ def test_recording_that_was_saved_is_scored_by_a_button(page, console):
     page.click("Drive")
 
 
-def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(page, console):
+def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(page, console) -> None:
     ready(page)
     page.click("Settings")
     page.fill("delays", "[nowhere=0.02]")
@@ -211,6 +219,6 @@ def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(pag
     page.click("New session with these")
     until((console.folder / "session_session2").exists, "a new session")
     page.shows("ENABLED", STARTS)
-    configuration = configuration_of(Bag(saved(page, console, "delayed")))
+    configuration = present(configuration_of(Bag(saved(page, console, "delayed"))))
     assert configuration.groups["teleop"].delays == ("slave/servo_jp=0.02",)
     assert not page.faults()

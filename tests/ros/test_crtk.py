@@ -10,6 +10,7 @@ from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -22,11 +23,15 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
 from live_process import wait_until
+from present import present
 from teleop_core.kernels.geometry import framed_wrenches
 from teleop_core.nodes.children import free_domain
 from teleop_drill.conformance import Verdict
 from teleop_drill.nodes.conformance import examine, left_behind
 from teleop_drill.nodes.conformance_arm import Arm
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 crtk = pytest.importorskip("crtk_msgs.msg")
 pytestmark = pytest.mark.ros
@@ -37,7 +42,7 @@ SPEED = 0.017
 seconds. Where commands come late it catches up no faster, or its motion would be over before its
 speeds could be told."""
 # A busy machine is no fault of the arm's.
-CALM = {
+CALM: dict[str, Any] = {
     "operation__longest_outage": 0.0, "command_timeout": 5.0, "start": MIDDLE, "start_speed": 1.0,
 }  # fmt: skip
 
@@ -45,7 +50,7 @@ CALM = {
 class StockClient:
     """What crtk_python_client does: reliable, ten deep, stamped now, joints without names."""
 
-    def __init__(self, peer, arm="slave"):
+    def __init__(self, peer, arm: str = "slave") -> None:
         self.peer, self.arm, self.newest, self.was_busy = peer, arm, {}, False
         for name, kind in (
             ("operating_state", crtk.OperatingState), ("setpoint_cp", PoseStamped),
@@ -55,14 +60,14 @@ class StockClient:
         self.commands = {}
 
     def taker(self, name):
-        def take(message):
+        def take(message) -> None:
             self.newest[name] = message
             if name == "operating_state":
                 self.was_busy = self.was_busy or message.is_busy
 
         return take
 
-    def spin(self):
+    def spin(self) -> None:
         self.peer._executor.spin_once(timeout_sec=0.02)
 
     def wait(self, condition, what):
@@ -72,7 +77,7 @@ class StockClient:
 
         return self.peer.wait(turn, what)
 
-    def send(self, name, message):
+    def send(self, name, message) -> None:
         if name not in self.commands:
             own = self.peer.node.create_publisher(type(message), f"{self.arm}/{name}", 10)
             self.commands[name] = own
@@ -93,7 +98,7 @@ class StockClient:
 
 
 @pytest.fixture
-def client(peer):
+def client(peer: "Peer"):
     peer.start("slave", **CALM)
     client = StockClient(peer)
     client.reaches(("ENABLED", True, False))
@@ -101,7 +106,7 @@ def client(peer):
     return client
 
 
-def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(client):
+def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(client) -> None:
     goal = [a + 0.05 for a in MIDDLE]
     goal[2] = 0.35
     client.was_busy = False
@@ -112,7 +117,7 @@ def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(client)
     client.wait(lambda: np.allclose(client.newest["goal_js"].position, goal), "goal_js")
 
 
-def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client):
+def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client) -> None:
     pose = client.newest["setpoint_cp"].pose
     goal = PoseStamped(pose=pose)
     goal.pose.position.z -= 0.01
@@ -127,7 +132,7 @@ def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client):
     client.peer.wait_value("slave", "refused.slave/move_cp", lambda count: count == 1)
 
 
-def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client):
+def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client) -> None:
     client.send("state_command", crtk.StringStamped(string="pause"))
     client.reaches(("PAUSED", True, False))
     client.send("move_jp", JointState(position=[a - 0.05 for a in MIDDLE]))
@@ -141,7 +146,7 @@ def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client):
     client.wait(lambda: np.array_equal(client.joints(), MIDDLE), "where it was")
 
 
-def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client):
+def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client) -> None:
     goal = [a + 0.02 for a in MIDDLE]
     goal[2] = 0.36
     peer, received = client.peer, 0.0
@@ -154,7 +159,7 @@ def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client):
     client.wait(lambda: np.allclose(client.joints(), goal, atol=1e-6), "the reference")
 
 
-def test_speeds_end_with_the_messages_and_hold_ends_a_move(client):
+def test_speeds_end_with_the_messages_and_hold_ends_a_move(client) -> None:
     before = client.joints()
     for _ in range(10):
         client.send("servo_jv", JointState(velocity=[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]))
@@ -176,7 +181,7 @@ def six(wrench):
     return np.array([force.x, force.y, force.z, torque.x, torque.y, torque.z])
 
 
-def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_stamp(client):
+def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_stamp(client) -> None:
     node, newest = client.peer.node, client.newest
     for name in ("body/measured_cf", "spatial/measured_cf"):
         node.create_subscription(WrenchStamped, f"slave/{name}", client.taker(name), 10)
@@ -205,7 +210,7 @@ def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_sta
     assert (body.header.frame_id, spatial.header.frame_id) == ("slave_tip", "slave_base")
 
 
-def test_a_disabled_master_pushes_with_no_force(peer):
+def test_a_disabled_master_pushes_with_no_force(peer: "Peer") -> None:
     peer.start("haptic_master", patience=3600.0)
     client = StockClient(peer, "master")
     client.reaches(("ENABLED", True, False))
@@ -216,7 +221,7 @@ def test_a_disabled_master_pushes_with_no_force(peer):
 class ForeignArm(Node):
     """A small CRTK arm of somebody else, with three joints, and what is wrong with it."""
 
-    def __init__(self, context, faults):
+    def __init__(self, context, faults) -> None:
         super().__init__("foreign", context=context, use_global_arguments=False,
                          enable_rosout=False)  # fmt: skip
         self.faults, self.state, self.q = set(faults), "ENABLED", [0.1, 0.2, 0.3]
@@ -236,18 +241,18 @@ class ForeignArm(Node):
         self.create_subscription(JointState, "PSM/servo_jp", self.servo, 10)
         self.create_timer(0.01, self.tick)
 
-    def command(self, message):
+    def command(self, message) -> None:
         word = {"pause": "PAUSED", "resume": "ENABLED"}.get(message.string)
         if "any word" in self.faults:
             word = word or "DISABLED"
         self.state = word or self.state
 
-    def move(self, message):
+    def move(self, message) -> None:
         if self.state == "ENABLED" or "moves paused" in self.faults:
             self.goal = list(message.position)
             self.busy_until = time.monotonic() + 0.15
 
-    def servo(self, message):
+    def servo(self, message) -> None:
         if self.state == "ENABLED":
             self.goal = list(message.position)
 
@@ -266,7 +271,7 @@ class ForeignArm(Node):
             speed = [2.0 * v for v in speed]
         return told, speed
 
-    def tick(self):
+    def tick(self) -> None:
         time_now, is_busy = self.get_clock().now(), False
         now = time_now.to_msg()
         # Ten milliseconds, more on a busy machine: speeds are those of the time that passed.
@@ -310,14 +315,14 @@ def findings_of(fault, *, may_move):
 
 
 @contextmanager
-def foreign_arm(*faults):
+def foreign_arm(*faults: object):
     """Client of a foreign arm with these faults, which runs meanwhile."""
     domain, context = int(free_domain()), Context()
     context.init(args=[], domain_id=domain)
     node, executor = ForeignArm(context, faults), SingleThreadedExecutor(context=context)
     executor.add_node(node)
 
-    def spin():
+    def spin() -> None:
         with suppress(ExternalShutdownException):
             executor.spin()
 
@@ -355,7 +360,7 @@ def by_moving():
 
 
 @pytest.mark.slow
-def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(by_moving):
+def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(by_moving) -> None:
     found = by_moving["honest"].result()
     verdicts = {name: one.verdict for name, one in found.items()}
     sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js",
@@ -377,7 +382,9 @@ def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(b
         ("no state", "operating_state", ""),
     ],
 )
-def test_faults_of_a_foreign_arm_are_found_by_looking(by_looking, fault, topic, note):
+def test_faults_of_a_foreign_arm_are_found_by_looking(
+    by_looking, fault: str, topic: str, note: str
+) -> None:
     found = by_looking[fault].result()[topic]
     assert found.verdict is Verdict.FAILED
     assert note in found.note
@@ -392,7 +399,9 @@ def test_faults_of_a_foreign_arm_are_found_by_looking(by_looking, fault, topic, 
         ("never busy", "move_jp", "never rose"),
     ],
 )
-def test_faults_of_a_foreign_arm_are_found_by_trying(by_moving, fault, topic, note):
+def test_faults_of_a_foreign_arm_are_found_by_trying(
+    by_moving, fault: str, topic: str, note: str
+) -> None:
     found = by_moving[fault].result()[topic]
     assert found.verdict is Verdict.FAILED
     assert note in found.note
@@ -408,21 +417,23 @@ def test_faults_of_a_foreign_arm_are_found_by_trying(by_moving, fault, topic, no
         ("speeds", ("measured_js",), "add up to another way"),
     ],
 )
-def test_an_arm_that_lies_about_where_it_is_is_found_by_moving_it(by_moving, fault, topics, note):
+def test_an_arm_that_lies_about_where_it_is_is_found_by_moving_it(
+    by_moving, fault: str, topics: tuple[str, ...], note: str
+) -> None:
     found = by_moving[fault].result()
     for topic in topics:
         assert found[topic].verdict is Verdict.FAILED, (topic, found[topic])
         assert note in found[topic].note, found[topic]
 
 
-def test_a_test_that_is_interrupted_claims_no_recording():
+def test_a_test_that_is_interrupted_claims_no_recording() -> None:
     domain = free_domain()
     command = [sys.executable, "-m", "teleop_core.cli", "conformance", "slave", "--read-only",
                "--wait", "60", "--domain", domain]  # fmt: skip
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         wait_until(lambda: process.poll() is not None or takes_part(int(domain)), "a participant")
         process.send_signal(signal.SIGINT)
-        assert process.stderr.read() == "teleop conformance: interrupted\n"
+        assert present(process.stderr).read() == "teleop conformance: interrupted\n"
     assert process.returncode == 130
 
 
@@ -436,13 +447,13 @@ def takes_part(domain):
     return 7410 + 250 * domain in ports
 
 
-def test_what_an_interrupted_test_leaves_is_told():
+def test_what_an_interrupted_test_leaves_is_told() -> None:
     with foreign_arm() as arm:
         assert left_behind(arm, may_move=False) == "nothing was commanded"
         assert "the arm is ENABLED and may be off by 0.01 rad" in left_behind(arm, may_move=True)
 
 
-def test_nothing_is_commanded_when_only_looking(by_looking):
+def test_nothing_is_commanded_when_only_looking(by_looking) -> None:
     found = by_looking[""].result()
     assert found["move_jp"].verdict is Verdict.SKIPPED
     assert found["state_command"].note == "read only"

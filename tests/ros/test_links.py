@@ -4,6 +4,7 @@ import signal
 import textwrap
 import time
 from functools import reduce
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ from live_process import CALM, LiveProcess, wait_until
 from teleop_core.graph import topics
 from teleop_core.graph.topics import Kind, Topic
 from teleop_core.robots import load_robot
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
 
@@ -104,7 +108,7 @@ ENTRIES = """
 RAISED, TWICE = (Topic(name, Kind.POSE) for name in ("slave/raised_cp", "slave/plain_cp"))
 
 
-def both_ways(topic, is_enough, *settings):
+def both_ways(topic, is_enough, *settings: object):
     """A session of these settings, in processes and composed, until it has enough of a topic."""
     ways = [(topic, is_enough, settings, way) for way in ((), ("--composed",))]
     return pytest.mark.parametrize("recorded", ways, ids=["processes", "composed"], indirect=True)
@@ -132,7 +136,7 @@ in_between = both_ways(
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory):
+def site(tmp_path_factory: pytest.TempPathFactory):
     """Folder of a user's installed package with four stages."""
     folder = tmp_path_factory.mktemp("links") / "site"
     about = folder / "my_stages-1.0.dist-info"
@@ -144,13 +148,18 @@ def site(tmp_path_factory):
 
 
 @pytest.fixture
-def package(site, monkeypatch):
+def package(site, monkeypatch: pytest.MonkeyPatch) -> None:
     """The package, found by what the test starts."""
     monkeypatch.setenv("PYTHONPATH", str(site))
 
 
 @pytest.fixture(scope="module")
-def recorded(request, site, common_peer, tmp_path_factory):
+def recorded(
+    request: pytest.FixtureRequest,
+    site,
+    common_peer: "Peer",
+    tmp_path_factory: pytest.TempPathFactory,
+):
     """Recording of a session of the user; tests of the same session share it."""
     topic, is_enough, settings, way = request.param
     listener = common_peer.listen(topic)
@@ -174,7 +183,7 @@ def recorded(request, site, common_peer, tmp_path_factory):
         session.close()
 
 
-def common(*series):
+def common(*series: object):
     """Values of some series at the stamps that all have."""
     stamps = reduce(np.intersect1d, (one.stamp_ns for one in series))
     assert len(stamps) > 500
@@ -185,7 +194,7 @@ def common(*series):
 
 @pytest.mark.slow
 @late_and_helped
-def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(recorded):
+def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(recorded) -> None:
     answers, setpoints = (
         recorded.read(topic) for topic in (topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS)
     )
@@ -204,7 +213,7 @@ def test_a_delay_on_a_link_is_seen_in_the_latency_of_the_recording(recorded):
 
 @pytest.mark.slow
 @late_and_helped
-def test_a_second_source_of_force_acts_beside_the_first(recorded):
+def test_a_second_source_of_force_acts_beside_the_first(recorded) -> None:
     helper = recorded.read(HELPER)
     assert len(helper) > 500
     # Without a fixture nothing else pushes.
@@ -217,7 +226,7 @@ def test_a_second_source_of_force_acts_beside_the_first(recorded):
 
 @pytest.mark.slow
 @in_between
-def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded):
+def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded) -> None:
     asked, raised, twice = (recorded.read(t) for t in (topics.SLAVE_SERVO_CP, RAISED, TWICE))
     for first, second, height in ((asked, raised, 0.002), (raised, twice, 0.003)):
         before, after = common(first, second)
@@ -234,7 +243,7 @@ def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded):
     assert off[is_free(limits)].max() < 1e-3 + 1e-9
 
 
-def push(peer, first, second):
+def push(peer, first, second) -> None:
     """Send one sample of each source that is given."""
     now = time.time_ns()
     for topic, force in ((topics.MASTER_SERVO_CF, first), (HELPER, second)):
@@ -242,11 +251,11 @@ def push(peer, first, second):
             peer.send(topic, now, [force, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-def test_the_master_feels_the_sum_of_all_sources_of_force(peer):
+def test_the_master_feels_the_sum_of_all_sources_of_force(peer: "Peer") -> None:
     felt = peer.listen(topics.MASTER_MEASURED_CF)
     peer.start("haptic_master", patience=0.0, links=FORCES)
 
-    def feels(wanted, *sources):
+    def feels(wanted, *sources: object) -> None:
         def is_felt():
             push(peer, *sources)
             return felt.take() and felt.values[-1][0] == wanted
@@ -259,7 +268,7 @@ def test_the_master_feels_the_sum_of_all_sources_of_force(peer):
 
 
 @pytest.mark.parametrize("silent", [0, 1])
-def test_a_source_of_force_that_falls_silent_acts_no_more(peer, silent):
+def test_a_source_of_force_that_falls_silent_acts_no_more(peer: "Peer", silent: int) -> None:
     felt = peer.listen(topics.MASTER_MEASURED_CF)
     peer.start("haptic_master", patience=0.0, links=FORCES)
     sources = [0.5, 0.25]
@@ -279,7 +288,9 @@ def test_a_source_of_force_that_falls_silent_acts_no_more(peer, silent):
     peer.wait(is_alone, "the other one alone")
 
 
-def test_an_answer_that_is_no_number_is_counted_and_told_but_not_sent(package, peer):
+def test_an_answer_that_is_no_number_is_counted_and_told_but_not_sent(
+    package, peer: "Peer"
+) -> None:
     answers = peer.listen(Topic("test/failing", Kind.POSE))
     peer.start("failing")
 

@@ -6,6 +6,8 @@ import select
 import subprocess
 import sys
 import time
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -22,6 +24,9 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.nodes.children import environment
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 AXES = ["+y", "+z", "+x"]
@@ -32,7 +37,7 @@ TYPES = {"PoseStamped": PoseStamped, "TransformStamped": TransformStamped, "Pose
 class Device:
     """A stylus of the test, in millimetres: it says where it is 500 times a second."""
 
-    def __init__(self, peer, kind="PoseStamped"):
+    def __init__(self, peer, kind: str = "PoseStamped") -> None:
         self.node, self.place, self.buttons, self.force = (
             peer.node,
             np.zeros(3),
@@ -45,14 +50,14 @@ class Device:
         self.node.create_subscription(WrenchStamped, "touch/force", self._push, quality)
         self._timer = self.node.create_timer(0.002, self._tick)
 
-    def stop(self):
+    def stop(self) -> None:
         self.node.destroy_timer(self._timer)
 
-    def _push(self, message):
+    def _push(self, message) -> None:
         force = message.wrench.force
         self.force = np.array([force.x, force.y, force.z])
 
-    def _tick(self):
+    def _tick(self) -> None:
         message, (x, y, z) = self._kind(), self.place.tolist()
         if self._kind is not Pose:
             message.header.stamp = self.node.get_clock().now().to_msg()
@@ -66,7 +71,7 @@ class Device:
         self._joy.publish(Joy(buttons=self.buttons))
 
 
-def started(peer, kind="PoseStamped"):
+def started(peer, kind: str = "PoseStamped"):
     device = Device(peer, kind)
     peer.start(
         "master_bridge", pose_topic="/touch/pose", device_axes=AXES, unit=0.001,
@@ -82,7 +87,9 @@ def turning(peer, condition):
 
 
 @pytest.mark.parametrize("kind", TYPES)
-def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(peer, kind):
+def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(
+    peer: "Peer", kind: str
+) -> None:
     measured, buttons = map(peer.listen, (MASTER_MEASURED_CP, MASTER_BUTTONS))
     device = started(peer, kind)
     device.place = np.array([10.0, 20.0, 30.0])
@@ -99,7 +106,7 @@ def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(peer, kin
     )
 
 
-def test_a_device_that_swings_leads_the_slave(peer):
+def test_a_device_that_swings_leads_the_slave(peer: "Peer") -> None:
     commands = peer.listen(SLAVE_SERVO_CP)
     device = started(peer)
     for name in ("motion_scaling", "inverse_kinematics"):
@@ -121,7 +128,9 @@ def test_a_device_that_swings_leads_the_slave(peer):
     peer.wait(lambda: "no master/measured_cp" in peer.status("motion_scaling").message, "silence")
 
 
-def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(peer):
+def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(
+    peer: "Peer",
+) -> None:
     device, asked = started(peer), np.array([0.5, -1.0, 0.3])
 
     def is_pushed():
@@ -141,7 +150,7 @@ def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(
 # -- map-device ------------------------------------------------------------------------------------
 
 
-def command(peer, *arguments):
+def command(peer, *arguments: object):
     words = [sys.executable, "-m", "teleop_core.cli", "map-device", *map(str, arguments)]
     env = environment() | {"ROS_DOMAIN_ID": peer.domain, "PYTHONUNBUFFERED": "1"}
     return subprocess.Popen(
@@ -150,7 +159,7 @@ def command(peer, *arguments):
     )  # fmt: skip
 
 
-def test_three_motions_write_what_the_bridge_needs(peer, tmp_path):
+def test_three_motions_write_what_the_bridge_needs(peer: "Peer", tmp_path: Path) -> None:
     device, file, said = Device(peer), tmp_path / "mine.yaml", ""
     with command(peer, "touch/pose", "--out", file) as asking:
 
@@ -183,7 +192,7 @@ def test_three_motions_write_what_the_bridge_needs(peer, tmp_path):
     }  # fmt: skip
 
 
-def test_a_topic_that_is_not_there_is_told_with_those_that_are(peer):
+def test_a_topic_that_is_not_there_is_told_with_those_that_are(peer: "Peer") -> None:
     Device(peer)
     with command(peer, "nowhere/pose") as asking:
         peer.wait(lambda: peer.spin() or asking.poll() is not None, "its end")

@@ -1,12 +1,15 @@
 """Network over real topics: a foreign publisher behind it, and a session across it."""
 
 import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
+from teleop_core.bags.reader import Bag
 from teleop_core.graph.topics import (
     NETWORK_SERVO_CP,
     NETWORK_SETPOINT_CP,
@@ -16,6 +19,9 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.session.configuration import configure
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 MS = 1_000_000
 DELAY = 0.15
@@ -24,10 +30,10 @@ DELAY = 0.15
 class Sender:
     """A program that knows nothing of the network: commands, and where a slave is."""
 
-    def __init__(self, peer):
+    def __init__(self, peer) -> None:
         self.peer, self.sent_ns = peer, {}
 
-    def send(self):
+    def send(self) -> None:
         stamp = (len(self.sent_ns) + 2) * MS
         pose = (1e-9 * stamp, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         self.peer.send(SLAVE_SETPOINT_CP, stamp, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
@@ -35,7 +41,9 @@ class Sender:
         self.peer.send(SLAVE_SERVO_CP, stamp, pose)
 
 
-def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_time(peer):
+def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_time(
+    peer: "Peer",
+) -> None:
     came, back = peer.listen(NETWORK_SERVO_CP), peer.listen(NETWORK_SETPOINT_CP)
     peer.start("network", there__least_delay=DELAY)
     sender, ages = Sender(peer), []
@@ -69,8 +77,8 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
 
 @pytest.mark.parametrize("is_composed", [True, False], ids=["composed", "processes"])
 def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
-    peer, session_until, is_composed
-):
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]], is_composed: bool
+) -> None:
     settings = [
         "teleop.stages=[network]", "network.there.least_delay=0.2", "network.back.least_delay=0.2",
         "slave.starts_at_home=true", "slave.operation.longest_outage=0", "duration=600",

@@ -2,6 +2,7 @@
 
 import signal
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 import psutil
@@ -14,6 +15,9 @@ from teleop_core.nodes.operation import STOP_TOPIC, StopButton
 from teleop_core.robots import load_robot
 from teleop_core.slave.operation import State
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = pytest.mark.ros
 HOME = load_robot("rcrt1").home
 
@@ -21,12 +25,12 @@ HOME = load_robot("rcrt1").home
 class Streamer:
     """Commands that swing joint 1, and what the slave makes of them."""
 
-    def __init__(self, peer):
+    def __init__(self, peer) -> None:
         self.peer, self.begin = peer, time.monotonic()
         self.setpoints = peer.listen(SLAVE_SETPOINT_JS)
         peer.publisher(SLAVE_SERVO_JP)
 
-    def send(self):
+    def send(self) -> None:
         """One command of the swing."""
         goal = HOME.copy()
         goal[0] += 0.1 * np.sin(2.0 * np.pi * (time.monotonic() - self.begin))
@@ -78,7 +82,9 @@ def command(peer, name):
     return answer.success, answer.message
 
 
-def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable_end_it(peer):
+def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable_end_it(
+    peer: "Peer",
+) -> None:
     peer.start("slave")
     streamer = Streamer(peer)
     streamer.until(streamer.moves, "motion")
@@ -110,7 +116,7 @@ def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable
     assert abs(stopped_at - HOME[0]) <= 0.11
 
 
-def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer):
+def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer: "Peer") -> None:
     peer.start("slave", operation__starts_enabled=False)
     streamer = Streamer(peer)
     streamer.until(lambda: state(peer) is State.DISABLED, "DISABLED")
@@ -129,7 +135,7 @@ def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer):
     streamer.until(streamer.moves, "motion again")
 
 
-def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer):
+def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer: "Peer") -> None:
     peer.start("slave", arm="left")
     peer.start("slave", arm="right")
     for arm in ("left", "right"):
@@ -149,7 +155,7 @@ def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer
 
 
 @pytest.fixture
-def button(peer):
+def button(peer: "Peer"):
     """A stop button as anybody would write it, found by a slave that is enabled."""
     peer.start("slave")
     plain = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
@@ -157,7 +163,7 @@ def button(peer):
     return plain
 
 
-def go_on(peer):
+def go_on(peer) -> None:
     """Reset and enable the arm until it says that it is: what it said before is of another stop."""
 
     def is_enabled():
@@ -170,13 +176,13 @@ def go_on(peer):
     peer.wait(is_enabled, "enabled again")
 
 
-def say(button, *, pressed, released):
+def say(button, *, pressed, released) -> None:
     """So many presses, and so many releases, as fast as they go."""
     for is_pressed in (True,) * pressed + (False,) * released:
         button.publish(Bool(data=is_pressed))
 
 
-def test_a_press_that_releases_follow_at_once_stops_the_arm(peer, button):
+def test_a_press_that_releases_follow_at_once_stops_the_arm(peer: "Peer", button) -> None:
     button.publish(Bool(data=False))
     for released in (1, 12, 30, 100) * 3:
         say(button, pressed=1, released=released)
@@ -185,7 +191,7 @@ def test_a_press_that_releases_follow_at_once_stops_the_arm(peer, button):
 
 
 @pytest.fixture
-def still_slave(peer, button):
+def still_slave(peer: "Peer", button):
     """Function that stops the process of a slave that knows the button, and returns it."""
     slave = psutil.Process(peer.nodes[0].process.pid)
 
@@ -198,7 +204,9 @@ def still_slave(peer, button):
 
 
 @pytest.mark.parametrize("released", [35, 6000])
-def test_a_press_while_the_slave_stands_still_stops_the_arm(peer, button, still_slave, released):
+def test_a_press_while_the_slave_stands_still_stops_the_arm(
+    peer: "Peer", button, still_slave, released: int
+) -> None:
     say(button, pressed=0, released=1)
     slave = still_slave()
     say(button, pressed=5, released=released)
@@ -207,7 +215,7 @@ def test_a_press_while_the_slave_stands_still_stops_the_arm(peer, button, still_
     go_on(peer)
 
 
-def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer):
+def test_a_button_that_was_pressed_before_the_slave_began_stops_it(peer: "Peer") -> None:
     button = StopButton(peer.node)
     button.say(is_pressed=True)
     peer.start("slave")

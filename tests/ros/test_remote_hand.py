@@ -3,6 +3,8 @@
 import subprocess
 import sys
 import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -20,9 +22,12 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.nodes.children import environment
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = pytest.mark.ros
 # A device without friction and noise goes where the hand is.
-EXACT = {"device__friction": 0.0, "device__gimbal_noise": 0.0}
+EXACT: dict[str, Any] = {"device__friction": 0.0, "device__gimbal_noise": 0.0}
 GAIN = 0.5
 PATIENT = 5.0
 """Silence that lets go [s], the longest there is: on a busy machine poses stay away for seconds."""
@@ -31,11 +36,11 @@ PATIENT = 5.0
 class Person:
     """Sends poses at 50 Hz, as a page does."""
 
-    def __init__(self, peer):
+    def __init__(self, peer) -> None:
         self.peer = peer
         peer.publisher(OPERATOR_SERVO_CP)
 
-    def hold(self, place, until, what):
+    def hold(self, place, until, what) -> None:
         """Want the stylus at a place from the inkwell [m] until something is so."""
         pose = rest_pose()
         pose[:3] += place
@@ -47,7 +52,7 @@ class Person:
 
         self.peer.wait(turn, what)
 
-    def drag(self, begin, end, poses=25):
+    def drag(self, begin, end, poses: int = 25) -> None:
         """Want it along a straight line, over half a second."""
         for share in np.linspace(0.0, 1.0, poses):
             self.hold((1.0 - share) * np.array(begin) + share * np.array(end), lambda: True, "")
@@ -68,7 +73,7 @@ def is_held(peer):
     return lambda: peer.status("operator").values.get("hand.is_held") == "1"
 
 
-def at_rest(listener, count=1000):
+def at_rest(listener, count: int = 1000):
     """Whether the tip has been at rest for so many samples, but for steps of its encoders."""
 
     def is_at_rest():
@@ -82,7 +87,9 @@ def at_rest(listener, count=1000):
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(peer, session):
+def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(
+    peer: "Peer", session
+) -> None:
     peer.wait(lambda: "nobody holds" in peer.status("operator").message, "a hand that waits")
     peer.wait_value("operator", "has_begun", lambda n: n == 1)
     tips, person = peer.listen(SLAVE_MEASURED_CP), Person(peer)
@@ -115,9 +122,9 @@ def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(pe
 
 
 @pytest.mark.slow
-def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
+def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer: "Peer") -> None:
     poses, buttons = peer.listen(MASTER_MEASURED_CP), peer.listen(MASTER_BUTTONS)
-    hand = {"operator__kind": "remote", "operator__remote__timeout": PATIENT}
+    hand: dict[str, Any] = {"operator__kind": "remote", "operator__remote__timeout": PATIENT}
     peer.start("haptic_master", patience=0.0, **hand, **EXACT)
     peer.wait(lambda: buttons.take() and buttons.values[-1][0] == 1.0, "a pressed clutch")
     person = Person(peer)
@@ -149,7 +156,9 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer):
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_a_recorded_hand_that_is_played_is_the_operator(peer, compose, tmp_path):
+def test_a_recorded_hand_that_is_played_is_the_operator(
+    peer: "Peer", compose, tmp_path: Path
+) -> None:
     bag = tmp_path / "hand"
     settings = {"operator.approach_time": 1.0, "tremor_amplitude": 0.0}
     tc.run("free_motion", duration=60.0, out=bag, settings=settings)

@@ -31,10 +31,10 @@ def abort_outside_python():
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path: Path):
     """Run a test of this body in a pytest of its own: its output, and how often the test ran."""
 
-    def result(body, *options):
+    def result(body, *options: object):
         file = tmp_path / "test_it.py"
         file.write_text(HEAD + body)
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = ros\n")
@@ -49,13 +49,13 @@ def run(tmp_path):
 
 
 @pytest.mark.parametrize("fault", ["assert False", "raise TimeoutError", "raise AssertionError"])
-def test_any_failure_of_ours_is_not_rerun(run, fault):
+def test_any_failure_of_ours_is_not_rerun(run, fault: str) -> None:
     code, out, runs = run(f"def test_it():\n    count()\n    {fault}\n")
     assert (code, runs) == (1, 1)
     assert "reruns because of the middleware" not in out
 
 
-def test_a_proven_loss_is_rerun_counted_and_named(run):
+def test_a_proven_loss_is_rerun_counted_and_named(run) -> None:
     body = "def test_it():\n    if count() == 1:\n        raise MiddlewareLossError('3 of a/b')\n"
     code, out, runs = run(body)
     assert (code, runs) == (0, 2)
@@ -63,20 +63,20 @@ def test_a_proven_loss_is_rerun_counted_and_named(run):
     assert "test_it: middleware_faults.MiddlewareLossError: 3 of a/b" in out
 
 
-def test_a_loss_that_comes_every_time_is_a_failure(run):
+def test_a_loss_that_comes_every_time_is_a_failure(run) -> None:
     code, out, runs = run("def test_it():\n    count()\n    raise MiddlewareLossError('all')\n")
     assert (code, runs) == (1, 3)
     assert "MiddlewareLossError 2" in out
 
 
-def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(run):
+def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(run) -> None:
     body = "def test_it():\n    if count() == 1:\n        abort_outside_python()\n"
     code, out, runs = run(body, "-n", "1")
     assert (code, runs) == (0, 2), out
     assert "reruns because of the middleware: MiddlewareCrashError 1" in out
 
 
-def test_a_crash_in_our_own_code_is_a_failure(run):
+def test_a_crash_in_our_own_code_is_a_failure(run) -> None:
     body = "def test_it():\n    if count() == 1:\n        ctypes.string_at(0)\n"
     code, out, _ = run(body, "-n", "1")
     assert code == 1

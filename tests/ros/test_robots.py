@@ -2,18 +2,24 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from live_process import CALM
 from teleop_core.bags.messages import layout
+from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import pose_from_transform, rotation, transform
 from teleop_core.nodes.children import environment
 from teleop_core.robots import list_robots, load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 SHORT = (
@@ -31,7 +37,7 @@ MS = 1_000_000
 
 
 @pytest.fixture
-def short_session(peer, session_until):
+def short_session(peer: "Peer", session_until: Callable[..., tuple[Bag, str]]):
     """Recording of two seconds of a live session, and joints (n,) that moved less than in virtual
     time.
 
@@ -71,19 +77,19 @@ def off_grid(bag):
 
 
 @pytest.mark.parametrize("name", SLAVES)
-def test_every_slave_follows_the_hand_through_a_live_session(short_session, name):
+def test_every_slave_follows_the_hand_through_a_live_session(short_session, name) -> None:
     bag, is_short = short_session(f"robot={name}")
     assert not is_short.any()
     assert off_grid(bag) < 1e-6
 
 
-def test_the_mma_leads_a_live_session_with_its_own_encoders(short_session):
+def test_the_mma_leads_a_live_session_with_its_own_encoders(short_session) -> None:
     bag, is_short = short_session("device.handle=mma")
     assert not is_short.any()
     assert off_grid(bag) > 0.1
 
 
-def send_pose(peer, stamp, T):
+def send_pose(peer, stamp, T) -> None:
     """Publish a pose of the slave's tip."""
     pose = np.empty(7)
     pose_from_transform(T, pose)
@@ -98,7 +104,7 @@ def beside_home(robot):
 
 
 @pytest.fixture
-def hybrid_node(peer):
+def hybrid_node(peer: "Peer"):
     """Inverse kinematics of the hybrid as ``ros2 run ... -p robot:=scara_stewart`` starts it."""
     command = [sys.executable, "-m", "teleop_core.nodes", "inverse_kinematics"]
     process = subprocess.Popen(
@@ -117,7 +123,9 @@ def hybrid_node(peer):
             process.wait()
 
 
-def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(peer, hybrid_node):
+def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(
+    peer: "Peer", hybrid_node
+) -> None:
     robot = load_robot("scara_stewart")
     goal, answers = beside_home(robot), peer.listen(topics.SLAVE_SERVO_JP)
     written = layout(topics.SLAVE_SETPOINT_JS, robot.joint_names)
@@ -138,7 +146,7 @@ def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(peer, hybri
     assert np.abs(robot.fk(answers.values[-1]) - goal).max() < 1e-9
 
 
-def test_a_stewart_slave_goes_where_a_pose_says_from_process_to_process(peer):
+def test_a_stewart_slave_goes_where_a_pose_says_from_process_to_process(peer: "Peer") -> None:
     robot = load_robot("stewart")
     goal, stamp = beside_home(robot), 0
     setpoints, measured = (

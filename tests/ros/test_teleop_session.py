@@ -5,7 +5,9 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
+from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
@@ -22,6 +25,9 @@ from teleop_core.nodes.real_time import apply_options, is_priority_granted
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = [*BUILT_IN, RECORDER_NAME]
@@ -53,12 +59,12 @@ def recorded(composed_session):
         return Bag(bag)
 
 
-def change(peer, name, transition):
+def change(peer, name, transition) -> None:
     request = ChangeState.Request(transition=Transition(id=transition))
     assert peer.call(ChangeState, f"/{name}/change_state", request).success
 
 
-def test_a_composed_session_loses_no_sample_between_its_stages(recorded):
+def test_a_composed_session_loses_no_sample_between_its_stages(recorded) -> None:
     sample, pose, joints = (
         recorded.read(t).stamp_ns
         for t in (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP)
@@ -71,7 +77,7 @@ def test_a_composed_session_loses_no_sample_between_its_stages(recorded):
     assert (np.diff(recorded.read(topics.SLAVE_MEASURED_JS).stamp_ns) == MS).all()
 
 
-def test_a_composed_session_computes_what_virtual_time_computes(recorded):
+def test_a_composed_session_computes_what_virtual_time_computes(recorded) -> None:
     live_poses = recorded.read(topics.MASTER_MEASURED_CP).values
     settings = ["operator.approach_time=1.0", "haptic_master.patience=0.0",
                 f"slave.start={HOME}", "motion_scaling.reach_force.is_on=false"]  # fmt: skip
@@ -80,7 +86,7 @@ def test_a_composed_session_computes_what_virtual_time_computes(recorded):
     assert np.array_equal(live_poses, virtual["master_measured_cp"])
 
 
-def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer, session):
+def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer: "Peer", session) -> None:
     change(peer, "haptic_master", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("haptic_master", "inactive")
     commands = peer.listen(topics.SLAVE_SERVO_CP)
@@ -100,7 +106,7 @@ def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer, session):
     peer.wait(moved, "slave commands that follow the outside master")
 
 
-def test_the_inside_master_comes_back_without_a_jump(peer, session):
+def test_the_inside_master_comes_back_without_a_jump(peer: "Peer", session) -> None:
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     # Few samples are no stream, of which an outage would pause the arm.
     peer.wait(
@@ -121,7 +127,7 @@ def test_the_inside_master_comes_back_without_a_jump(peer, session):
     assert np.abs(np.diff(np.array(measured.values)[:, :6], axis=0)).max() < 0.01
 
 
-def test_a_node_may_leave_a_composed_session_in_any_moment(peer, session):
+def test_a_node_may_leave_a_composed_session_in_any_moment(peer: "Peer", session) -> None:
     for _ in range(20):
         for transition in (
             Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
@@ -135,8 +141,8 @@ def test_a_node_may_leave_a_composed_session_in_any_moment(peer, session):
 
 
 def test_live_composed_records_all_topics_at_times_that_rise_from_stage_to_stage(
-    peer, session_until
-):
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]]
+) -> None:
     enough = {topic.name: 1500 for topic in STREAMS}
     configuration = configure("coarse_box", settings=["teleop.duration=600.0"])
     bag, text = session_until(configuration, lambda: peer.has_recorded(enough), is_composed=True)
@@ -152,7 +158,7 @@ def test_live_composed_records_all_topics_at_times_that_rise_from_stage_to_stage
         assert (after.log_ns[j] >= before.log_ns[i]).all()
 
 
-def test_real_time_options_are_taken_or_refused_in_one_line():
+def test_real_time_options_are_taken_or_refused_in_one_line() -> None:
     allowed = os.sched_getaffinity(0)
     try:
         (refusal,) = apply_options(RealTimeParameters(cpus=(4096,), freeze_gc=False))
@@ -163,7 +169,7 @@ def test_real_time_options_are_taken_or_refused_in_one_line():
         os.sched_setaffinity(0, allowed)
 
 
-def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_they_start():
+def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_they_start() -> None:
     if not is_priority_granted(10):
         pytest.skip("the system grants no priority")
     script = """
@@ -181,8 +187,8 @@ subprocess.run([sys.executable, "-c", started], check=True)
         [sys.executable, "-uc", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     with process:
-        said = [process.stdout.readline().strip() for _ in range(2)]
-        process.stdin.close()
+        said = [present(process.stdout).readline().strip() for _ in range(2)]
+        present(process.stdin).close()
     main, *others = ast.literal_eval(said[0])
     assert main == 10
     assert set(others) == {1}
@@ -198,7 +204,9 @@ def rest_of(measured):
 
 
 @pytest.mark.alone
-def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(peer, session):
+def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(
+    peer: "Peer", session
+) -> None:
     change(peer, "inverse_kinematics", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("inverse_kinematics", "inactive")
     measured = peer.listen(topics.SLAVE_MEASURED_JS)

@@ -1,5 +1,8 @@
 """Trust: whatever anybody publishes, nodes go on and say what they refuse."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pytest
 
@@ -8,6 +11,9 @@ from teleop_core.graph import topics
 from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.streams import message_type
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = pytest.mark.ros
 
 GARBAGE = b"\0\1\0\0" + bytes(range(200, 256))
@@ -15,9 +21,13 @@ NODES = ("operator", "haptic_master", "motion_scaling", "inverse_kinematics", "s
 
 
 @pytest.mark.parametrize("name", NODES)
-def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(peer, name):
+def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(
+    peer: "Peer", name: str
+) -> None:
     reads = STAGES.find(name).reads
-    looks = {"kind": "remote"} if name == "operator" else {}  # others do not look at what is told
+    looks: dict[str, Any] = (
+        {"kind": "remote"} if name == "operator" else {}
+    )  # others do not look at what is told
     node = peer.start(name, has_arm=False, **looks)
 
     def refused():
@@ -31,7 +41,7 @@ def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(peer,
     assert node.end() == 0
 
 
-def test_who_watches_a_session_passes_reports_over_that_are_none(peer):
+def test_who_watches_a_session_passes_reports_over_that_are_none(peer: "Peer") -> None:
     peer.start("motion_scaling")
     publisher = peer.publisher(topics.DIAGNOSTICS)
 
@@ -45,7 +55,7 @@ def test_who_watches_a_session_passes_reports_over_that_are_none(peer):
     peer.wait(lambda: peer.status("motion_scaling"), "a further report")
 
 
-def test_a_second_master_is_refused_and_the_first_one_goes_on(peer):
+def test_a_second_master_is_refused_and_the_first_one_goes_on(peer: "Peer") -> None:
     peer.start("motion_scaling", owner_silence=10.0)
     first = peer.publisher(topics.MASTER_MEASURED_CP)
     kind = message_type(topics.MASTER_MEASURED_CP.kind.ros_type)
@@ -82,7 +92,7 @@ def test_a_second_master_is_refused_and_the_first_one_goes_on(peer):
     assert status.number("rate_hz.master/measured_cp") > 0.0
 
 
-def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer):
+def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer: "Peer") -> None:
     peer.start("motion_scaling")
     pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
 
@@ -93,7 +103,9 @@ def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer):
     peer.wait(told, "the advice")
 
 
-def test_a_recorder_does_not_take_a_second_publisher_for_losses(peer, tmp_path):
+def test_a_recorder_does_not_take_a_second_publisher_for_losses(
+    peer: "Peer", tmp_path: Path
+) -> None:
     peer.start("recorder", out=str(tmp_path / "bag"))
     topic = topics.MASTER_MEASURED_CP
     first = peer.publisher(topic)

@@ -16,13 +16,13 @@ def watched(composed_session):
         yield peer
 
 
-def test_outside_subscribers_see_every_topic(watched):
+def test_outside_subscribers_see_every_topic(watched) -> None:
     listeners = [watched.listen(topic) for topic in STREAMS]
     for listener in listeners:
         watched.wait(lambda listener=listener: listener.take() > 500, listener.topic.name)
 
 
-def test_parameters_of_a_composed_node_change_at_run_time(watched):
+def test_parameters_of_a_composed_node_change_at_run_time(watched) -> None:
     (result,) = watched.set("motion_scaling", fine_gain=0.2)
     assert result.successful
     (refused,) = watched.set("motion_scaling", fine_gain=20.0)
@@ -30,7 +30,7 @@ def test_parameters_of_a_composed_node_change_at_run_time(watched):
     assert "fine_gain" in refused.reason
 
 
-def test_a_subscriber_that_never_reads_does_not_slow_the_session(watched):
+def test_a_subscriber_that_never_reads_does_not_slow_the_session(watched) -> None:
     deaf = [watched.listen(topic) for topic in STREAMS]
     spans = [_ticks_and_lost_time(watched)]
 

@@ -1,5 +1,8 @@
 """What RViz and Foxglove get of a running session, and what its recording holds of it."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -15,6 +18,9 @@ from teleop_core.robots import load_robot
 from teleop_core.robots.bodies import bodies_of
 from teleop_core.robots.bodies.urdf import urdf_of
 
+if TYPE_CHECKING:
+    from ros.conftest import Peer
+
 pytestmark = pytest.mark.ros
 
 MS = 1_000_000
@@ -22,7 +28,7 @@ REST = [0.0, -0.06, -0.08, 1.0, 0.0, 0.0, 0.0]
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer, tmp_path):
+def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_path: Path) -> None:
     robot = load_robot("rcrt1")
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     described, drawn = [], []
@@ -61,7 +67,9 @@ def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer, tmp_path):
         assert [place.x, place.y, place.z] == pytest.approx(tip[:3])
 
 
-def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(peer, tmp_path):
+def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(
+    peer: "Peer", tmp_path: Path
+) -> None:
     robot = load_robot("puma560")
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     joints = np.concatenate((robot.start, np.zeros(2 * robot.n)))

@@ -9,6 +9,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import numpy as np
 import pytest
 
+from present import present
+
 pytest.importorskip("viser")
 
 import viser
@@ -28,19 +30,19 @@ CENTER = (700, 450)
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory):
+def tab(tmp_path_factory: pytest.TempPathFactory):
     with Tab(tmp_path_factory.mktemp("first")) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
-def other(tmp_path_factory):
+def other(tmp_path_factory: pytest.TempPathFactory):
     with Tab(tmp_path_factory.mktemp("second")) as opened:
         yield opened
 
 
 @pytest.fixture(autouse=True)
-def _clean(request):
+def _clean(request: pytest.FixtureRequest) -> None:
     """Each test has its tabs empty and with no memory of errors."""
     for name in {"tab", "other"} & set(request.fixturenames):
         opened = request.getfixturevalue(name)
@@ -54,7 +56,9 @@ def is_driven(server):
     return server.drivers.driver is not None
 
 
-def test_page_opens_without_errors_asks_no_other_host_and_is_used(tab, capfd):
+def test_page_opens_without_errors_asks_no_other_host_and_is_used(
+    tab, capfd: pytest.CaptureFixture[str]
+) -> None:
     with ConsoleServer(0, token="secret", label="arm") as server:
         clicks = []
         server.viser.gui.add_button("Start").on_click(lambda event: clicks.append(event.client_id))
@@ -71,7 +75,7 @@ def test_page_opens_without_errors_asks_no_other_host_and_is_used(tab, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab):
+def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab) -> None:
     with ConsoleServer(0, token="secret") as server:
         address = server.url.split("?", maxsplit=1)[0]
         for wrong in (address, address + "?token=guess"):
@@ -85,7 +89,7 @@ def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab):
         assert tab.value("document.cookie") == ""  # no script can read it
 
 
-def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab):
+def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab) -> None:
     with ConsoleServer(0) as server, elsewhere() as foreign:
         tab.call("Page.navigate", url=foreign)
         tab.until("document.body")
@@ -110,12 +114,12 @@ def elsewhere():
 
 class Elsewhere:
     class Answer(BaseHTTPRequestHandler):
-        def do_GET(self):
+        def do_GET(self) -> None:
             self.send_response(200)
             self.end_headers()
             self.wfile.write(b"<body>somewhere else</body>")
 
-        def log_message(self, *told):
+        def log_message(self, *told: object) -> None:
             pass
 
     def __enter__(self):
@@ -123,15 +127,15 @@ class Elsewhere:
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
         return f"http://127.0.0.1:{self._server.server_port}/"
 
-    def __exit__(self, *error):
+    def __exit__(self, *error: object) -> None:
         self._server.shutdown()
         self._server.server_close()
 
 
-def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab, other):
+def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab, other) -> None:
     with ConsoleServer(0) as server:
         take = server.viser.gui.add_button("Take control")
-        take.on_click(lambda event: server.drivers.take(event.client_id))
+        take.on_click(lambda event: server.drivers.take(present(event.client_id)))
         server.viser.make_public(take)
         tab.visit(server.url)
         until(lambda: is_driven(server), "the first page is there")
@@ -149,7 +153,7 @@ def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab, 
         assert not tab.faults()
 
 
-def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab):
+def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab) -> None:
     with ConsoleServer(0, patience=2.5) as server:
         held = []
         gizmo = server.viser.scene.add_transform_controls("/stylus", scale=2.0)
@@ -176,8 +180,8 @@ def gizmo_tip(tab):
 
 
 def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_served(
-    tab, monkeypatch
-):
+    tab, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(connection, "STUCK", 1.0)
     with ConsoleServer(0) as server:
         scene = server.viser.scene
@@ -213,7 +217,7 @@ def cloud(seed):
     return {"points": points, "colors": np.zeros((20_000, 3), np.uint8)}
 
 
-def test_page_is_led_out_of_the_machine_by_nobody(tab):
+def test_page_is_led_out_of_the_machine_by_nobody(tab) -> None:
     with ConsoleServer(0) as server:
         tab.visit(server.url)
         until(lambda: is_driven(server), "the page is there")
@@ -225,12 +229,12 @@ def test_page_is_led_out_of_the_machine_by_nobody(tab):
             server.viser.request_share_url()
 
 
-def test_port_of_another_console_is_refused_and_not_counted_up():
+def test_port_of_another_console_is_refused_and_not_counted_up() -> None:
     with ConsoleServer(0) as server, pytest.raises(SessionError, match="taken by"):
         ConsoleServer(server.port)
 
 
-def test_other_addresses_than_the_loopback_are_served_with_a_token_alone():
+def test_other_addresses_than_the_loopback_are_served_with_a_token_alone() -> None:
     with ConsoleServer(0, "0.0.0.0") as server:
         assert len(server.token) >= 32
         assert server.url == f"http://localhost:{server.port}/?token={server.token}"
@@ -243,7 +247,7 @@ def test_other_addresses_than_the_loopback_are_served_with_a_token_alone():
         assert server.token == ""
 
 
-def test_message_that_is_drawn_just_before_its_reader_waits_is_sent():
+def test_message_that_is_drawn_just_before_its_reader_waits_is_sent() -> None:
     async def read():
         # As viser makes its buffers, once the console's hooks are in place.
         buffer = _infra.AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
@@ -257,11 +261,11 @@ def test_message_that_is_drawn_just_before_its_reader_waits_is_sent():
 class AfterDrawing(deque):
     """Who waits for an event; each comes only after another thread has drawn once."""
 
-    def __init__(self, draw):
+    def __init__(self, draw) -> None:
         super().__init__()
         self._draw = draw
 
-    def append(self, waiter):
+    def append(self, waiter) -> None:
         drawing = threading.Thread(target=self._draw)
         drawing.start()
         drawing.join()

@@ -1,5 +1,7 @@
 """Sessions with every built-in fixture: its wall holds the hand, and the score tells how well."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -17,9 +19,9 @@ READING = 0.11
 pytestmark = pytest.mark.slow
 
 
-def session(kind, **settings):
+def session(kind, **settings: object):
     """Ten seconds of a person who aims beyond the fixture."""
-    more = {**SETTINGS.get(kind, {}), **settings}
+    more: dict[str, Any] = {**SETTINGS.get(kind, {}), **settings}
     return tc.run("coarse_box", duration=SECONDS, fixture=kind, **more)
 
 
@@ -39,7 +41,7 @@ def ways(recording, kind):
 
 
 @pytest.mark.parametrize("kind", [name for name in FIXTURES if "mesh" not in name])
-def test_every_fixture_holds_the_hand_and_is_scored(kind):
+def test_every_fixture_holds_the_hand_and_is_scored(kind) -> None:
     recording = session(kind)
     score = recording.score()
     assert score.fixture.kind == kind

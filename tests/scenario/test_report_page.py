@@ -5,10 +5,13 @@ import os
 import re
 import shutil
 import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
@@ -26,6 +29,9 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_JS,
     TELEOP_STATE,
 )
+
+if TYPE_CHECKING:
+    from conftest import Run
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
@@ -55,7 +61,7 @@ def browser():
     return found
 
 
-def record(path, seed, fixture=None, count=6000):
+def record(path, seed, fixture=None, count: int = 6000):
     """A live-looking recording: a tip on a curve through a fixture, with delays and a noisy hand.
 
     ``fixture`` are names and texts that describe it; None for a box, as older recordings have it.
@@ -115,7 +121,7 @@ def requested(log):
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path):
+def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     page.write_text('<body data-drawn="0"><img src="http://example.com/x.png"></body>')
     assert opened(browser, page, tmp_path)[2] == {"http://example.com/x.png"}
@@ -123,7 +129,9 @@ def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path):
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_page_of_three_recordings_draws_everything_without_asking_the_network(browser, tmp_path):
+def test_page_of_three_recordings_draws_everything_without_asking_the_network(
+    browser, tmp_path: Path
+) -> None:
     bags = [
         record(tmp_path / "box", 1),
         record(tmp_path / "sphere", 2, {"fixture": "sphere", "fixture.diameter": "0.03"}),
@@ -144,7 +152,9 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(br
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_page_of_a_session_shows_both_arms_with_their_fixtures(browser, teleop, tmp_path):
+def test_page_of_a_session_shows_both_arms_with_their_fixtures(
+    browser, teleop: "Run", tmp_path: Path
+) -> None:
     bag, page = tmp_path / "two", tmp_path / "report.html"
     arms = ("arms=[left,right]", "right/robot=puma560", "right/seed=2", "right/fixture=sphere")
     teleop("sim", "--scenario", "coarse_box", "--duration", 6, "--out", bag, "--set", *arms)
@@ -162,11 +172,13 @@ def test_page_of_a_session_shows_both_arms_with_their_fixtures(browser, teleop, 
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_page_tells_when_a_plot_cannot_be_drawn(browser, tmp_path):
+def test_page_tells_when_a_plot_cannot_be_drawn(browser, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     evaluate_bags([record(tmp_path / "live", 1)], None, page, _Silent())
     text = page.read_text()
-    data = re.search(r'id="page-data" type="application/json">(.*?)</script>', text, re.DOTALL)
+    data = present(
+        re.search(r'id="page-data" type="application/json">(.*?)</script>', text, re.DOTALL)
+    )
     broken = json.loads(data.group(1))
     broken["figures"][2]["id"] = "nowhere"
     page.write_text(text.replace(data.group(1), json.dumps(broken)))
@@ -180,5 +192,5 @@ class _Silent:
 
     width = 80
 
-    def print(self, *things, **options):
+    def print(self, *things: object, **options: object) -> None:
         pass

@@ -1,5 +1,9 @@
 """Replay of the report page: in a real browser the robot stands where the recording says."""
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -25,7 +29,12 @@ ROBOTS = ("scara", "stewart")  # of turning and sliding joints; of loops
 RATE, DURATION = 200, 8.0  # 1/s, s
 # Coordinates are rounded to 0.01 mm or mrad, and straight between moments 40 ms apart.
 TOLERANCE_MM = 0.2
-FIXTURE = {"gain": 1.0, "fixture_size_x": 0.03, "fixture_size_y": 0.03, "fixture_size_z": 0.03}
+FIXTURE: dict[str, Any] = {
+    "gain": 1.0,
+    "fixture_size_x": 0.03,
+    "fixture_size_y": 0.03,
+    "fixture_size_z": 0.03,
+}
 FIXTURE_ON = (3.0, 5.0)
 LARGEST_PAGE = 10_000_000
 CARD = """[...document.querySelectorAll('figure.card')].filter((f) =>
@@ -73,7 +82,7 @@ def record(path, name, duration=DURATION, rate=RATE):
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def page(tmp_path_factory: pytest.TempPathFactory):
     """A page with one recording of each robot, and where their tips were."""
     folder = tmp_path_factory.mktemp("replays")
     tips = [record(folder / name, name) for name in ROBOTS]
@@ -82,7 +91,7 @@ def page(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def tab(page, tmp_path_factory):
+def tab(page, tmp_path_factory: pytest.TempPathFactory):
     with Tab(tmp_path_factory.mktemp("profile"), 1200) as opened:
         opened.open(page[0])
         assert opened.value("document.body.dataset.errors") is None
@@ -90,7 +99,7 @@ def tab(page, tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def _whole(tab):
+def _whole(tab) -> Iterator[None]:
     tab.value("document.querySelectorAll('.times .all').forEach((button) => button.click())")
     tab.settled()
     yield
@@ -127,7 +136,7 @@ def recorded(tips, time):
 
 
 @pytest.mark.parametrize("number", range(len(ROBOTS)), ids=ROBOTS)
-def test_tip_is_drawn_where_the_recording_says_at_any_time(tab, page, number):
+def test_tip_is_drawn_where_the_recording_says_at_any_time(tab, page, number: int) -> None:
     _, tips = page
     for time in (0.0, 2.3456, 5.0, 7.9):
         shown = show(tab, number, time)
@@ -135,18 +144,18 @@ def test_tip_is_drawn_where_the_recording_says_at_any_time(tab, page, number):
     assert np.ptp(tips[number][1], axis=0).max() > 20 * TOLERANCE_MM  # it did move
 
 
-def test_last_solid_is_where_the_tip_is(tab, page):
+def test_last_solid_is_where_the_tip_is(tab, page) -> None:
     for time in (1.0, 6.5):
         shown = show(tab, 0, time)
         np.testing.assert_allclose(shown["ball"], shown["tip"], atol=TOLERANCE_MM)
 
 
-def test_fixture_is_drawn_while_it_is_on(tab):
+def test_fixture_is_drawn_while_it_is_on(tab) -> None:
     shown = [show(tab, 0, time)["isOn"] for time in (1.0, 4.0, 6.0)]
     assert shown == [[False], [True], [False]]
 
 
-def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab, page):
+def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab, page) -> None:
     tab.value("""(() => { const [from, to] = document.querySelectorAll('.times input');
         from.value = 2; to.value = 3; to.dispatchEvent(new Event('change')); })()""")
     tab.settled()
@@ -161,7 +170,7 @@ def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab, page):
     np.testing.assert_allclose(drawn, recorded(page[1][0], 3.0), atol=TOLERANCE_MM)
 
 
-def test_recording_without_joints_or_of_an_unknown_robot_has_no_replay(tmp_path):
+def test_recording_without_joints_or_of_an_unknown_robot_has_no_replay(tmp_path: Path) -> None:
     for name, robot in (("still", "rcrt1"), ("foreign", "no such robot")):
         recipe = Recipe()
         recipe.metadata["robot"] = robot
@@ -170,7 +179,7 @@ def test_recording_without_joints_or_of_an_unknown_robot_has_no_replay(tmp_path)
         assert "<h3>Replay</h3>" not in (tmp_path / f"{name}.html").read_text()
 
 
-def test_long_replay_stays_within_its_room(tmp_path, monkeypatch):
+def test_long_replay_stays_within_its_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metric, "RATE", 250.0)  # as many moments as ten minutes have
     record(tmp_path / "long", "stewart", duration=20.0, rate=250)
     evaluate_bags([tmp_path / "long"], None, tmp_path / "page.html", _Silent())
@@ -184,5 +193,5 @@ class _Silent:
 
     width = 80
 
-    def print(self, *things, **options):
+    def print(self, *things: object, **options: object) -> None:
         pass

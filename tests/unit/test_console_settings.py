@@ -20,7 +20,9 @@ EVERY = [
 
 
 @pytest.mark.parametrize(("node", "name", "value"), EVERY, ids=[f"{n}.{p}" for n, p, _ in EVERY])
-def test_a_value_that_is_shown_is_read_as_itself(node, name, value):
+def test_a_value_that_is_shown_is_read_as_itself(
+    node: str, name: str, value: str | float | bool | tuple[str | float, ...]
+) -> None:
     info = ParameterInfo(node, name, value)
     read = _parsed(_shown(value), info)
     assert read == value or read == pytest.approx(value)
@@ -34,19 +36,25 @@ def test_a_value_that_is_shown_is_read_as_itself(node, name, value):
         ("[a]", (1.0,), None), (3, 2, 3), (3, 2.0, 3.0), (True, False, True),
     ],
 )  # fmt: skip
-def test_lists_are_read_as_people_write_them(shown, present, wanted):
+def test_lists_are_read_as_people_write_them(
+    shown: str | int | bool,
+    present: float | bool | tuple[str | float, ...],
+    wanted: float | bool | tuple[str | float, ...] | None,
+) -> None:
     assert _parsed(shown, ParameterInfo("node", "name", present)) == wanted
 
 
 @pytest.mark.parametrize(
     "value", [(0.1, 2.0), ("a=0.1", "b"), ("ball at=[0, 1]", "box"), (), True, 3, 0.25, "hold"]
 )
-def test_a_setting_text_is_read_by_the_session_as_the_value(value):
+def test_a_setting_text_is_read_by_the_session_as_the_value(
+    value: str | float | bool | tuple[str | float, ...],
+) -> None:
     found = parse(_text(value)) if not isinstance(value, bool) else {"True": True}[_text(value)]
     assert (tuple(found) if isinstance(found, list) else found) == value
 
 
-def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back():
+def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back() -> None:
     desk = Desk()
     desk.known = {
         MODE: ParameterInfo(*MODE, "coarse", choices=("coarse", "fine")),

@@ -8,6 +8,7 @@ from numba import types
 
 from teleop_core.base.errors import KernelError
 from teleop_core.kernels import IS_COMPILED, kernel, pointer, raise_pending
+from teleop_core.kernels.geometry import Array
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
 
@@ -22,13 +23,13 @@ def call_with_row(function, row, count):
     return total
 
 
-def test_plain_function_serves_in_place_of_a_kernel():
+def test_plain_function_serves_in_place_of_a_kernel() -> None:
     @kernel
     def compiled(row, x):
         row[0] += x
         return row[0]
 
-    def plain(row, x):
+    def plain(row: Array, x: float) -> float:
         assert isinstance(x, float)
         row[0] += x
         return row[0]
@@ -41,7 +42,7 @@ def test_plain_function_serves_in_place_of_a_kernel():
     raise_pending()
 
 
-def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_each_time():
+def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_each_time() -> None:
     @kernel
     def compiled(row):
         return row[0]
@@ -57,10 +58,10 @@ def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_e
     assert pointer(compiled, real)(np.full(1, 2.5)) == 2.5
 
 
-def test_plain_function_gets_tables_flags_and_counts():
+def test_plain_function_gets_tables_flags_and_counts() -> None:
     seen = []
 
-    def plain(table, flag, count):
+    def plain(table: Array, flag: bool, count: int) -> int:
         seen.append((table.shape, flag, count))
         table[1, 2] = count
         return count + 1
@@ -78,17 +79,17 @@ def test_plain_function_gets_tables_flags_and_counts():
     assert seen[1] == ((4, 3), False, 7)
 
 
-def test_plain_function_may_return_nothing_and_may_be_any_callable():
+def test_plain_function_may_return_nothing_and_may_be_any_callable() -> None:
     class Mover:
-        def __init__(self):
+        def __init__(self) -> None:
             self.calls = 0
 
-        def __call__(self, row):
+        def __call__(self, row: Array) -> None:
             self.calls += 1
             row[:] = self.calls
 
     @kernel
-    def call(function, row):
+    def call(function, row) -> None:
         function(row)
         function(row)
 
@@ -97,8 +98,8 @@ def test_plain_function_may_return_nothing_and_may_be_any_callable():
     assert row.tolist() == [2.0, 2.0]
 
 
-def test_plain_function_called_from_python_is_itself():
-    def plain(row, x):
+def test_plain_function_called_from_python_is_itself() -> None:
+    def plain(row: Array, x: float) -> None:
         raise ValueError("from Python at once")
 
     with pytest.raises(ValueError, match="at once"):
@@ -107,8 +108,8 @@ def test_plain_function_called_from_python_is_itself():
 
 
 @compiled_only
-def test_first_exception_of_a_plain_function_waits_until_the_block_is_over():
-    def plain(row, x):
+def test_first_exception_of_a_plain_function_waits_until_the_block_is_over() -> None:
+    def plain(row: Array, x: float) -> float:
         if x >= 2.0:
             raise ValueError(f"tick {x}")
         return 1.0
@@ -122,7 +123,7 @@ def test_first_exception_of_a_plain_function_waits_until_the_block_is_over():
 
 
 @compiled_only
-def test_result_of_another_type_counts_as_an_exception():
+def test_result_of_another_type_counts_as_an_exception() -> None:
     call_with_row(
         pointer(lambda row, x: "three", types.float64(ROW, types.float64)), np.zeros(1), 1
     )
@@ -131,8 +132,8 @@ def test_result_of_another_type_counts_as_an_exception():
 
 
 @compiled_only
-def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions():
-    def plain(row, x):
+def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions() -> None:
+    def plain(row: Array, x: float) -> float:
         row[0] += 1.0
         if threading.current_thread().name == "bad":
             raise ValueError("bad")
@@ -141,7 +142,7 @@ def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions(
     function = pointer(plain, types.float64(ROW, types.float64))
     found = {}
 
-    def work():
+    def work() -> None:
         row = np.zeros(2)
         total = call_with_row(function, row, 2_000)
         try:
@@ -181,7 +182,7 @@ def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions(
         ),
     ],
 )
-def test_signature_that_a_plain_function_cannot_have_is_refused(signature, message):
+def test_signature_that_a_plain_function_cannot_have_is_refused(signature, message: str) -> None:
     def takes_two(row, x):
         return 0.0
 
