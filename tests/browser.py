@@ -5,6 +5,7 @@ import os
 import shutil
 import socket
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback", "THREE.Clock")
 KEYS = {" ": ("Space", 32), "Escape": ("Escape", 27), "Enter": ("Enter", 13)}
 
 
-def chromium():
+def chromium() -> str:
     """Path of a browser; the test is skipped without one, in CI it fails."""
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
@@ -53,7 +54,7 @@ class Tab(Headless):
     ``answers`` the status of each answer.
     """
 
-    def __init__(self, folder, width: int = 1400, height: int = 900) -> None:
+    def __init__(self, folder: Path, width: int = 1400, height: int = 900) -> None:
         self.errors, self.asked, self.answers = [], [], {}
         super().__init__(chromium(), folder, width, height, FLAGS)
         for domain in ("Network", "Log"):
@@ -167,7 +168,7 @@ class Tab(Headless):
                     box.y + box.height * (0.5 - 0.5 * y / w)];
         }})()""")
 
-    def place_of(self, node):
+    def place_of(self, node) -> str:
         """Expression of the place of a node of viser's scene in its parent's frame [m]."""
         return f"{VIEWER}.nodeRefFromName[{json.dumps(node)}].position.toArray()"
 
@@ -202,7 +203,7 @@ def until(condition: Callable[..., object], what: str, seconds: float = 60.0) ->
     return wait_until(condition, what, seconds)
 
 
-def handshake(port, path: str = "/", **headers: object):
+def handshake(port: int, path: str = "/", **headers: object):
     """First line of the answer to the opening of a WebSocket, and the socket it came on."""
     opened = socket.create_connection(("127.0.0.1", port), timeout=20)
     told = {

@@ -71,7 +71,7 @@ class Desk:
     def changes(self) -> dict[str, object]:
         return {}
 
-    def change(self, node, name, value):
+    def change(self, node, name, value) -> str:
         self.asked.append(name)
         return ""
 

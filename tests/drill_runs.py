@@ -3,9 +3,10 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 
-def run_drill(tmp_path, *arguments: object):
+def run_drill(tmp_path: Path, *arguments: object):
     """Exit code, output and outcomes by name of ``teleop drill``."""
     file = tmp_path / "drill.json"
     command = [sys.executable, "-m", "teleop_core.cli", "drill", *arguments, "--json", str(file)]

@@ -1,9 +1,14 @@
 """A hand at a device of others, for tests of nodes."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from sensor_msgs.msg import Joy
 
 from teleop_core.graph import topics
+
+if TYPE_CHECKING:
+    from ros.conftest import Peer
 
 MS = 1_000_000
 WHERE = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0]
@@ -13,7 +18,7 @@ WHERE = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0]
 class Hand:
     """A hand that moves 10 µm a sample, with the buttons of a foreign device."""
 
-    def __init__(self, peer) -> None:
+    def __init__(self, peer: "Peer") -> None:
         self._peer, self._stamp, self._x = peer, 0, 0.0
         name = f"/{topics.MASTER_BUTTONS.name}"
         self._publisher = peer.node.create_publisher(Joy, name, 10)
@@ -32,7 +37,7 @@ class Hand:
     def engage(self, *buttons: object) -> None:
         """Tell where the slave is until it follows."""
 
-        def engaged():
+        def engaged() -> bool:
             self.move(*buttons)
             self._peer.send(topics.SLAVE_SETPOINT_CP, self._stamp, WHERE)
             return self.answers.take() >= 3
@@ -42,7 +47,7 @@ class Hand:
     def moved(self, *buttons: object):
         """How far the answers to some hundred samples go [m]."""
 
-        def answered():
+        def answered() -> bool:
             self.move(*buttons)
             return self.answers.take() > 200
 

@@ -1,6 +1,7 @@
 """Free tool: a rigid tool with several points that is dragged or flies through an object."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,7 +34,7 @@ FREE = pointer(free_acceleration, ACCELERATION)
 
 
 @kernel
-def _turn(axis, by) -> None:
+def _turn(axis: Array, by: Array) -> None:
     """Turn an axis (3,) by a rotation vector (3,) [rad]."""
     angle = math.sqrt(by[0] * by[0] + by[1] * by[1] + by[2] * by[2])
     if angle == 0.0:
@@ -51,13 +52,17 @@ def _turn(axis, by) -> None:
 
 
 @kernel
-def _place(arm, q, axis) -> None:
+def _place(
+    arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
+    q: Array,
+    axis: Array,
+) -> None:
     for k in range(3):
         arm.T[k, 3], arm.T[k, 2] = q[k], axis[k]
 
 
 @kernel
-def stored(p, contacts):
+def stored(p: object, contacts: NDArray[np.void]) -> float:
     """Energy in the springs of all points that touch [J]."""
     energy = 0.0
     for point in range(contacts.shape[0]):
@@ -71,7 +76,16 @@ def stored(p, contacts):
 
 
 @kernel
-def _drag(p, contacts, arm, q, axis, steps, felt, account) -> None:
+def _drag(
+    p: object,
+    contacts: NDArray[np.void],
+    arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
+    q: Array,
+    axis: Array,
+    steps: Array,
+    felt: Array,
+    account: Array,
+) -> None:
     push, speed, middle, energy, turned = np.empty(6), np.empty(6), np.empty(6), 0.0, 0.0
     for tick in range(len(steps)):
         _place(arm, q, axis)
@@ -95,7 +109,18 @@ def _drag(p, contacts, arm, q, axis, steps, felt, account) -> None:
 
 
 @kernel
-def _fly(p, s, contacts, arm, acceleration, dynamics, q, dq, axis, found) -> None:
+def _fly(
+    p: object,
+    s: SimulationState,
+    contacts: NDArray[np.void],
+    arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
+    acceleration: Callable[..., object],
+    dynamics: Array,
+    q: Array,
+    dq: Array,
+    axis: Array,
+    found: Array,
+) -> None:
     effort, felt, before = np.zeros(6), np.zeros(6), np.empty(6)
     for tick in range(len(found)):
         _place(arm, q, axis)

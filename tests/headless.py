@@ -6,6 +6,9 @@ import os
 import select
 import subprocess
 from itertools import count
+from pathlib import Path
+
+from numpy.typing import ArrayLike
 
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
@@ -20,7 +23,9 @@ SILENCE = 200.0
 class Headless:
     """One tab; everything it says on the console is in ``said``."""
 
-    def __init__(self, browser, folder, width: int = 1200, height: int = 900, flags=FLAGS) -> None:
+    def __init__(
+        self, browser: str, folder: Path, width: int = 1200, height: int = 900, flags=FLAGS
+    ) -> None:
         (read_here, write_there), (read_there, write_here) = os.pipe(), os.pipe()
 
         def connect() -> None:  # Chromium reads descriptor 3 and writes descriptor 4
@@ -47,7 +52,7 @@ class Headless:
             self.call(f"{domain}.enable")
         self.resize(width, height)
 
-    def __enter__(self):
+    def __enter__(self) -> "Headless":
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -57,7 +62,7 @@ class Headless:
         os.close(self._in)
         self._out.close()
 
-    def call(self, method, **parameters: object):
+    def call(self, method: str, **parameters: object):
         """Answer to a command of the DevTools protocol."""
         number = next(self._numbers)
         message = {"id": number, "method": method, "params": parameters}
@@ -72,7 +77,7 @@ class Headless:
                 return answer["result"]
             self._note(answer)
 
-    def _read(self):
+    def _read(self) -> bytes:
         while b"\0" not in self._heard:
             assert select.select([self._in], [], [], SILENCE)[0], "the browser is silent"
             more = os.read(self._in, 1 << 16)
@@ -89,12 +94,12 @@ class Headless:
             texts = [str(a.get("value", a.get("description"))) for a in event["params"]["args"]]
             self.said.append(" ".join(texts))
 
-    def resize(self, width, height) -> None:
+    def resize(self, width: int, height: int) -> None:
         """Size of the window, [px]."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
                   deviceScaleFactor=1, mobile=False)  # fmt: skip
 
-    def value(self, script):
+    def value(self, script: str):
         """Value of an expression in the page; promises are waited for."""
         answer = self.call("Runtime.evaluate", expression=script, returnByValue=True,
                            awaitPromise=True)  # fmt: skip
@@ -108,7 +113,7 @@ class Headless:
             "document.body && (document.body.dataset.finished || document.body.dataset.errors)"
         )
 
-    def until(self, condition, seconds: int = 60) -> None:
+    def until(self, condition: object, seconds: int = 60) -> None:
         """Wait until an expression is true, but not for ever."""
         self.value(
             "new Promise((done, fail) => { const end = performance.now() + "
@@ -121,13 +126,13 @@ class Headless:
         """Wait until no plot is behind the visible time."""
         self.until("[...document.querySelectorAll('.times')].every((bar) => !bar.dataset.busy)")
 
-    def mouse(self, kind, x, y, clicks: int = 1) -> None:
+    def mouse(self, kind: str, x, y, clicks: int = 1) -> None:
         """Move, press or release the left button, in pixels of the window."""
         button = "none" if kind == "mouseMoved" else "left"
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button,
                   buttons=int(kind != "mouseReleased"), clickCount=clicks)  # fmt: skip
 
-    def drag(self, begin, end) -> None:
+    def drag(self, begin: ArrayLike, end: tuple[int, int, int]) -> None:
         """Drag from one point to another."""
         self.mouse("mouseMoved", *begin)
         self.mouse("mousePressed", *begin)

@@ -54,7 +54,7 @@ def needle(
 
 
 @kernel
-def _stored_in_button(p, s, depth):
+def _stored_in_button(p: SimulationNumbers, s, depth):
     """Energy that a button can give back [J] by what moves along its normal."""
     rising, falling = min(depth, p.click_travel), min(depth, p.stroke) - p.click_travel
     energy = 0.5 * p.click_force * rising * rising / p.click_travel
@@ -68,7 +68,7 @@ def _stored_in_button(p, s, depth):
 
 
 @kernel
-def _stored(p, s):
+def _stored(p: SimulationNumbers, s):
     """Energy that the object can give back [J]: by its surface, or by springs of the channel."""
     stiffness, depth, square = p.world_stiffness, max(-s.gap, 0.0), 0.0
     for k in range(3):
@@ -84,7 +84,14 @@ def _stored(p, s):
 
 
 @kernel
-def _lead(p, contacts, arm, way, felt, lost) -> None:
+def _lead(
+    p: SimulationNumbers,
+    contacts,
+    arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
+    way: Array,
+    felt: Array,
+    lost: Array,
+) -> None:
     """Lead the tip along ``way`` (N, 3), a tick each ``PIECES`` rows.
 
     Writes the force at the begin of each tick (ticks, 6), and the energy lost so far (ticks,): what

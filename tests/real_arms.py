@@ -21,7 +21,7 @@ from random_arms import row
 ARMS = json.loads((Path(__file__).parent / "data" / "arms.json").read_text(encoding="utf-8"))
 
 
-def urdf_of(name: str, effort=None) -> str:
+def urdf_of(name: str, effort: float | None = None) -> str:
     """URDF text of an arm, its links l0, l1, ... and tip; all efforts as given [N·m]."""
     arm = ARMS[name]
     lines = [f'<robot name="{name}"><link name="l0"/>']

@@ -8,6 +8,7 @@ of them do more than open their file, for minutes or for as long as somebody loo
 import io
 import shutil
 import warnings
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
 import teleop_core as tc
 from fuzzing import NASTY, assert_one_line, damaged, fuzz
@@ -100,7 +102,7 @@ def hand() -> pd.DataFrame:
     return table
 
 
-def messages(store):
+def messages(store: Typestore):
     """Poses and buttons, as the types of a version of ROS."""
     types = store.types
     more = {} if "rcl_interfaces/msg/Log" in types else {"seq": 0}
@@ -115,7 +117,7 @@ def messages(store):
         yield "/joy", stamp, types["sensor_msgs/msg/Joy"](head, axes, buttons)
 
 
-def bag1(path: Path, packing=None) -> bytes:
+def bag1(path: Path, packing: Writer1.CompressionFormat | None = None) -> bytes:
     store, writer = get_typestore(Stores.ROS1_NOETIC), Writer1(path)
     if packing is not None:
         writer.set_compression(packing)
@@ -132,7 +134,7 @@ def bag2(path: Path, storage: StoragePlugin, mode=None) -> bytes:
     return next(file for file in path.iterdir() if file.suffix != ".yaml").read_bytes()
 
 
-def _write(writer, store, serialise) -> None:
+def _write(writer: Writer1 | Writer2, store: Typestore, serialise: Callable[..., object]) -> None:
     known = {}
     with writer:
         for topic, stamp, message in messages(store):
@@ -220,7 +222,7 @@ def test_any_compressed_recording_is_imported_or_refused(folder: Path, mode) -> 
 # -- tables --------------------------------------------------------------------------------------
 
 
-def poses_table(robot) -> bytes:
+def poses_table(robot: tc.Robot) -> bytes:
     """Tip positions at random joints."""
     joints = np.random.default_rng(1).uniform(-0.3, 0.3, (8, robot.n)) + robot.start
     joints = np.clip(joints, robot.lower, robot.upper)
@@ -229,7 +231,7 @@ def poses_table(robot) -> bytes:
     return table.to_csv(index=False).encode()
 
 
-def rests_table(robot) -> bytes:
+def rests_table(robot: tc.Robot) -> bytes:
     rng = np.random.default_rng(2)
     targets = np.repeat([robot.start, robot.home], 3, axis=0)
     columns = [*(f"target_{name}" for name in robot.joint_names), *robot.joint_names]

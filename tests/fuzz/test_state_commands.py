@@ -26,7 +26,7 @@ def arm(standstill: str) -> SimulatedArm:
 ARMS = {standstill: arm(standstill) for standstill in ("hold", "brake")}
 
 
-def play(slave, words) -> None:
+def play(slave: SimulatedArm, words) -> None:
     """Send words one by one; after each the flags must agree and the setpoint keep its limits."""
     row, ns = slave.signals, 10**9
     reach = slave.robot.drives.speed_limit * 1e-3

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import FkStatus, load_robot
 from teleop_core.robots.stewart import PAIRED
 
@@ -34,7 +35,7 @@ def ball_joint_gaps(angles, legs, b: float = 1.0, a: float = 0.5):
     return np.linalg.norm(np.roll(S, -1, axis=0) - S, axis=1) - math.sqrt(3.0) * a
 
 
-def any_platform(rng):
+def any_platform(rng) -> Array:
     return np.concatenate((rng.uniform([-0.2, -0.2, 0.0], [0.2, 0.2, 0.35]), rng.normal(0, 1.2, 3)))
 
 
@@ -49,7 +50,7 @@ SEARCHES = {
 }
 
 
-def finds(name, legs, rng):
+def finds(name: str, legs, rng: np.random.Generator) -> bool:
     """Whether Newton steps of MINPACK close the loops from some random start."""
     gaps, start, _ = SEARCHES[name]
     for _ in range(STARTS):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from present import present
+from teleop_core.kernels.geometry import Array
 from teleop_core.slave.operation import OperationParameters, State
 from teleop_core.slave.operation.faults import Fault
 from teleop_core.slave.operation.states import COMMANDS
@@ -20,7 +21,7 @@ LIMIT = 1.0 + 1e-9
 class Chaos:
     """A slave that is sent anything, at any time."""
 
-    def __init__(self, robot, seed) -> None:
+    def __init__(self, robot: str, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
         self.slave = SimulatedArm(ArmParameters(
             robot=robot, starts_at_home=True,
@@ -36,7 +37,7 @@ class Chaos:
         self.worst = 0.0
         self.states = set()
 
-    def tick(self, command=None, stamp_ns=None) -> None:
+    def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> None:
         """One tick; keeps the largest step over the drive's limit."""
         self.ns += TICK_NS
         self.row["now_ns"] = self.ns
@@ -49,7 +50,7 @@ class Chaos:
         self.last = now
         self.states.add(int(self.row["slave_operation"][0]))
 
-    def stream(self, ticks) -> None:
+    def stream(self, ticks: int) -> None:
         """A stream of sound commands that wander about."""
         robot = self.slave.robot
         speed = self.rng.uniform(-1.0, 1.0, robot.n)

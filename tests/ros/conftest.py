@@ -431,7 +431,7 @@ def _composed(
 
 
 @pytest.fixture
-def compose(peer: Peer, tmp_path: Path):
+def compose(peer: Peer, tmp_path: Path) -> Iterator[Callable[..., object]]:
     """Starter of a composed session with parameters; all its nodes are active, its arm at home."""
     with ExitStack() as stack:
 
@@ -444,7 +444,7 @@ def compose(peer: Peer, tmp_path: Path):
 
 
 @pytest.fixture(scope="module")
-def composed_session(tmp_path_factory: pytest.TempPathFactory):
+def composed_session(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., object]:
     """Composed session that tests of a file share, as a context: peer, process, recording."""
 
     @contextmanager

@@ -17,7 +17,7 @@ from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    from ros.conftest import Listener, Peer
 
 pytestmark = pytest.mark.ros
 
@@ -101,11 +101,11 @@ def test_two_arms_are_recorded_together_and_scored_one_by_one(
     configuration = configure("coarse_box", settings=[*settings, "teleop.duration=600.0"])
     enough = {topic.of_arm(arm).name: 100 for arm in robots for topic in topics.STREAMS}
 
-    def has_moved(listener):
+    def has_moved(listener: "Listener") -> bool:
         values = listener.values
         return listener.take() > 300 and np.abs(values[-1] - values[0])[:3].max() > 1e-3
 
-    def is_under_way():
+    def is_under_way() -> bool:
         moved = [has_moved(listener) for listener in listeners.values()]
         return all(moved) and peer.has_recorded(enough)
 

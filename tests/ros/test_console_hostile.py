@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
 SETTLES = 1e-6  # filters come to rest within nanometres; a drag moves millimetres [m]
 
 
-def saved(driver, console, name):
+def saved(driver: PageClient, console: ConsoleProcess | float, name: str | Path) -> tc.Recording:
     """What has been recorded until now, closed under a name."""
     driver.set(driver.elements["name"], value=name)
     driver.click("Save as")

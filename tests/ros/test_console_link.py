@@ -1,5 +1,6 @@
 """Link to a live session: what the page sees is what is recorded, what it asks for happens."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,7 +42,7 @@ def live(tmp_path_factory: pytest.TempPathFactory):
             yield session, link, out
 
 
-def state(link):
+def state(link: int):
     """State of the arm as the page sees it."""
     return link.view().arms[""].operation_text.split(",")[0].split(":")[0]
 
@@ -145,7 +146,7 @@ def test_without_a_session_there_is_one_clear_error() -> None:
 
 
 def test_of_a_session_in_a_namespace_the_link_knows_arm_and_recorder(
-    compose, peer: "Peer", tmp_path: Path
+    compose: Callable[..., object], peer: "Peer", tmp_path: Path
 ) -> None:
     compose("left")
     with LiveLink(int(peer.domain)) as link:

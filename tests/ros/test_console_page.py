@@ -1,10 +1,12 @@
 """Console's page: in a real browser a person drives a live session, and its recordings prove it."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from headless import Headless
 from present import present
 
 pytest.importorskip("viser")
@@ -33,7 +35,7 @@ SHARE, STILL = 0.15, 2e-4  # m
 
 
 @pytest.fixture(scope="module")
-def console(tmp_path_factory: pytest.TempPathFactory):
+def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess]:
     folder = tmp_path_factory.mktemp("console")
     own = ("--parts", ROOT / "examples" / "own_control.py")
     started = ConsoleProcess(folder, *own, "--out", folder / "session", "--set", PATIENT)
@@ -44,7 +46,7 @@ def console(tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.fixture(scope="module")
-def page(console, tmp_path_factory: pytest.TempPathFactory):
+def page(console: ConsoleProcess, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     """The page in a browser that drives."""
     with Tab(tmp_path_factory.mktemp("browser"), *SIZE) as tab:
         tab.visit(console.url)
@@ -53,7 +55,7 @@ def page(console, tmp_path_factory: pytest.TempPathFactory):
         yield tab
 
 
-def ready(tab) -> None:
+def ready(tab: Headless) -> None:
     """Wait until the slave follows; where it paused because this machine stood still, resume.
 
     A session begins enabled, on its way to where it starts: it follows nobody until it is there.
@@ -64,14 +66,14 @@ def ready(tab) -> None:
     tab.shows("ENABLED, homed", 120)
 
 
-def arrow(tab, axis, way=PULLED):
+def arrow(tab: Headless, axis: int, way: float = PULLED):
     """Where an arrow of the stylus is seen, and where it would be a way farther [px]."""
     begin, end = np.zeros(3), np.zeros(3)
     begin[axis], end[axis] = ARROW, ARROW + way
     return tab.seen_at(GRIP, begin), tab.seen_at(GRIP, end)
 
 
-def pull(tab, axis, way=PULLED):
+def pull(tab: Headless, axis: int, way: float = PULLED):
     """Take an arrow of the stylus and pull it along itself; the button stays down."""
     grip, goal = arrow(tab, axis, way)
     tab.mouse("mouseMoved", *grip)
@@ -94,7 +96,7 @@ def rest(tab) -> None:
     }})""")
 
 
-def saved(page, console, name):
+def saved(page: str, console: float, name: str | Path):
     """What has been recorded until now, closed under a name."""
     page.fill("name", name)
     page.click("Save as")
@@ -103,17 +105,19 @@ def saved(page, console, name):
     return console.folder / name
 
 
-def way(stream):
+def way(stream: tc.Stream):
     """Where a tip went from the begin to the end of a recording [m]."""
     return stream[["x", "y", "z"]][-1] - stream[["x", "y", "z"]][0]
 
 
-def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(page, console) -> None:
+def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(
+    page: Headless, console: ConsoleProcess
+) -> None:
     assert not page.faults()
     assert page.hosts() == {console.url.split("/")[2]}
 
 
-def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page) -> None:
+def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page: Headless) -> None:
     for told in ("at most 20 mm/s", "at most what its joints make"):
         page.click("Gentle")
         page.shows(told)
@@ -121,7 +125,7 @@ def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page) -> No
 
 @pytest.mark.parametrize(("axis", "by"), [(0, "mouse"), (1, "mouse"), (1, "finger")])
 def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(
-    page, console, axis: int, by: str
+    page: Headless, console: ConsoleProcess, axis: int, by: str
 ) -> None:
     ready(page)
     saved(page, console, f"before_{axis}_{by}")
@@ -142,7 +146,7 @@ def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(
 
 @pytest.mark.parametrize("way_in", ["button", "key"])
 def test_emergency_stop_stops_by_button_and_key_until_it_is_released(
-    page, console, way_in: str
+    page: Headless, console: ConsoleProcess, way_in: str
 ) -> None:
     ready(page)
     if way_in == "button":
@@ -159,7 +163,7 @@ def test_emergency_stop_stops_by_button_and_key_until_it_is_released(
     page.shows("ENABLED", 60)
 
 
-def test_page_that_is_loaded_again_goes_on_driving(page) -> None:
+def test_page_that_is_loaded_again_goes_on_driving(page: Headless) -> None:
     page.reload()
     page.shows("drives", 60)
     ready(page)
@@ -170,7 +174,7 @@ def test_page_that_is_loaded_again_goes_on_driving(page) -> None:
 
 
 def test_browser_that_is_closed_in_motion_leaves_the_slave_still(
-    page, console, tmp_path: Path
+    page: Headless, console: ConsoleProcess, tmp_path: Path
 ) -> None:
     ready(page)
     begin = page.value(page.place_of(TIP))
@@ -197,7 +201,9 @@ def test_browser_that_is_closed_in_motion_leaves_the_slave_still(
     assert after["teleop/state"]["is_clutched"][-1] == 1.0
 
 
-def test_recording_that_was_saved_is_scored_by_a_button(page, console) -> None:
+def test_recording_that_was_saved_is_scored_by_a_button(
+    page: Headless, console: ConsoleProcess
+) -> None:
     ready(page)
     page.mouse("mouseReleased", *pull(page, 0))
     saved(page, console, "to_score")
@@ -207,7 +213,9 @@ def test_recording_that_was_saved_is_scored_by_a_button(page, console) -> None:
     page.click("Drive")
 
 
-def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(page, console) -> None:
+def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(
+    page: Headless, console: ConsoleProcess
+) -> None:
     ready(page)
     page.click("Settings")
     page.fill("delays", "[nowhere=0.02]")

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections import deque
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -24,7 +25,7 @@ from std_msgs.msg import Empty
 
 from live_process import wait_until
 from present import present
-from teleop_core.kernels.geometry import framed_wrenches
+from teleop_core.kernels.geometry import Array, framed_wrenches
 from teleop_core.nodes.children import free_domain
 from teleop_drill.conformance import Verdict
 from teleop_drill.nodes.conformance import examine, left_behind
@@ -50,7 +51,7 @@ CALM: dict[str, Any] = {
 class StockClient:
     """What crtk_python_client does: reliable, ten deep, stamped now, joints without names."""
 
-    def __init__(self, peer, arm: str = "slave") -> None:
+    def __init__(self, peer: "Peer", arm: str = "slave") -> None:
         self.peer, self.arm, self.newest, self.was_busy = peer, arm, {}, False
         for name, kind in (
             ("operating_state", crtk.OperatingState), ("setpoint_cp", PoseStamped),
@@ -59,7 +60,7 @@ class StockClient:
             peer.node.create_subscription(kind, f"{arm}/{name}", self.taker(name), 10)
         self.commands = {}
 
-    def taker(self, name):
+    def taker(self, name: str) -> Callable[..., object]:
         def take(message) -> None:
             self.newest[name] = message
             if name == "operating_state":
@@ -70,14 +71,14 @@ class StockClient:
     def spin(self) -> None:
         self.peer._executor.spin_once(timeout_sec=0.02)
 
-    def wait(self, condition, what):
-        def turn():
+    def wait(self, condition: Callable[[], object] | Callable[[], bool], what: str):
+        def turn() -> object:
             self.spin()
             return condition()
 
         return self.peer.wait(turn, what)
 
-    def send(self, name, message) -> None:
+    def send(self, name: str, message) -> None:
         if name not in self.commands:
             own = self.peer.node.create_publisher(type(message), f"{self.arm}/{name}", 10)
             self.commands[name] = own
@@ -90,15 +91,15 @@ class StockClient:
         found = self.newest.get("operating_state")
         return found and (found.state, found.is_homed, found.is_busy)
 
-    def reaches(self, state):
+    def reaches(self, state: tuple[str, bool, bool]):
         return self.wait(lambda: self.state() == state, f"{state}, not {self.state()}")
 
-    def joints(self):
+    def joints(self) -> Array:
         return np.array(self.newest["setpoint_js"].position)
 
 
 @pytest.fixture
-def client(peer: "Peer"):
+def client(peer: "Peer") -> StockClient:
     peer.start("slave", **CALM)
     client = StockClient(peer)
     client.reaches(("ENABLED", True, False))
@@ -106,7 +107,9 @@ def client(peer: "Peer"):
     return client
 
 
-def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(client) -> None:
+def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(
+    client: StockClient,
+) -> None:
     goal = [a + 0.05 for a in MIDDLE]
     goal[2] = 0.35
     client.was_busy = False
@@ -117,7 +120,9 @@ def test_a_move_without_names_arrives_busy_on_the_way_and_not_afterwards(client)
     client.wait(lambda: np.allclose(client.newest["goal_js"].position, goal), "goal_js")
 
 
-def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client) -> None:
+def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(
+    client: StockClient,
+) -> None:
     pose = client.newest["setpoint_cp"].pose
     goal = PoseStamped(pose=pose)
     goal.pose.position.z -= 0.01
@@ -132,7 +137,9 @@ def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client) 
     client.peer.wait_value("slave", "refused.slave/move_cp", lambda count: count == 1)
 
 
-def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client) -> None:
+def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(
+    client: StockClient,
+) -> None:
     client.send("state_command", crtk.StringStamped(string="pause"))
     client.reaches(("PAUSED", True, False))
     client.send("move_jp", JointState(position=[a - 0.05 for a in MIDDLE]))
@@ -146,7 +153,7 @@ def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client) 
     client.wait(lambda: np.array_equal(client.joints(), MIDDLE), "where it was")
 
 
-def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client) -> None:
+def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client: StockClient) -> None:
     goal = [a + 0.02 for a in MIDDLE]
     goal[2] = 0.36
     peer, received = client.peer, 0.0
@@ -159,7 +166,7 @@ def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client) -> None:
     client.wait(lambda: np.allclose(client.joints(), goal, atol=1e-6), "the reference")
 
 
-def test_speeds_end_with_the_messages_and_hold_ends_a_move(client) -> None:
+def test_speeds_end_with_the_messages_and_hold_ends_a_move(client: StockClient) -> None:
     before = client.joints()
     for _ in range(10):
         client.send("servo_jv", JointState(velocity=[0.05, 0.0, 0.0, 0.0, 0.0, 0.0]))
@@ -176,12 +183,14 @@ def test_speeds_end_with_the_messages_and_hold_ends_a_move(client) -> None:
     assert client.joints()[2] > goal[2] + 0.001
 
 
-def six(wrench):
+def six(wrench) -> Array:
     force, torque = wrench.force, wrench.torque
     return np.array([force.x, force.y, force.z, torque.x, torque.y, torque.z])
 
 
-def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_stamp(client) -> None:
+def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_stamp(
+    client: StockClient,
+) -> None:
     node, newest = client.peer.node, client.newest
     for name in ("body/measured_cf", "spatial/measured_cf"):
         node.create_subscription(WrenchStamped, f"slave/{name}", client.taker(name), 10)
@@ -189,7 +198,7 @@ def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_sta
     message = WrenchStamped()
     message.wrench.force.x, message.wrench.torque.z = 2.0, 0.1
 
-    def tip():
+    def tip() -> Array:
         p, q = newest["measured_cp"].pose.position, newest["measured_cp"].pose.orientation
         return np.array([p.x, p.y, p.z, q.w, q.x, q.y, q.z])
 
@@ -221,7 +230,7 @@ def test_a_disabled_master_pushes_with_no_force(peer: "Peer") -> None:
 class ForeignArm(Node):
     """A small CRTK arm of somebody else, with three joints, and what is wrong with it."""
 
-    def __init__(self, context, faults) -> None:
+    def __init__(self, context: Context, faults: tuple[object, ...]) -> None:
         super().__init__("foreign", context=context, use_global_arguments=False,
                          enable_rosout=False)  # fmt: skip
         self.faults, self.state, self.q = set(faults), "ENABLED", [0.1, 0.2, 0.3]
@@ -256,7 +265,7 @@ class ForeignArm(Node):
         if self.state == "ENABLED":
             self.goal = list(message.position)
 
-    def lying(self, dt):
+    def lying(self, dt: float):
         """Joints and speeds as this arm tells them, a time after it told the last ones [s]."""
         self.past.append(list(self.q))
         before = self.past[-2] if len(self.past) > 1 else self.q
@@ -315,7 +324,7 @@ def findings_of(fault, *, may_move):
 
 
 @contextmanager
-def foreign_arm(*faults: object):
+def foreign_arm(*faults: object) -> Iterator[Arm]:
     """Client of a foreign arm with these faults, which runs meanwhile."""
     domain, context = int(free_domain()), Context()
     context.init(args=[], domain_id=domain)
@@ -343,7 +352,7 @@ LOOKED = ("", "stamp", "nan", "length", "unit", "type", "qos", "no state")
 MOVED = ("honest", "moves paused", "any word", "never busy", "frozen", "scaled", "late", "speeds")
 
 
-def examined(faults, *, may_move):
+def examined(faults: tuple[str, str, str, str, str, str, str, str], *, may_move: bool):
     """What is found of foreign arms, by fault: several at once, since each test mostly waits."""
     with ThreadPoolExecutor(4) as pool:
         return {fault: pool.submit(findings_of, fault, may_move=may_move) for fault in faults}
@@ -437,7 +446,7 @@ def test_a_test_that_is_interrupted_claims_no_recording() -> None:
     assert process.returncode == 130
 
 
-def takes_part(domain):
+def takes_part(domain: int) -> bool:
     """Whether a participant of a ROS domain listens: DDSI-RTPS 2.5, 9.6.1.1.
 
     Looked up, not tried: a port that is tried is taken at just the wrong moment now and then.

@@ -79,7 +79,7 @@ rclpy.shutdown()
 
 
 @pytest.fixture(scope="module")
-def env(tmp_path_factory: pytest.TempPathFactory):
+def env(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Environment in which the package is found that was built just now, wherever others are."""
     prefix = tmp_path_factory.mktemp("crtk") / "prefix"
     script = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", prefix]
@@ -91,7 +91,7 @@ def env(tmp_path_factory: pytest.TempPathFactory):
     return given | {"PYTHONPATH": str(module), "LD_LIBRARY_PATH": libraries}
 
 
-def run(env, *arguments: object):
+def run(env: str | dict[str, str] | list[object], *arguments: object):
     named = env | {"ROS_DOMAIN_ID": free_domain()}
     command = [sys.executable, "-c", *arguments]
     done = subprocess.run(
@@ -101,12 +101,12 @@ def run(env, *arguments: object):
     return done.stdout.splitlines()
 
 
-def test_every_field_has_the_name_type_and_place_that_crtk_gives_it(env) -> None:
+def test_every_field_has_the_name_type_and_place_that_crtk_gives_it(env: dict[str, str]) -> None:
     shown = dict(zip(FIELDS, run(env, SHOW_FIELDS, *FIELDS), strict=True))
     assert shown == FIELDS
 
 
-def test_built_messages_cross_the_middleware(env) -> None:
+def test_built_messages_cross_the_middleware(env: dict[str, str]) -> None:
     assert run(env, SEND_AND_TAKE) == ["ENABLED True False", "FAULT"]
 
 

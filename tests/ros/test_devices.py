@@ -2,6 +2,7 @@
 
 import signal
 import time
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from teleop_core.chain.operators import OPERATORS
 from teleop_core.chain.operators.remote import AHEAD, RemoteHand
 from teleop_core.graph.topics import HAND_BUTTONS
 from teleop_core.nodes.device_hand import DeviceHand
+from virtual_pad import VirtualPad
 
 if TYPE_CHECKING:
     from ros.conftest import Peer
@@ -23,7 +25,7 @@ NODE = SimpleNamespace(get_logger=lambda: get_logger("devices"))
 
 
 @pytest.fixture
-def pad():
+def pad() -> Iterator[VirtualPad]:
     pytest.importorskip("pygame")
     from virtual_pad import VirtualPad
 
@@ -32,7 +34,7 @@ def pad():
     made.unplug()
 
 
-def opened(hand, force: float = 0.0, **parameters: object):
+def opened(hand: RemoteHand, force: float = 0.0, **parameters: object) -> DeviceHand:
     operator = OPERATORS.find("gamepad")
     return DeviceHand(
         NODE, hand, operator.opens, operator.parameters(**parameters), lambda: force
@@ -42,11 +44,11 @@ def opened(hand, force: float = 0.0, **parameters: object):
 class Clock:
     """Asks the hand at 1000 Hz of real time, as the node does."""
 
-    def __init__(self, hand) -> None:
+    def __init__(self, hand: RemoteHand) -> None:
         self._hand, self._ticks, self._begin = hand, 0, time.monotonic()
         self.row = np.zeros(12)
 
-    def until(self, condition, what) -> None:
+    def until(self, condition: object, what: str) -> None:
         deadline = time.monotonic() + 30.0
         while not condition():
             assert time.monotonic() < deadline, what
@@ -57,7 +59,9 @@ class Clock:
             time.sleep(0.002)
 
 
-def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_lost(pad) -> None:
+def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_lost(
+    pad: VirtualPad,
+) -> None:
     hand = RemoteHand()
     clock, device = Clock(hand), opened(hand, force=0.5, speed=0.1)
     try:
@@ -79,7 +83,7 @@ def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_l
         device.close()
 
 
-def test_a_gamepad_that_comes_back_is_taken_again(pad) -> None:
+def test_a_gamepad_that_comes_back_is_taken_again(pad: VirtualPad) -> None:
     from virtual_pad import VirtualPad
 
     hand = RemoteHand()

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,18 +58,18 @@ tc.register_stage(
 '''
 
 
-def change(peer, name, transition):
+def change(peer: "Peer", name: str, transition):
     """Whether a transition was made, asked for by service."""
     request = ChangeState.Request(transition=Transition(id=transition))
     return peer.call(ChangeState, f"/{name}/change_state", request).success
 
 
 @pytest.fixture
-def start(tmp_path: Path):
+def start(tmp_path: Path) -> Iterator[Callable[..., object]]:
     """Starter of a live session."""
     started = []
 
-    def start(*arguments: object, **options: Any):
+    def start(*arguments: object, **options: Any) -> LiveProcess:
         started.append(LiveProcess(tmp_path, *arguments, **options))
         return started[-1]
 
@@ -97,7 +98,7 @@ def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer: "P
 
 
 @pytest.fixture
-def composed(compose):
+def composed(compose: Callable[..., object]) -> object:
     """Process of the composed session, all its nodes active."""
     return compose(operator={"approach_time": 1.0, "patience": 0.0})
 
@@ -127,7 +128,7 @@ def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
     ],
 )
 def test_no_node_outlives_the_command_and_the_recording_is_closed(
-    start, number, composed_option: tuple[str, ...]
+    start: Callable[..., object], number, composed_option: tuple[str, ...]
 ) -> None:
     session = start(*composed_option)
     session.wait_running()
@@ -144,7 +145,9 @@ def test_no_node_outlives_the_command_and_the_recording_is_closed(
     assert left == (marks if number == signal.SIGKILL else [])
 
 
-def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_first(start) -> None:
+def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_first(
+    start: Callable[..., object],
+) -> None:
     session = start("--composed")
     session.wait_running()
     lines = [line for line in session.text.splitlines() if not line.startswith("note: ")]
@@ -157,7 +160,7 @@ def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_fir
 
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
 def test_a_stage_that_never_comes_back_is_found_within_a_second(
-    start, tmp_path: Path, composed_option: tuple[str, ...]
+    start: Callable[..., object], tmp_path: Path, composed_option: tuple[str, ...]
 ) -> None:
     parts = tmp_path / "hangs.py"
     parts.write_text(HANGS)
@@ -179,7 +182,7 @@ def test_a_stage_that_never_comes_back_is_found_within_a_second(
 
 
 def test_a_second_session_in_the_same_domain_is_refused_though_another_user_started_it(
-    start, tmp_path: Path
+    start: Callable[..., object], tmp_path: Path
 ) -> None:
     domain = {"ROS_DOMAIN_ID": free_domain()}
     first = start("--composed", env=domain)
@@ -193,7 +196,7 @@ def test_a_second_session_in_the_same_domain_is_refused_though_another_user_star
     assert first.wait() == 0, first.text
 
 
-def test_a_process_that_stands_still_ends_the_session(start) -> None:
+def test_a_process_that_stands_still_ends_the_session(start: Callable[..., object]) -> None:
     session = start()
     session.wait_running()
     (node,) = session.nodes("inverse_kinematics")
@@ -203,7 +206,9 @@ def test_a_process_that_stands_still_ends_the_session(start) -> None:
     assert session.recorded().topics["slave/measured_js"].count > 100
 
 
-def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(start, tmp_path: Path) -> None:
+def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(
+    start: Callable[..., object], tmp_path: Path
+) -> None:
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
         session = start(
@@ -221,7 +226,7 @@ def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(start, tmp_p
 @pytest.mark.soak
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
 def test_sessions_start_and_end_again_and_again(
-    start, tmp_path: Path, composed_option: tuple[str, ...]
+    start: Callable[..., object], tmp_path: Path, composed_option: tuple[str, ...]
 ) -> None:
     for number in range(3):
         folder = tmp_path / str(number)
@@ -234,7 +239,7 @@ def test_sessions_start_and_end_again_and_again(
 
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
 def test_a_session_that_a_shell_started_in_the_background_ends_like_any(
-    start, composed_option: tuple[str, ...]
+    start: Callable[..., object], composed_option: tuple[str, ...]
 ) -> None:
     session = start(*composed_option, duration=1.0, ignores=(signal.SIGINT, signal.SIGQUIT))
     for name in NODES:  # from then on nothing is started or compiled

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,7 +34,7 @@ HELD = 0.1  # rad
 class Gripper:
     """A controller of a gripper, its bridge, and the servers of jaw and arm."""
 
-    def __init__(self, peer) -> None:
+    def __init__(self, peer: "Peer") -> None:
         self.peer, self.witnessed = peer, [0.0, 0.0]
         self.measured = peer.listen(SLAVE_JAW_MEASURED_JS)
         self.setpoint = peer.listen(SLAVE_JAW_SETPOINT_JS)
@@ -45,26 +46,26 @@ class Gripper:
     def angle(self):
         return self.measured.values[-1][0] if self.measured.take() else None
 
-    def command(self, angle, until, what) -> None:
+    def command(self, angle: float, until: Callable[[], object], what: str) -> None:
         """Command an angle, as a hand does, until something is so."""
 
-        def goes_on():
+        def goes_on() -> object:
             self.peer.send(SLAVE_JAW_SERVO_JP, time.time_ns(), [angle])
             return until()
 
         self.peer.wait(goes_on, what)
 
-    def is_at(self, angle):
+    def is_at(self, angle: float) -> bool:
         found = self.angle()
         return found is not None and abs(found - angle) < 2e-3
 
-    def says(self, node, text):
+    def says(self, node: str, text: str) -> bool:
         status = self.peer.status(node)
         return status is not None and text in status.message
 
 
 @contextmanager
-def gripper(peer, kind):
+def gripper(peer: "Peer", kind: str) -> Iterator[Gripper]:
     env = environment() | {"ROS_DOMAIN_ID": peer.domain}
     controller = subprocess.Popen([sys.executable, str(CONTROLLER), kind, "gripper"], env=env)
     try:
@@ -82,7 +83,7 @@ def gripper(peer, kind):
 
 @pytest.mark.parametrize("kind", sorted(TOPICS))
 def test_a_gripper_that_holds_something_opens_only_once_the_hand_has_closed(
-    peer: "Peer", kind
+    peer: "Peer", kind: str
 ) -> None:
     with gripper(peer, kind) as found:
         peer.wait(lambda: found.is_at(HELD), "where the gripper is")

@@ -37,7 +37,7 @@ def test_a_device_with_too_few_buttons_is_told_what_to_set(peer: "Peer") -> None
     peer.start("motion_scaling")
     hand = Hand(peer)
 
-    def told():
+    def told() -> bool:
         hand.move(1, 0)
         peer.send(topics.SLAVE_SETPOINT_CP, 0, WHERE)
         return "set joy_buttons=[0, -1, 1]" in peer.status("motion_scaling").message

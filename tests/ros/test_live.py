@@ -25,7 +25,7 @@ from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME
 from teleop_core.graph.topics import STREAMS
 from teleop_core.nodes.live import live
 from teleop_core.nodes.play import play
-from teleop_core.session.configuration import configure
+from teleop_core.session.configuration import Configuration, configure
 
 if TYPE_CHECKING:
     from ros.conftest import Peer
@@ -35,17 +35,17 @@ SESSION_TIMEOUT = 300.0
 """Until a session runs, whose kernels may have to be compiled first [s]."""
 
 
-def quick(duration):
+def quick(duration: float) -> Configuration:
     return configure(
         "coarse_box", settings=[f"teleop.duration={duration}", "operator.approach_time=1.0"]
     )
 
 
-def console():
+def console() -> Console:
     return Console(file=io.StringIO(), width=200)
 
 
-def is_running(show):
+def is_running(show: Console) -> re.Match[str] | None:
     """Whether a line of progress was shown: of the first second, unless the machine was busy."""
     return re.search(r"\d/600 s  ", show.file.getvalue())
 

@@ -6,6 +6,7 @@ import select
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,7 +38,7 @@ TYPES = {"PoseStamped": PoseStamped, "TransformStamped": TransformStamped, "Pose
 class Device:
     """A stylus of the test, in millimetres: it says where it is 500 times a second."""
 
-    def __init__(self, peer, kind: str = "PoseStamped") -> None:
+    def __init__(self, peer: "Peer", kind: str = "PoseStamped") -> None:
         self.node, self.place, self.buttons, self.force = (
             peer.node,
             np.zeros(3),
@@ -71,7 +72,7 @@ class Device:
         self._joy.publish(Joy(buttons=self.buttons))
 
 
-def started(peer, kind: str = "PoseStamped"):
+def started(peer: "Peer", kind: str = "PoseStamped") -> Device:
     device = Device(peer, kind)
     peer.start(
         "master_bridge", pose_topic="/touch/pose", device_axes=AXES, unit=0.001,
@@ -81,7 +82,9 @@ def started(peer, kind: str = "PoseStamped"):
     return device
 
 
-def turning(peer, condition):
+def turning(
+    peer: "Peer", condition: Callable[[], object] | Callable[[], int | bool]
+) -> Callable[[], object]:
     """A condition, looked at once the test's own node had a turn."""
     return lambda: peer.spin() or condition()
 
@@ -95,7 +98,7 @@ def test_poses_of_each_type_arrive_in_the_axes_of_the_master_in_metres(
     device.place = np.array([10.0, 20.0, 30.0])
     expected = 1e-3 * ROWS @ device.place
 
-    def is_there():
+    def is_there() -> int | bool:
         return measured.take() and np.allclose(measured.values[-1][:3], expected, atol=1e-9)
 
     peer.wait(turning(peer, is_there), "the place")
@@ -114,7 +117,7 @@ def test_a_device_that_swings_leads_the_slave(peer: "Peer") -> None:
     peer.start("slave")
     begin = time.monotonic()
 
-    def swings():
+    def swings() -> int:
         turn = 2.0 * math.pi * 0.5 * (time.monotonic() - begin)
         device.place = np.array([0.0, 0.0, 10.0 * math.sin(turn)])  # mm; z is the master's y
         commands.take()
@@ -133,14 +136,14 @@ def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(
 ) -> None:
     device, asked = started(peer), np.array([0.5, -1.0, 0.3])
 
-    def is_pushed():
+    def is_pushed() -> bool:
         peer.send(MASTER_SERVO_CF, time.time_ns(), [*asked, 0.0, 0.0, 0.0])
         return np.allclose(device.force, ROWS.T @ asked, atol=1e-9)
 
     peer.wait(turning(peer, is_pushed), "the force")
     device.stop()
 
-    def is_free():
+    def is_free() -> bool:
         peer.send(MASTER_SERVO_CF, time.time_ns(), [*asked, 0.0, 0.0, 0.0])
         return not device.force.any()
 
@@ -150,7 +153,7 @@ def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(
 # -- map-device ------------------------------------------------------------------------------------
 
 
-def command(peer, *arguments: object):
+def command(peer: "Peer", *arguments: object) -> subprocess.Popen[str]:
     words = [sys.executable, "-m", "teleop_core.cli", "map-device", *map(str, arguments)]
     env = environment() | {"ROS_DOMAIN_ID": peer.domain, "PYTHONUNBUFFERED": "1"}
     return subprocess.Popen(
@@ -163,7 +166,7 @@ def test_three_motions_write_what_the_bridge_needs(peer: "Peer", tmp_path: Path)
     device, file, said = Device(peer), tmp_path / "mine.yaml", ""
     with command(peer, "touch/pose", "--out", file) as asking:
 
-        def asks(text, count):
+        def asks(text: str, count):
             """Whether the command has asked so often; what it says comes without an end of line."""
             nonlocal said
             peer.spin()

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
 from teleop_core.graph import topics
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.start import taken_names
 from teleop_core.robots import load_robot
@@ -30,11 +32,11 @@ MEASURED = topics.SLAVE_MEASURED_CP.name
 
 
 @pytest.fixture
-def start(peer: "Peer", tmp_path: Path):
+def start(peer: "Peer", tmp_path: Path) -> Iterator[Callable[..., object]]:
     """Starter of a composed session with a parameter file; it ends with the test."""
     started = []
 
-    def started_with(groups, *arguments: object):
+    def started_with(groups, *arguments: object) -> subprocess.Popen[bytes]:
         groups = {"recorder": {"out": str(tmp_path / "bag")}} | groups
         file = tmp_path / "session.yaml"
         content = {name: {"ros__parameters": values} for name, values in groups.items()}
@@ -53,12 +55,12 @@ def start(peer: "Peer", tmp_path: Path):
         process.wait()
 
 
-def parameter(peer, node, name):
+def parameter(peer: "Peer", node: str, name: str):
     request = GetParameters.Request(names=[name])
     return peer.call(GetParameters, f"{node}/get_parameters", request).values[0]
 
 
-def recorded(peer, process, tmp_path, *slaves: object):
+def recorded(peer: "Peer", process: Array, tmp_path: Array | Path, *slaves: object) -> Bag:
     """Recording of a session, ended when these slaves have worked for two seconds."""
     for slave in slaves:
         peer.wait_value(slave, "ticks", lambda ticks: ticks > 2000)
@@ -69,7 +71,7 @@ def recorded(peer, process, tmp_path, *slaves: object):
 
 @pytest.mark.slow
 def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
-    peer: "Peer", start, tmp_path: Path
+    peer: "Peer", start: Callable[..., object], tmp_path: Path
 ) -> None:
     groups = {"operator": PATIENCE, "slave": RCRT1 | {"command_timeout": 0.25}}
     process = start(groups, "-r", "__ns:=/left", "-r", "__node:=arm")
@@ -95,7 +97,7 @@ def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
 
 @pytest.mark.slow
 def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(
-    peer: "Peer", start, tmp_path: Path
+    peer: "Peer", start: Callable[..., object], tmp_path: Path
 ) -> None:
     puma = {"robot": "puma560"}
     groups = {

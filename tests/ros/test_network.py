@@ -30,7 +30,7 @@ DELAY = 0.15
 class Sender:
     """A program that knows nothing of the network: commands, and where a slave is."""
 
-    def __init__(self, peer) -> None:
+    def __init__(self, peer: "Peer") -> None:
         self.peer, self.sent_ns = peer, {}
 
     def send(self) -> None:
@@ -48,7 +48,7 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
     peer.start("network", there__least_delay=DELAY)
     sender, ages = Sender(peer), []
 
-    def many():
+    def many() -> int:
         sender.send()
         before = len(came.stamps)
         came.take()
@@ -65,7 +65,7 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
     assert peer.call(SetParameters, "/network/set_parameters", request).results[0].successful
     set_ns = time.monotonic_ns()
 
-    def quiet():
+    def quiet() -> bool:
         sender.send()
         came.take()
         return time.monotonic_ns() - set_ns > 3 * DELAY * 1e9
@@ -85,7 +85,7 @@ def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(
     ]  # fmt: skip
     setpoints = peer.listen(SLAVE_SETPOINT_JS)
 
-    def is_led():
+    def is_led() -> bool:
         setpoints.take()
         q = setpoints.values
         return len(q) > 1000 and np.abs(q[-1] - q[0]).max() > 2e-3

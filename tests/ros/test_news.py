@@ -8,14 +8,14 @@ from teleop_core.graph import topics
 from teleop_core.robots import load_robot
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    from ros.conftest import NodeProcess, Peer
 
 pytestmark = pytest.mark.ros
 
 HOME = load_robot("rcrt1").home
 
 
-def said(node, text):
+def said(node: "NodeProcess", text: str):
     return [line for line in node.stderr.read_text().splitlines() if text in line]
 
 

@@ -17,6 +17,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
 from teleop_core.graph.stage import STAGES
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.start import main
 from teleop_core.robots import load_robot
@@ -64,7 +65,7 @@ def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer: "Peer"
     where = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0]
     stamp = 2 * MS
 
-    def answered():
+    def answered() -> int:
         nonlocal stamp
         peer.send(topics.SLAVE_SETPOINT_CP, 0, where)
         peer.send(topics.MASTER_MEASURED_CP, stamp, REST)
@@ -117,7 +118,7 @@ def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer: "Peer") ->
     pose = np.array([*goal[:3, 3], *_quaternion(goal)])
     stamp = MS
 
-    def answered():
+    def answered() -> int:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)
@@ -136,7 +137,7 @@ def test_inverse_kinematics_warns_with_the_joint_that_holds_the_slave_back(peer:
     goal[:3, 3] += 0.01 * robot.jacobian(HOME)[:3, 2]  # 10 mm past the end of d3
     pose, stamp = np.array([*goal[:3, 3], *_quaternion(goal)]), MS
 
-    def warned():
+    def warned() -> bool:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_JS, stamp - MS, HOME)
@@ -152,7 +153,7 @@ def test_inverse_kinematics_warns_with_the_joint_that_holds_the_slave_back(peer:
     np.testing.assert_allclose(cut, robot.fk(HOME)[:3, 3] - goal[:3, 3], atol=1e-9)
 
 
-def _quaternion(transform):
+def _quaternion(transform: Array) -> Array:
     from teleop_core.kernels.geometry import pose_from_transform
 
     pose = np.empty(7)
@@ -179,7 +180,7 @@ def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer: "Peer") -> N
     assert set(setpoints.stamps) <= {topics.NO_COMMAND_NS}
     wanted, stamp = HOME - 0.001 * np.eye(6)[0], 0
 
-    def passed_on():
+    def passed_on() -> int | bool:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SERVO_JP, stamp, wanted)
@@ -187,7 +188,7 @@ def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer: "Peer") -> N
 
     peer.wait(passed_on, "stamp passed on")
 
-    def arrived():
+    def arrived() -> bool:
         passed_on()
         return np.allclose(setpoints.values[-1], wanted, atol=1e-9)
 
@@ -197,7 +198,7 @@ def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer: "Peer") -> N
     assert (steps % MS == 0).all()
 
 
-def heard_by_recorder(peer):
+def heard_by_recorder(peer: "Peer") -> int:
     """Send samples until one is recorded; returns the stamp of the last one.
 
     A best-effort writer may know its reader before the reader knows it: what it sends until then
@@ -336,7 +337,7 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer: "Peer") -> None:
         before, last = answers.values[-1], stamp
         pose[0] += 1e-3
 
-        def answered():
+        def answered() -> int | bool:
             nonlocal stamp
             stamp += MS
             peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
@@ -345,7 +346,7 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer: "Peer") -> None:
         peer.wait(answered, "answer")
         return float(np.linalg.norm(answers.values[-1][:3] - before[:3]))
 
-    def engaged():
+    def engaged() -> bool:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_CP, stamp, where)
@@ -358,7 +359,7 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer: "Peer") -> None:
     assert moved() == pytest.approx(0.25e-3, rel=1e-6)
 
 
-def change(peer, name, transition):
+def change(peer: "Peer", name: str, transition):
     request = ChangeState.Request(transition=Transition(id=transition))
     return peer.call(ChangeState, f"/{name}/change_state", request).success
 

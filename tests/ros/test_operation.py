@@ -2,11 +2,13 @@
 
 import signal
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 import psutil
 import pytest
+from rclpy.publisher import Publisher
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
@@ -25,7 +27,7 @@ HOME = load_robot("rcrt1").home
 class Streamer:
     """Commands that swing joint 1, and what the slave makes of them."""
 
-    def __init__(self, peer) -> None:
+    def __init__(self, peer: "Peer") -> None:
         self.peer, self.begin = peer, time.monotonic()
         self.setpoints = peer.listen(SLAVE_SETPOINT_JS)
         peer.publisher(SLAVE_SERVO_JP)
@@ -37,33 +39,37 @@ class Streamer:
         self.peer.send(SLAVE_SERVO_JP, time.time_ns(), goal)
         self.setpoints.take()
 
-    def until(self, condition, what):
+    def until(
+        self,
+        condition: str | Callable[[], object] | Callable[[], str | bool] | Callable[[], bool],
+        what: str,
+    ):
         """Send commands until something is so."""
 
-        def turn():
+        def turn() -> object:
             self.send()
             time.sleep(0.001)  # the rate of commands, not a wait
             return condition()
 
         return self.peer.wait(turn, what)
 
-    def moves(self):
+    def moves(self) -> bool:
         """Whether the last setpoints differ."""
         last = self.setpoints.values[-50:]
         return len(last) == 50 and np.ptp(np.array(last)[:, 0]) > 1e-3
 
-    def rests(self):
+    def rests(self) -> bool:
         """Whether the last setpoints are one and the same."""
         last = self.setpoints.values[-50:]
         return len(last) == 50 and np.ptp(np.array(last)[:, 0]) == 0.0
 
 
-def state(peer):
+def state(peer: "int | Peer") -> State | None:
     status = operation(peer)
     return None if status is None else State(int(float(status["state"])))
 
 
-def operation(peer):
+def operation(peer: "Peer"):
     """Newest report of the slave's operation, by name."""
     if not hasattr(peer, "operation"):
         from teleop_core.bags.reports import read_reports
@@ -77,7 +83,7 @@ def operation(peer):
     return peer.read or None
 
 
-def command(peer, name):
+def command(peer: "Peer", name: str):
     answer = peer.call(Trigger, f"/slave/{name}", Trigger.Request())
     return answer.success, answer.message
 
@@ -147,7 +153,7 @@ def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer
     button.publish(Bool(data=True))
     for arm in ("left", "right"):
 
-        def is_stopped(arm=arm):
+        def is_stopped(arm=arm) -> bool:
             answer = peer.call(Trigger, f"/{arm}/slave/resume", Trigger.Request())
             return not answer.success and "FAULT" in answer.message
 
@@ -155,7 +161,7 @@ def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer
 
 
 @pytest.fixture
-def button(peer: "Peer"):
+def button(peer: "Peer") -> Publisher:
     """A stop button as anybody would write it, found by a slave that is enabled."""
     peer.start("slave")
     plain = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
@@ -163,10 +169,10 @@ def button(peer: "Peer"):
     return plain
 
 
-def go_on(peer) -> None:
+def go_on(peer: "Peer") -> None:
     """Reset and enable the arm until it says that it is: what it said before is of another stop."""
 
-    def is_enabled():
+    def is_enabled() -> bool:
         if state(peer) is State.ENABLED:
             return True
         for name in ("reset", "enable"):  # what is refused is asked for again
@@ -176,13 +182,15 @@ def go_on(peer) -> None:
     peer.wait(is_enabled, "enabled again")
 
 
-def say(button, *, pressed, released) -> None:
+def say(button: Publisher, *, pressed: int, released: int) -> None:
     """So many presses, and so many releases, as fast as they go."""
     for is_pressed in (True,) * pressed + (False,) * released:
         button.publish(Bool(data=is_pressed))
 
 
-def test_a_press_that_releases_follow_at_once_stops_the_arm(peer: "Peer", button) -> None:
+def test_a_press_that_releases_follow_at_once_stops_the_arm(
+    peer: "Peer", button: Publisher
+) -> None:
     button.publish(Bool(data=False))
     for released in (1, 12, 30, 100) * 3:
         say(button, pressed=1, released=released)
@@ -191,7 +199,7 @@ def test_a_press_that_releases_follow_at_once_stops_the_arm(peer: "Peer", button
 
 
 @pytest.fixture
-def still_slave(peer: "Peer", button):
+def still_slave(peer: "Peer", button: Publisher) -> Callable[[], object]:
     """Function that stops the process of a slave that knows the button, and returns it."""
     slave = psutil.Process(peer.nodes[0].process.pid)
 
@@ -205,7 +213,7 @@ def still_slave(peer: "Peer", button):
 
 @pytest.mark.parametrize("released", [35, 6000])
 def test_a_press_while_the_slave_stands_still_stops_the_arm(
-    peer: "Peer", button, still_slave, released: int
+    peer: "Peer", button: Publisher, still_slave: Callable[[], object], released: int
 ) -> None:
     say(button, pressed=0, released=1)
     slave = still_slave()

@@ -23,13 +23,13 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "bags" / "example"
 PRESS, RELEASE = (0, 0, 1), (0, 0, 0)
 
 
-def mode(peer):
+def mode(peer: "Peer"):
     request = GetParameters.Request(names=["mode"])
     answer = peer.call(GetParameters, "/motion_scaling/get_parameters", request)
     return answer.values[0].string_value
 
 
-def press(peer, hand, expected) -> None:
+def press(peer: "Peer", hand: Hand, expected: str) -> None:
     """Press the mode button until the parameter shows the mode, and release it."""
 
     def shown():

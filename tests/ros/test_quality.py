@@ -1,5 +1,6 @@
 """Quality: streams reach subscribers of both kinds, and qos_overrides mean what they say."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -8,7 +9,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from teleop_core.base.errors import ParameterError
 from teleop_core.graph import topics
 from teleop_core.graph.stage import STAGES
-from teleop_core.graph.topics import Quality
+from teleop_core.graph.topics import Quality, Topic
 from teleop_core.nodes.quality import QualityOverrides, profile
 from teleop_core.nodes.streams import message_type
 
@@ -20,15 +21,15 @@ pytestmark = pytest.mark.ros
 JS = topics.SLAVE_MEASURED_JS
 
 
-def heard(peer, topic, qos):
+def heard(peer: "Peer", topic: Topic, qos: QoSProfile):
     """Messages of a subscription as a stock client makes it."""
     found = []
     peer.node.create_subscription(message_type(topic.kind.ros_type), topic.name, found.append, qos)
     return found
 
 
-def spun(peer, condition):
-    def done():
+def spun(peer: "Peer", condition: Callable[..., object]) -> Callable[[], object]:
+    def done() -> object:
         peer.spin()
         return condition()
 

@@ -24,11 +24,11 @@ MASTER = topics.MASTER_MEASURED_CP
 class Session:
     """A recorder and a master that sends to it."""
 
-    def __init__(self, peer, **parameters: object) -> None:
+    def __init__(self, peer: "Peer", **parameters: object) -> None:
         self.peer, self._stamp = peer, 0
         self.node = peer.start("recorder", **parameters)
 
-    def ask(self, service):
+    def ask(self, service: str | int):
         answer = self.peer.call(Trigger, f"/recorder/{service}", Trigger.Request())
         return answer.success, answer.message
 
@@ -45,7 +45,7 @@ class Session:
         self.peer.wait(heard, "samples at the recorder")
 
 
-def count(path, topic=MASTER):
+def count(path: Path, topic=MASTER) -> int:
     return Bag(path).topics[topic.name].count
 
 

@@ -13,7 +13,7 @@ from teleop_core.bags.reader import Bag, recover
 from teleop_core.graph import topics
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    from ros.conftest import NodeProcess, Peer
 
 pytestmark = pytest.mark.ros
 
@@ -21,7 +21,7 @@ LOST = 0.2
 """What a recorder that is killed may lose of the time for which it and its master worked [s]."""
 
 
-def start(peer, tmp_path):
+def start(peer: "str | Peer", tmp_path: Path) -> "NodeProcess":
     """A recorder that hears a master at 1 kHz."""
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     peer.wait_value("recorder", "received.master/measured_cp", lambda n: n >= 0)

@@ -3,11 +3,13 @@
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 import teleop_core as tc
 from teleop_core.chain.operators.rest import rest_pose
@@ -23,7 +25,7 @@ from teleop_core.graph.topics import (
 from teleop_core.nodes.children import environment
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    from ros.conftest import Listener, Peer
 
 pytestmark = pytest.mark.ros
 # A device without friction and noise goes where the hand is.
@@ -36,30 +38,32 @@ PATIENT = 5.0
 class Person:
     """Sends poses at 50 Hz, as a page does."""
 
-    def __init__(self, peer) -> None:
+    def __init__(self, peer: "Peer") -> None:
         self.peer = peer
         peer.publisher(OPERATOR_SERVO_CP)
 
-    def hold(self, place, until, what) -> None:
+    def hold(
+        self, place: ArrayLike, until: Callable[[], object] | Callable[[], bool], what: str
+    ) -> None:
         """Want the stylus at a place from the inkwell [m] until something is so."""
         pose = rest_pose()
         pose[:3] += place
 
-        def turn():
+        def turn() -> object:
             self.peer.send(OPERATOR_SERVO_CP, time.time_ns(), pose)
             time.sleep(0.02)  # the rate of poses, not a wait
             return until()
 
         self.peer.wait(turn, what)
 
-    def drag(self, begin, end, poses: int = 25) -> None:
+    def drag(self, begin: ArrayLike, end: ArrayLike, poses: int = 25) -> None:
         """Want it along a straight line, over half a second."""
         for share in np.linspace(0.0, 1.0, poses):
             self.hold((1.0 - share) * np.array(begin) + share * np.array(end), lambda: True, "")
 
 
 @pytest.fixture
-def session(compose):
+def session(compose: Callable[..., object]) -> object:
     """Composed session whose hand is a person's; a machine that stands still is no outage here."""
     return compose(
         operator={"kind": "remote", "remote": {"timeout": PATIENT}},
@@ -69,14 +73,14 @@ def session(compose):
     )
 
 
-def is_held(peer):
+def is_held(peer: "Peer") -> Callable[[], object]:
     return lambda: peer.status("operator").values.get("hand.is_held") == "1"
 
 
-def at_rest(listener, count: int = 1000):
+def at_rest(listener: "Listener", count: int = 1000) -> Callable[[], object]:
     """Whether the tip has been at rest for so many samples, but for steps of its encoders."""
 
-    def is_at_rest():
+    def is_at_rest() -> bool:
         if listener.take() < count:
             return False
         last = np.array(listener.values[-count:])[:, :3]
@@ -147,7 +151,7 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer: "Peer
     for pressed in ([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]):
         peer.send(OPERATOR_BUTTONS, time.time_ns(), pressed)
 
-    def presses():
+    def presses() -> bool:
         is_there = buttons.take() > 1
         return is_there and (np.diff(np.array(buttons.values)[:, 1]) > 0.0).sum() == 2
 
@@ -157,7 +161,7 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer: "Peer
 @pytest.mark.slow
 @pytest.mark.alone
 def test_a_recorded_hand_that_is_played_is_the_operator(
-    peer: "Peer", compose, tmp_path: Path
+    peer: "Peer", compose: Callable[..., object], tmp_path: Path
 ) -> None:
     bag = tmp_path / "hand"
     settings = {"operator.approach_time": 1.0, "tremor_amplitude": 0.0}
@@ -174,7 +178,7 @@ def test_a_recorded_hand_that_is_played_is_the_operator(
         command, stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": peer.domain}
     )
 
-    def moves():
+    def moves() -> int:
         assert player.poll() is None, "the player ended"
         return tips.take() and np.ptp(np.array(tips.values)[:, :3], axis=0).max() > 5e-3
 

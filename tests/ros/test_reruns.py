@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -31,7 +32,7 @@ def abort_outside_python():
 
 
 @pytest.fixture
-def run(tmp_path: Path):
+def run(tmp_path: Path) -> Callable[..., object]:
     """Run a test of this body in a pytest of its own: its output, and how often the test ran."""
 
     def result(body, *options: object):
@@ -49,13 +50,13 @@ def run(tmp_path: Path):
 
 
 @pytest.mark.parametrize("fault", ["assert False", "raise TimeoutError", "raise AssertionError"])
-def test_any_failure_of_ours_is_not_rerun(run, fault: str) -> None:
+def test_any_failure_of_ours_is_not_rerun(run: Callable[..., object], fault: str) -> None:
     code, out, runs = run(f"def test_it():\n    count()\n    {fault}\n")
     assert (code, runs) == (1, 1)
     assert "reruns because of the middleware" not in out
 
 
-def test_a_proven_loss_is_rerun_counted_and_named(run) -> None:
+def test_a_proven_loss_is_rerun_counted_and_named(run: Callable[..., object]) -> None:
     body = "def test_it():\n    if count() == 1:\n        raise MiddlewareLossError('3 of a/b')\n"
     code, out, runs = run(body)
     assert (code, runs) == (0, 2)
@@ -63,20 +64,22 @@ def test_a_proven_loss_is_rerun_counted_and_named(run) -> None:
     assert "test_it: middleware_faults.MiddlewareLossError: 3 of a/b" in out
 
 
-def test_a_loss_that_comes_every_time_is_a_failure(run) -> None:
+def test_a_loss_that_comes_every_time_is_a_failure(run: Callable[..., object]) -> None:
     code, out, runs = run("def test_it():\n    count()\n    raise MiddlewareLossError('all')\n")
     assert (code, runs) == (1, 3)
     assert "MiddlewareLossError 2" in out
 
 
-def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(run) -> None:
+def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(
+    run: Callable[..., object],
+) -> None:
     body = "def test_it():\n    if count() == 1:\n        abort_outside_python()\n"
     code, out, runs = run(body, "-n", "1")
     assert (code, runs) == (0, 2), out
     assert "reruns because of the middleware: MiddlewareCrashError 1" in out
 
 
-def test_a_crash_in_our_own_code_is_a_failure(run) -> None:
+def test_a_crash_in_our_own_code_is_a_failure(run: Callable[..., object]) -> None:
     body = "def test_it():\n    if count() == 1:\n        ctypes.string_at(0)\n"
     code, out, _ = run(body, "-n", "1")
     assert code == 1

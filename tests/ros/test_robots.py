@@ -2,19 +2,22 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from _pytest.compat import NotSetType
+from _pytest.mark.structures import Mark, MarkDecorator, _HiddenParam
 
 from live_process import CALM
 from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import topics
-from teleop_core.kernels.geometry import pose_from_transform, rotation, transform
+from teleop_core.kernels.geometry import Array, pose_from_transform, rotation, transform
 from teleop_core.nodes.children import environment
 from teleop_core.robots import list_robots, load_robot
+from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -37,7 +40,9 @@ MS = 1_000_000
 
 
 @pytest.fixture
-def short_session(peer: "Peer", session_until: Callable[..., tuple[Bag, str]]):
+def short_session(
+    peer: "Peer", session_until: Callable[..., tuple[Bag, str]]
+) -> Callable[..., object]:
     """Recording of two seconds of a live session, and joints (n,) that moved less than in virtual
     time.
 
@@ -45,11 +50,11 @@ def short_session(peer: "Peer", session_until: Callable[..., tuple[Bag, str]]):
     slave's own steps, of which a busy machine makes fewer.
     """
 
-    def run(setting):
+    def run(setting: str | int | list[str]):
         configuration = configure("free_motion", settings=[*SHORT, setting])
         begin = None
 
-        def has_led():
+        def has_led() -> bool:
             nonlocal begin
             operator, slave = peer.status("operator"), peer.status("slave")
             if begin is None and operator and slave and operator.number("has_begun"):
@@ -77,26 +82,33 @@ def off_grid(bag):
 
 
 @pytest.mark.parametrize("name", SLAVES)
-def test_every_slave_follows_the_hand_through_a_live_session(short_session, name) -> None:
+def test_every_slave_follows_the_hand_through_a_live_session(
+    short_session: Callable[..., object],
+    name: tuple[
+        Sequence[object | NotSetType], Collection[MarkDecorator | Mark], str | _HiddenParam | None
+    ],
+) -> None:
     bag, is_short = short_session(f"robot={name}")
     assert not is_short.any()
     assert off_grid(bag) < 1e-6
 
 
-def test_the_mma_leads_a_live_session_with_its_own_encoders(short_session) -> None:
+def test_the_mma_leads_a_live_session_with_its_own_encoders(
+    short_session: Callable[..., object],
+) -> None:
     bag, is_short = short_session("device.handle=mma")
     assert not is_short.any()
     assert off_grid(bag) > 0.1
 
 
-def send_pose(peer, stamp, T) -> None:
+def send_pose(peer: "Peer", stamp: int, T: Array) -> None:
     """Publish a pose of the slave's tip."""
     pose = np.empty(7)
     pose_from_transform(T, pose)
     peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
 
 
-def beside_home(robot):
+def beside_home(robot: Robot) -> Array:
     """Pose some millimetres and degrees away from home: further than one tick reaches."""
     home = robot.fk(robot.home)
     turn = rotation("x", 0.02) @ rotation("y", -0.01) @ rotation("z", 0.03)
@@ -104,7 +116,7 @@ def beside_home(robot):
 
 
 @pytest.fixture
-def hybrid_node(peer: "Peer"):
+def hybrid_node(peer: "Peer") -> Iterator[subprocess.Popen[bytes]]:
     """Inverse kinematics of the hybrid as ``ros2 run ... -p robot:=scara_stewart`` starts it."""
     command = [sys.executable, "-m", "teleop_core.nodes", "inverse_kinematics"]
     process = subprocess.Popen(
@@ -124,14 +136,14 @@ def hybrid_node(peer: "Peer"):
 
 
 def test_the_hybrids_node_answers_a_pose_with_joints_that_lead_there(
-    peer: "Peer", hybrid_node
+    peer: "Peer", hybrid_node: subprocess.Popen[bytes]
 ) -> None:
     robot = load_robot("scara_stewart")
     goal, answers = beside_home(robot), peer.listen(topics.SLAVE_SERVO_JP)
     written = layout(topics.SLAVE_SETPOINT_JS, robot.joint_names)
     setpoints, stamp = peer.publisher(topics.SLAVE_SETPOINT_JS), 0
 
-    def answered():
+    def answered() -> bool:
         """Send on as a slave that is always where it was told to be; 30 ms lead to the goal."""
         nonlocal stamp
         stamp += MS

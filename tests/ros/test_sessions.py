@@ -1,6 +1,7 @@
 """Several nodes together: safe with bad input, deaths and restarts, equal to virtual time."""
 
 import signal
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,13 +16,15 @@ from teleop_core.chain.mapping.inverse_kinematics import (
     InverseKinematicsParameters,
 )
 from teleop_core.graph import topics
+from teleop_core.graph.topics import Topic
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    from ros.conftest import Listener, Peer
 
 pytestmark = pytest.mark.ros
 
@@ -38,11 +41,11 @@ STEADY: dict[str, Any] = {
 }  # fmt: skip
 
 
-def drive(peer, topic, wanted, listener, start: int = 0):
+def drive(peer: "Peer", topic: Topic, wanted, listener: "Listener", start: int = 0) -> int:
     """Send a value until the slave's setpoints carry its stamp; returns that stamp."""
     stamp = start
 
-    def in_force():
+    def in_force() -> int | bool:
         nonlocal stamp
         stamp += MS
         peer.send(topic, stamp, wanted)
@@ -59,7 +62,7 @@ def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
     wanted = HOME - 0.001 * np.eye(6)[0]
     last = drive(peer, topics.SLAVE_SERVO_JP, wanted, setpoints)
 
-    def there():
+    def there() -> int | bool:
         nonlocal last
         last += MS
         peer.send(topics.SLAVE_SERVO_JP, last, wanted)
@@ -68,7 +71,7 @@ def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
     peer.wait(there, "rest")
     setpoints.forget()
 
-    def refuse(key, publish) -> None:
+    def refuse(key: str, publish: Callable[..., object]) -> None:
         """Publish until one more is refused for this reason."""
         name = f"refused.slave/servo_jp.{key}"
 
@@ -84,8 +87,8 @@ def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
     near = HOME - 0.002 * np.eye(6)[0]
     publisher = peer.publisher(topics.SLAVE_SERVO_JP)
 
-    def typed(names, position):
-        def publish(stamp) -> None:
+    def typed(names, position) -> Callable[..., object]:
+        def publish(stamp: int) -> None:
             message = JointState(name=list(names), position=list(map(float, position)))
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
             publisher.publish(message)
@@ -119,7 +122,7 @@ def test_poses_that_are_not_unit_or_not_finite_are_refused(peer: "Peer") -> None
     peer.start("inverse_kinematics")
     stamp = 0
 
-    def refuse(key, pose) -> None:
+    def refuse(key: str, pose) -> None:
         def refused():
             nonlocal stamp
             stamp += MS
@@ -144,7 +147,7 @@ def test_another_frame_and_another_order_of_joints_give_the_same_motion(peer: "P
     order = [3, 0, 5, 1, 4, 2]
     stamp = 0
 
-    def followed():
+    def followed() -> int | bool:
         nonlocal stamp
         stamp += MS
         message = JointState(
@@ -169,7 +172,7 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer: "Peer") -> None:
     pose = np.array([0.01, -0.06, -0.08, 0.8, 0.0, 0.6, 0.0])
     stamp = 0
 
-    def send(is_foreign) -> None:
+    def send(is_foreign: Topic) -> None:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_CP, 1, where)
@@ -181,11 +184,11 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer: "Peer") -> None:
         else:
             peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
 
-    def answer(is_foreign):
+    def answer(is_foreign: bool) -> Array:
         """Answer to one of the samples that are sent from now on, but the first few."""
         first = stamp + 4 * MS
 
-        def has_come():
+        def has_come() -> int | bool:
             send(is_foreign)
             return answers.take() and answers.stamps[-1] >= first
 
@@ -196,7 +199,7 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer: "Peer") -> None:
     np.testing.assert_allclose(answer(is_foreign=True), ours, atol=1e-12)
 
 
-def chain(peer, master=STEADY) -> None:
+def chain(peer: "Peer", master: dict[str, object] = STEADY) -> None:
     # On a busy machine nothing is paused, held or aligned anew while the hand moves.
     calm = {
         "slave": {"operation__longest_outage": 0.0, "command_timeout": LONGEST_TIMEOUT},
@@ -223,10 +226,10 @@ def test_the_hand_rests_until_the_slave_follows(peer: "Peer") -> None:
     peer.wait_value("operator", "has_begun", lambda n: n == 1)
 
 
-def rest(peer, listener):
+def rest(peer: "Peer", listener: "Listener") -> Array:
     """Joints of the slave once it has followed the hand to its rest."""
 
-    def is_at_rest():
+    def is_at_rest() -> bool:
         listener.take()
         q = np.array(listener.values[-1000:])[:, :6]
         travelled = np.abs(q[-1] - HOME).max() if len(q) else 0.0
@@ -236,7 +239,7 @@ def rest(peer, listener):
     return listener.values[-1][:6].copy()
 
 
-def follows(peer, setpoints) -> None:
+def follows(peer: "Peer", setpoints: "Listener") -> None:
     """Wait until commands younger than now are in force.
 
     An outage of more than two seconds has paused the arm, which goes on on purpose only.
@@ -245,7 +248,7 @@ def follows(peer, setpoints) -> None:
     peer.wait(setpoints.take, "setpoints")
     old = setpoints.stamps[-1]
 
-    def is_following():
+    def is_following() -> int | bool:
         if "PAUSED" in peer.status("slave").message:
             peer.call(Trigger, "/slave/resume", Trigger.Request())
         return setpoints.take() and setpoints.stamps[-1] > old + 500 * MS
@@ -267,7 +270,7 @@ def test_restarting_a_node_does_not_move_the_slave(peer: "Peer", name: str) -> N
     (old,) = [node for node in peer.nodes if node.name == name]
     assert old.end(signal.SIGTERM) == 0
 
-    def holds():
+    def holds() -> bool:
         measured.take()
         return peer.slave_holds()
 
@@ -327,10 +330,10 @@ def test_nodes_give_bit_equal_setpoints_to_the_core_for_the_same_commands(peer: 
     )
     peer.wait(lambda: setpoints.take() > 100, "slave/setpoint_js")
 
-    def take_all():
+    def take_all() -> int:
         return [listener.take() for listener in listeners][-1]
 
-    def wait_ticks(count) -> None:
+    def wait_ticks(count: int) -> None:
         seen = take_all()
         peer.wait(lambda: take_all() > seen + count, "ticks")
 
@@ -353,7 +356,7 @@ def test_nodes_give_bit_equal_setpoints_to_the_core_for_the_same_commands(peer: 
     _assert_core_slave_leads_alike(commands, setpoints)
 
 
-def _end_slave(peer, setpoints) -> None:
+def _end_slave(peer: "Peer", setpoints: "Listener") -> None:
     """End the slave; every setpoint of a tick was seen since the first one that was."""
     (slave,) = [node for node in peer.nodes if node.name == "slave"]
     assert slave.end(signal.SIGINT) == 0
@@ -362,7 +365,7 @@ def _end_slave(peer, setpoints) -> None:
     setpoints.insist_on_all()
 
 
-def _core_answers(poses, stamps):
+def _core_answers(poses: Array, stamps: list[int]) -> Array:
     stage = InverseKinematics(InverseKinematicsParameters(feedback_timeout=5.0))
     stage.signals["slave_setpoint_js"] = HOME
     answers = []
@@ -376,7 +379,7 @@ def _core_answers(poses, stamps):
     return np.array(answers)
 
 
-def _assert_core_slave_leads_alike(commands, setpoints) -> None:
+def _assert_core_slave_leads_alike(commands: dict[int, Array], setpoints: "Listener") -> None:
     given = ArmParameters(start=tuple(HOME.tolist()), command_timeout=LONGEST_TIMEOUT)
     stage = SimulatedArm(given)
     row = stage.signals

@@ -4,11 +4,13 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import psutil
 import pytest
+from rclpy.publisher import Publisher
 from std_msgs.msg import Bool
 
 from present import present
@@ -23,11 +25,11 @@ READER = Path(__file__).resolve().parents[1] / "stop_reader.py"
 
 
 @pytest.fixture
-def start(peer: "Peer"):
+def start(peer: "Peer") -> Iterator[Callable[..., object]]:
     """Function that starts a process which listens for so many presses."""
     started = []
 
-    def start(presses):
+    def start(presses: int) -> subprocess.Popen[str]:
         words, env = [sys.executable, str(READER), str(presses)], environment()
         process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True,
                                    env=env | {"ROS_DOMAIN_ID": peer.domain})  # fmt: skip
@@ -43,33 +45,33 @@ def start(peer: "Peer"):
         present(process.stdout).close()
 
 
-def button_of(peer):
+def button_of(peer: "Peer") -> Publisher:
     button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
     peer.wait(lambda: button.get_subscription_count() == 2, "both who hear reliable senders")
     return button
 
 
-def say(button, released) -> None:
+def say(button: Publisher, released: int) -> None:
     """A press, and so many releases after it, as fast as they go."""
     for is_pressed in (True,) + (False,) * released:
         button.publish(Bool(data=is_pressed))
 
 
-def stand_still(peer, reader):
+def stand_still(peer: "Peer", reader: object) -> float:
     reader.send_signal(signal.SIGSTOP)
     process = psutil.Process(reader.pid)
     peer.wait(lambda: process.status() == psutil.STATUS_STOPPED, "a reader that stands still")
     return time.monotonic()
 
 
-def go_on(peer, reader, since) -> None:
+def go_on(peer: "Peer", reader: object, since: float) -> None:
     """Go on after a standstill of a third of a second at least."""
     peer.wait(lambda: time.monotonic() > since + 0.3, "a standstill")
     reader.send_signal(signal.SIGCONT)
 
 
 def test_a_press_that_is_the_first_word_of_a_button_is_heard_though_the_middleware_lost_it(
-    peer: "Peer", start
+    peer: "Peer", start: Callable[..., object]
 ) -> None:
     """The middleware keeps the newest messages for who stands still; no number tells of others."""
     reader, button = start(1), button_of(peer)
@@ -81,7 +83,7 @@ def test_a_press_that_is_the_first_word_of_a_button_is_heard_though_the_middlewa
 
 
 def test_presses_of_buttons_that_were_made_while_the_listener_stood_still_are_heard(
-    peer: "Peer", start
+    peer: "Peer", start: Callable[..., object]
 ) -> None:
     """A button keeps its last ten messages for who has not found it yet.
 

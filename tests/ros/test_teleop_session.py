@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from numpy.typing import NDArray
 from std_srvs.srv import Trigger
 
 from present import present
@@ -27,7 +28,7 @@ from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
 if TYPE_CHECKING:
-    from ros.conftest import Peer
+    from ros.conftest import Listener, Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 NODES = [*BUILT_IN, RECORDER_NAME]
@@ -44,13 +45,13 @@ SETTINGS = {
 
 
 @pytest.fixture
-def session(compose):
+def session(compose: Callable[..., object]) -> object:
     """Process of the composed session, all its nodes active."""
     return compose(**SETTINGS)
 
 
 @pytest.fixture(scope="module")
-def recorded(composed_session):
+def recorded(composed_session: NDArray[np.int64]) -> Bag:
     """Recording of three seconds of a session."""
     with composed_session(**SETTINGS) as (peer, process, bag):
         peer.wait_value("slave", "ticks", lambda ticks: ticks > 3000)
@@ -59,12 +60,12 @@ def recorded(composed_session):
         return Bag(bag)
 
 
-def change(peer, name, transition) -> None:
+def change(peer: "Peer", name: str, transition) -> None:
     request = ChangeState.Request(transition=Transition(id=transition))
     assert peer.call(ChangeState, f"/{name}/change_state", request).success
 
 
-def test_a_composed_session_loses_no_sample_between_its_stages(recorded) -> None:
+def test_a_composed_session_loses_no_sample_between_its_stages(recorded: Bag) -> None:
     sample, pose, joints = (
         recorded.read(t).stamp_ns
         for t in (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP)
@@ -77,7 +78,7 @@ def test_a_composed_session_loses_no_sample_between_its_stages(recorded) -> None
     assert (np.diff(recorded.read(topics.SLAVE_MEASURED_JS).stamp_ns) == MS).all()
 
 
-def test_a_composed_session_computes_what_virtual_time_computes(recorded) -> None:
+def test_a_composed_session_computes_what_virtual_time_computes(recorded: Bag) -> None:
     live_poses = recorded.read(topics.MASTER_MEASURED_CP).values
     settings = ["operator.approach_time=1.0", "haptic_master.patience=0.0",
                 f"slave.start={HOME}", "motion_scaling.reach_force.is_on=false"]  # fmt: skip
@@ -94,7 +95,7 @@ def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer: "Peer", s
     clock = peer.node.get_clock()
     publisher = peer.publisher(topics.MASTER_MEASURED_CP, readers=2)  # scaling and recorder
 
-    def moved():
+    def moved() -> bool:
         moved.step += 1
         now = clock.now().nanoseconds
         pose = rest + np.array([0.0, 1e-5 * moved.step, 0.0, 0, 0, 0, 0])
@@ -195,7 +196,7 @@ subprocess.run([sys.executable, "-c", started], check=True)
     assert said[1] == "0"
 
 
-def rest_of(measured):
+def rest_of(measured: "Listener"):
     """Joints of an arm that has not moved for 500 samples; nothing before."""
     measured.take()
     joints = np.array(measured.values)[-500:, :6]

@@ -30,7 +30,7 @@ def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(
     )  # others do not look at what is told
     node = peer.start(name, has_arm=False, **looks)
 
-    def refused():
+    def refused() -> bool:
         for topic in reads:
             peer.publisher(topic).publish(GARBAGE)
         values = peer.status(name).values
@@ -45,7 +45,7 @@ def test_who_watches_a_session_passes_reports_over_that_are_none(peer: "Peer") -
     peer.start("motion_scaling")
     publisher = peer.publisher(topics.DIAGNOSTICS)
 
-    def counted():
+    def counted() -> int:
         publisher.publish(GARBAGE)
         peer.status("motion_scaling")
         return peer.observer.malformed
@@ -96,7 +96,7 @@ def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer: "Peer") -> N
     peer.start("motion_scaling")
     pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
 
-    def told():
+    def told() -> bool:
         peer.send(topics.MASTER_MEASURED_CP, 0, pose)
         return "its stamps are 0: stamp each" in peer.status("motion_scaling").message
 

@@ -3,6 +3,7 @@
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import chain, repeat
 from pathlib import Path
@@ -48,7 +49,7 @@ def bridge(tmp_path: Path):
 
 
 @contextmanager
-def witness(domain):
+def witness(domain: int) -> Iterator[Callable[[], object]]:
     """What the controller says of its commands: first one's distance, and the largest step."""
     context = Context()
     context.init(domain_id=domain)
@@ -88,7 +89,7 @@ def arm(*others: object):
     assert set(codes) == {0}
 
 
-def led(tmp_path, bridge, seed, *settings: object, operator: tuple[object, ...] = ()):
+def led(tmp_path: Path, bridge, seed: int, *settings: object, operator: tuple[object, ...] = ()):
     """A recorded session that leads the arm, and what the controller witnessed."""
     out = tmp_path / f"bag_{seed}"
     live = [
@@ -106,7 +107,7 @@ def led(tmp_path, bridge, seed, *settings: object, operator: tuple[object, ...] 
     return tc.open_recording(out), first, largest
 
 
-def goes_home_and_follows(recording, first, largest) -> None:
+def goes_home_and_follows(recording: tc.Recording, first, largest) -> None:
     assert first <= STEP
     assert largest <= STEP
     measured, setpoints = recording["slave/measured_js"], recording["slave/setpoint_js"]
@@ -154,7 +155,7 @@ def test_a_person_at_the_console_leads_it_without_a_jump(
             tip, stylus = present(seen.get(SLAVE_MEASURED_CP))[:3], seen.get(MASTER_MEASURED_CP)[:7]
             ways = chain(np.linspace(0.0, _PULLED, 100), repeat(_PULLED))  # a grip moves nothing
 
-            def is_pulled():
+            def is_pulled() -> bool:
                 link.hold("", stylus + next(ways) * np.eye(7)[0])
                 link.view()
                 return (

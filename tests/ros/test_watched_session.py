@@ -1,5 +1,7 @@
 """A composed session as others see it, who subscribe, set parameters or never read: one for all."""
 
+from collections.abc import Callable
+
 import pytest
 
 from teleop_core.graph.topics import STREAMS
@@ -8,7 +10,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def watched(composed_session):
+def watched(composed_session: Callable[..., object]):
     """Peer of a session that goes on while tests look at it."""
     operator = {"approach_time": 1.0, "patience": 0.0}
     scaling = {"reach_force": {"is_on": False}}

@@ -37,7 +37,7 @@ def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_
     peer.node.create_subscription(MarkerArray, "/teleop/markers", drawn.append, 10)
     stamps = iter(range(MS, 10**6 * MS, MS))
 
-    def sent():
+    def sent() -> bool:
         stamp_ns = next(stamps)
         peer.send(SLAVE_MEASURED_JS, stamp_ns, joints)
         peer.send(SLAVE_MEASURED_CP, stamp_ns, tip)

@@ -37,7 +37,7 @@ NODES = {
 
 
 @pytest.fixture(scope="module")
-def workspace(tmp_path_factory: pytest.TempPathFactory):
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Copy of the repository's workspace, links as links, built."""
     root = tmp_path_factory.mktemp("workspace")
     ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", "build", "install", "log")
@@ -49,7 +49,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory):
     return made
 
 
-def colcon(workspace, *arguments: object):
+def colcon(workspace: Path, *arguments: object):
     path = f"{COLCON.parent}:{os.environ['PATH']}"
     done = subprocess.run(
         [COLCON, *arguments], cwd=workspace, capture_output=True, text=True, timeout=900,
@@ -59,7 +59,7 @@ def colcon(workspace, *arguments: object):
     return done.stdout
 
 
-def test_the_workspace_builds_and_a_built_node_answers(workspace, peer: "Peer") -> None:
+def test_the_workspace_builds_and_a_built_node_answers(workspace: Path, peer: "Peer") -> None:
     if CAN_COMPILE:
         assert list(workspace.glob("install/crtk_msgs/lib/python*/site-packages/crtk_msgs/msg"))
     installed = workspace / "install" / "teleop_core"
@@ -83,7 +83,7 @@ def test_the_workspace_builds_and_a_built_node_answers(workspace, peer: "Peer") 
         node.wait()
 
 
-def test_teleop_of_the_workspace_finds_the_commands_of_the_other_packages(workspace) -> None:
+def test_teleop_of_the_workspace_finds_the_commands_of_the_other_packages(workspace: Path) -> None:
     packages = [
         workspace / "install" / name for name in ("teleop_core", "teleop_lab", "teleop_drill")
     ]
@@ -98,7 +98,7 @@ def test_teleop_of_the_workspace_finds_the_commands_of_the_other_packages(worksp
         assert text in done.stdout, done.stderr
 
 
-def test_colcon_test_runs_the_quick_tests_and_keeps_their_results(workspace) -> None:
+def test_colcon_test_runs_the_quick_tests_and_keeps_their_results(workspace: Path) -> None:
     select = ("--packages-select", "teleop_core")
     colcon(workspace, "test", *select, "--return-code-on-test-failure")
     results = ElementTree.parse(workspace / "build" / "teleop_core" / "pytest.xml").getroot()

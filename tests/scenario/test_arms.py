@@ -12,6 +12,7 @@ from teleop_core.base.errors import TeleopError
 from teleop_core.chain.operators import register_operator
 from teleop_core.graph.layers import parse_layer
 from teleop_core.graph.topics import STREAMS
+from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import Configuration, configure
 from teleop_core.session.runner import replay, simulate
 from teleop_core.session.virtual import VirtualTime
@@ -105,7 +106,7 @@ def test_wrong_arms_are_refused_in_one_line_before_anything_runs(
     assert "\n" not in str(error.value)
 
 
-def waits(times):
+def waits(times) -> Array:
     """Rest until the slave follows, with the delay too; then swing by 20 mm."""
     swing = 0.01 * (1.0 - np.cos(2.0 * np.pi * np.maximum(times - 0.1, 0.0)))
     return np.column_stack((swing, -swing, 0.5 * swing))
@@ -127,7 +128,9 @@ def test_delay_of_one_arm_is_not_one_of_the_other(own_parts: None) -> None:
 
 
 @pytest.mark.slow
-def test_one_recording_holds_and_replays_both_arms_to_the_bit(tmp_path: Path, both) -> None:
+def test_one_recording_holds_and_replays_both_arms_to_the_bit(
+    tmp_path: Path, both: NDArray[np.void]
+) -> None:
     configuration = settings(*ARMS, "duration=1.5")
     simulate(configuration, tmp_path / "bag")
     bag = Bag(tmp_path / "bag")

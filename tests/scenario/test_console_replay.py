@@ -1,8 +1,12 @@
 """Replay on the console's page: a real browser shows a recording as it was at any time."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from headless import Headless
+from teleop_core.kernels.geometry import Array
 
 pytest.importorskip("viser")
 
@@ -20,7 +24,7 @@ STILL = 3e-5  # poses that differ less from what is drawn are not sent [m]
 
 
 @pytest.fixture(scope="module")
-def page(recording: Path, tmp_path_factory: pytest.TempPathFactory):
+def page(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     """Page of a recording in a browser."""
     console = ConsoleProcess(tmp_path_factory.mktemp("console"), recording)
     try:
@@ -32,14 +36,14 @@ def page(recording: Path, tmp_path_factory: pytest.TempPathFactory):
         assert console.end() == 0, console.text
 
 
-def go_to(page, time) -> None:
+def go_to(page, time: float) -> None:
     """Write a time [s] beside its slider."""
     page.fill("time", f"{time:.3f}")
     page.key("Enter")
     page.until(f"{SHOWN} === '{time:.2f}'")
 
 
-def measured(recording, time):
+def measured(recording: Path, time: float) -> Array:
     """Where the tip was last measured by a time since the begin [m], as the recording says."""
     bag = Bag(recording)
     series = bag.read(SLAVE_MEASURED_CP)
@@ -49,7 +53,7 @@ def measured(recording, time):
 
 @pytest.mark.parametrize("time", [9.5, 4.25, 11.0])
 def test_tip_is_shown_where_the_recording_says_at_a_time(
-    page, recording: Path, time: float
+    page: Headless, recording: Path, time: float
 ) -> None:
     go_to(page, time)
     wanted = measured(recording, time)
@@ -58,7 +62,7 @@ def test_tip_is_shown_where_the_recording_says_at_a_time(
     assert not page.faults()
 
 
-def test_replay_plays_pauses_and_steps(page) -> None:
+def test_replay_plays_pauses_and_steps(page: Headless) -> None:
     go_to(page, 2.0)
     page.click("Play")
     page.shows("Pause")
@@ -78,12 +82,12 @@ def test_replay_plays_pauses_and_steps(page) -> None:
     page.until("!document.body.innerText.includes('Pause')")  # or the time is written over
 
 
-def test_recording_cannot_be_driven_from_the_page(page) -> None:
+def test_recording_cannot_be_driven_from_the_page(page: Headless) -> None:
     assert not page.value("document.body.innerText.includes('EMERGENCY STOP')")
     assert not page.value("document.body.innerText.includes('Initialize')")
 
 
-def test_pictures_from_tool_and_microscope_show_the_scene(page) -> None:
+def test_pictures_from_tool_and_microscope_show_the_scene(page: Headless) -> None:
     go_to(page, 6.0)
     page.click("View")
     page.click("show")

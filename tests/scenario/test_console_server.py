@@ -3,13 +3,16 @@
 import asyncio
 import threading
 from collections import deque
+from collections.abc import Iterator
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import numpy as np
 import pytest
 
+from headless import Headless
 from present import present
+from teleop_core.kernels.geometry import Array
 
 pytest.importorskip("viser")
 
@@ -30,13 +33,13 @@ CENTER = (700, 450)
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory):
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     with Tab(tmp_path_factory.mktemp("first")) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
-def other(tmp_path_factory: pytest.TempPathFactory):
+def other(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     with Tab(tmp_path_factory.mktemp("second")) as opened:
         yield opened
 
@@ -52,12 +55,12 @@ def _clean(request: pytest.FixtureRequest) -> None:
             kept.clear()
 
 
-def is_driven(server):
+def is_driven(server: ConsoleServer) -> bool:
     return server.drivers.driver is not None
 
 
 def test_page_opens_without_errors_asks_no_other_host_and_is_used(
-    tab, capfd: pytest.CaptureFixture[str]
+    tab: Headless, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with ConsoleServer(0, token="secret", label="arm") as server:
         clicks = []
@@ -75,7 +78,7 @@ def test_page_opens_without_errors_asks_no_other_host_and_is_used(
     assert capfd.readouterr() == ("", "")
 
 
-def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab) -> None:
+def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab: Headless) -> None:
     with ConsoleServer(0, token="secret") as server:
         address = server.url.split("?", maxsplit=1)[0]
         for wrong in (address, address + "?token=guess"):
@@ -89,7 +92,7 @@ def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab) -> No
         assert tab.value("document.cookie") == ""  # no script can read it
 
 
-def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab) -> None:
+def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab: Headless) -> None:
     with ConsoleServer(0) as server, elsewhere() as foreign:
         tab.call("Page.navigate", url=foreign)
         tab.until("document.body")
@@ -107,7 +110,7 @@ def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab) -
         assert server.drivers.pages == (0,)
 
 
-def elsewhere():
+def elsewhere() -> "Elsewhere":
     """Address of a harmless page that another server of this machine has."""
     return Elsewhere()
 
@@ -122,7 +125,7 @@ class Elsewhere:
         def log_message(self, *told: object) -> None:
             pass
 
-    def __enter__(self):
+    def __enter__(self) -> str:
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), self.Answer)
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
         return f"http://127.0.0.1:{self._server.server_port}/"
@@ -132,7 +135,9 @@ class Elsewhere:
         self._server.server_close()
 
 
-def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab, other) -> None:
+def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(
+    tab: Headless, other: Headless
+) -> None:
     with ConsoleServer(0) as server:
         take = server.viser.gui.add_button("Take control")
         take.on_click(lambda event: server.drivers.take(present(event.client_id)))
@@ -153,7 +158,7 @@ def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab, 
         assert not tab.faults()
 
 
-def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab) -> None:
+def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab: Headless) -> None:
     with ConsoleServer(0, patience=2.5) as server:
         held = []
         gizmo = server.viser.scene.add_transform_controls("/stylus", scale=2.0)
@@ -173,14 +178,14 @@ def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab) 
         assert server.drivers.pages == (page,)  # its connection is well: a worker answers
 
 
-def gizmo_tip(tab):
+def gizmo_tip(tab) -> tuple[int, int]:
     """A point of the upward arrow of a gizmo at the origin [px]: where the cursor grabs it."""
     tab.value("new Promise((done) => setTimeout(done, 500))")
     return (CENTER[0], CENTER[1] - 40)
 
 
 def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_served(
-    tab, monkeypatch: pytest.MonkeyPatch
+    tab: Headless, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(connection, "STUCK", 1.0)
     with ConsoleServer(0) as server:
@@ -198,7 +203,7 @@ def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_se
         until(lambda: is_driven(server), "the page is there")
         kept = []
 
-        def went():
+        def went() -> bool:
             for _ in range(20):
                 body.position = (0.001 * len(kept), 0.0, 0.0)
                 mesh.points = cloud(len(kept))["points"]
@@ -212,12 +217,12 @@ def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_se
         dead.close()
 
 
-def cloud(seed):
+def cloud(seed: int):
     points = np.random.default_rng(seed).normal(size=(20_000, 3)).astype(np.float32)
     return {"points": points, "colors": np.zeros((20_000, 3), np.uint8)}
 
 
-def test_page_is_led_out_of_the_machine_by_nobody(tab) -> None:
+def test_page_is_led_out_of_the_machine_by_nobody(tab: Headless) -> None:
     with ConsoleServer(0) as server:
         tab.visit(server.url)
         until(lambda: is_driven(server), "the page is there")
@@ -248,7 +253,7 @@ def test_other_addresses_than_the_loopback_are_served_with_a_token_alone() -> No
 
 
 def test_message_that_is_drawn_just_before_its_reader_waits_is_sent() -> None:
-    async def read():
+    async def read() -> bool:
         # As viser makes its buffers, once the console's hooks are in place.
         buffer = _infra.AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
         message = _messages.RunJavascriptMessage("drawn")
@@ -261,11 +266,11 @@ def test_message_that_is_drawn_just_before_its_reader_waits_is_sent() -> None:
 class AfterDrawing(deque):
     """Who waits for an event; each comes only after another thread has drawn once."""
 
-    def __init__(self, draw) -> None:
+    def __init__(self, draw: partial[None]) -> None:
         super().__init__()
         self._draw = draw
 
-    def append(self, waiter) -> None:
+    def append(self, waiter: int | Array | None) -> None:
         drawing = threading.Thread(target=self._draw)
         drawing.start()
         drawing.join()

@@ -4,6 +4,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from headless import Headless
+from teleop_core.console.server import ConsoleServer
+
 pytest.importorskip("viser")
 
 from browser import Tab, until
@@ -27,13 +30,13 @@ DEAD = """[...document.querySelectorAll('button')].filter((b) =>
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory):
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     with Tab(tmp_path_factory.mktemp("stop"), 390, 780) as opened:
         yield opened
 
 
 @pytest.fixture(autouse=True)
-def _clean(tab) -> Iterator[None]:
+def _clean(tab: Headless) -> Iterator[None]:
     """Each test begins with an empty tab and with no memory of errors."""
     yield
     tab.call("Page.navigate", url="about:blank")
@@ -43,7 +46,7 @@ def _clean(tab) -> Iterator[None]:
 
 @pytest.mark.parametrize("size", [(390, 780), (780, 390), (1400, 900)])
 def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pressed(
-    tab, size: tuple[int, int]
+    tab: Headless, size: tuple[int, int]
 ) -> None:
     tab.resize(*size)
     with shown(Desk(is_stoppable=True)) as (server, desk):
@@ -66,12 +69,12 @@ def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pr
         assert not tab.faults()
 
 
-def gizmos(server):
+def gizmos(server: ConsoleServer):
     """All styli's handles that the server shows."""
     return list(server.viser.scene._handle_from_transform_controls_name.values())
 
 
-def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab) -> None:
+def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab: Headless) -> None:
     with shown(Desk(is_stoppable=True)) as (server, desk):
         tab.visit(server.url)
         tab.shows("ENABLED")
@@ -85,7 +88,9 @@ def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab) -> None
         until(lambda: desk.stops == 1, "the stop is heard")
 
 
-def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_gone(tab) -> None:
+def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_gone(
+    tab: Headless,
+) -> None:
     with shown(Desk(is_stoppable=True)) as (server, desk):
         tab.visit(server.url)
         tab.shows("ENABLED")

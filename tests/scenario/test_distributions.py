@@ -25,7 +25,7 @@ sys.exit(cli.main(sys.argv[1:]))
 """Command of the core, as if neither of the others were installed."""
 
 
-def alone(*words: object, code: int = 0):
+def alone(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(
         [sys.executable, "-c", ALONE, *map(str, words)], capture_output=True, text=True, check=False
     )

@@ -29,7 +29,7 @@ TURNS = Rotation.from_rotvec(0.2 * np.column_stack((np.sin(T), np.cos(T), 0.0 * 
 
 
 @pytest.fixture(scope="module")
-def hand(tmp_path_factory: pytest.TempPathFactory):
+def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten seconds at 30 Hz with a pedal, as another program would write them."""
     names = ["time", "x", "y", "z", "qx", "qy", "qz", "qw"]
     table = pd.DataFrame(np.column_stack((T, PLACES, TURNS.as_quat())), columns=names)
@@ -40,13 +40,13 @@ def hand(tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.fixture(scope="module")
-def imported(teleop: "Run", hand, tmp_path_factory: pytest.TempPathFactory):
+def imported(teleop: "Run", hand: Path, tmp_path_factory: pytest.TempPathFactory):
     """The recording, and what the command said."""
     out = tmp_path_factory.mktemp("bags") / "hand"
     return out, teleop("import", hand, "--out", out).stdout
 
 
-def next_command(text):
+def next_command(text) -> list[str]:
     return present(re.search(r"next: teleop (.*)", text))[1].split()
 
 
@@ -80,7 +80,7 @@ def test_a_motion_goes_in_through_the_graph_and_out_unchanged(
 
 
 def test_replaying_the_file_itself_gives_the_same_motion(
-    teleop: "Run", hand, imported, tmp_path: Path
+    teleop: "Run", hand: Path, imported, tmp_path: Path
 ) -> None:
     out, text = imported
     if not (out.parent / "hand_replayed").exists():
@@ -94,7 +94,7 @@ def test_replaying_the_file_itself_gives_the_same_motion(
 
 
 def test_import_is_repeated_by_what_its_metadata_say(
-    teleop: "Run", hand, imported, tmp_path: Path
+    teleop: "Run", hand: Path, imported, tmp_path: Path
 ) -> None:
     out, _ = imported
     about = Bag(out).metadata
@@ -112,7 +112,9 @@ def test_import_is_repeated_by_what_its_metadata_say(
     assert np.array_equal(one.stamp_ns, two.stamp_ns)
 
 
-def test_axes_with_a_minus_are_values_not_options(teleop: "Run", hand, tmp_path: Path) -> None:
+def test_axes_with_a_minus_are_values_not_options(
+    teleop: "Run", hand: Path, tmp_path: Path
+) -> None:
     for number, axes in enumerate((("-y", "+x", "+z"), ("+y", "-x", "+z"), ("z", "x", "y"))):
         out = tmp_path / str(number)
         teleop("import", hand, "--out", out, "--axes", *axes, "--scale", "0.5")
@@ -153,7 +155,7 @@ def test_a_session_follows_the_recording_for_as_long_as_it_is(
     ],
 )
 def test_mistakes_are_one_line_and_leave_nothing(
-    teleop: "Run", imported, hand, tmp_path: Path, arguments: tuple[str, ...], text: str
+    teleop: "Run", imported, hand: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
 ) -> None:
     places = {"hand": hand, "out": tmp_path / "out", "bag": imported[0]}
     done = teleop(*(word.format(**places) for word in arguments), code=2)

@@ -14,6 +14,7 @@ import pytest
 from headless import Headless
 from teleop_lab import experiments
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.outcome import Outcome
 from teleop_lab.experiments.page import experiments_page
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def test_files_are_written_although_nobody_reads_the_tables_to_their_end(tmp_pat
 
 
 @pytest.fixture(scope="module")
-def browser():
+def browser() -> str:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
         pytest.skip(f"no browser to open the page with; install one of {', '.join(BROWSERS)}")
@@ -120,7 +121,7 @@ def bench() -> Bench:
 
 
 @pytest.fixture(scope="module")
-def outcomes(bench):
+def outcomes(bench: Bench) -> list[Outcome]:
     """Experiments with plots of every kind."""
     names = ("resolution", "workspace", "master_slave", "gravity", "hybrid", "mma_frames")
     return experiments.run_several(names, bench=bench)
@@ -130,7 +131,7 @@ def outcomes(bench):
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1200, 500])
 def test_page_draws_every_figure_and_is_as_wide_as_its_window(
-    browser, outcomes, tmp_path: Path, width: int
+    browser: str, outcomes: list[Outcome], tmp_path: Path, width: int
 ) -> None:
     page = tmp_path / "page.html"
     page.write_text(experiments_page(outcomes), encoding="utf-8")
@@ -146,7 +147,7 @@ def test_page_draws_every_figure_and_is_as_wide_as_its_window(
 
 
 @pytest.mark.slow
-def test_sessions_that_several_experiments_need_run_once(outcomes) -> None:
+def test_sessions_that_several_experiments_need_run_once(outcomes: list[Outcome]) -> None:
     bench = experiments.Bench(settings=SHORT)
     experiments.run("master_slave", bench=bench)
     alone = bench.runs

@@ -20,7 +20,7 @@ PEOPLE = runpy.run_path(str(EXAMPLE))["PEOPLE"] | {"tremor_um": (57.0, 69.0)}
 SINGLE = 0.1
 
 
-def figures(name, **changes: object):
+def figures(name: str, **changes: object):
     """A figure of the hand, of each seed."""
     return [score.value(f"motion.hand.{name}") for score in scores(**changes)]
 
@@ -31,7 +31,7 @@ def scores(**changes: Any):
 
 
 @pytest.mark.parametrize("name", sorted(set(PEOPLE) - {"speed_median_mm_s"}))
-def test_hand_moves_within_the_range_of_people(name) -> None:
+def test_hand_moves_within_the_range_of_people(name: Any) -> None:
     low, high = PEOPLE[name]
     values = np.array(figures(name))
     room = SINGLE * np.abs([low, high])

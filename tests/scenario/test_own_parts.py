@@ -102,7 +102,7 @@ def test_delay_on_a_late_link_comes_on_top_of_its_tick(seconds: float, ticks: in
     assert np.abs(applied).max() > 0.1
 
 
-def mirror(name, topic, **more: Any):
+def mirror(name: str, topic: Topic, **more: Any) -> Stage:
     """Stage that repeats the slave's pose, however old, under the name of its topic."""
 
     def step(parameters, state, signals, dt) -> None:
@@ -112,7 +112,9 @@ def mirror(name, topic, **more: Any):
 
 
 @pytest.mark.slow
-def test_delay_to_one_reader_leaves_the_others_in_time(own_parts: None, plain) -> None:
+def test_delay_to_one_reader_leaves_the_others_in_time(
+    own_parts: None, plain: NDArray[np.void]
+) -> None:
     first, second = (
         Topic(f"test/{name}", Kind.POSE, passed_on("slave/measured_cp")) for name in "ab"
     )
@@ -235,7 +237,7 @@ class PushParameters:
 
 @pytest.mark.parametrize("is_compiled", [True, False])
 def test_second_source_of_force_is_added_and_pushes_the_hand(
-    own_parts: None, plain, is_compiled: bool
+    own_parts: None, plain: NDArray[np.void], is_compiled: bool
 ) -> None:
     step = kernel(push_step) if is_compiled else push_step
     register_stage(Stage("contact", PushParameters, (MASTER_MEASURED_CP,), (PUSH,), step=step))

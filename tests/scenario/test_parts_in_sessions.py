@@ -129,7 +129,7 @@ def test_file_of_parts_that_raises_is_told_with_its_line(
 
 @pytest.mark.slow
 def test_command_notes_an_answer_that_nobody_reads_and_scores_without_its_file(
-    teleop: "Run", forgetful, tmp_path: Path
+    teleop: "Run", forgetful: Path, tmp_path: Path
 ) -> None:
     out, scores = tmp_path / "bag", tmp_path / "scores.json"
     done = teleop("sim", "--parts", forgetful, "--duration", 0.5, "--out", out,

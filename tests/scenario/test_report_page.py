@@ -53,7 +53,7 @@ FIXTURE = {"gain": 1.0, "is_fixture_on": 1.0, "fixture_center_x": 0.4, "fixture_
 
 
 @pytest.fixture(scope="module")
-def browser():
+def browser() -> str:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
         reason = f"no browser to open the page with; install one of {', '.join(BROWSERS)}"
@@ -61,7 +61,7 @@ def browser():
     return found
 
 
-def record(path, seed, fixture=None, count: int = 6000):
+def record(path: Path, seed: int, fixture=None, count: int = 6000) -> Path:
     """A live-looking recording: a tip on a curve through a fixture, with delays and a noisy hand.
 
     ``fixture`` are names and texts that describe it; None for a box, as older recordings have it.
@@ -93,7 +93,7 @@ def record(path, seed, fixture=None, count: int = 6000):
     return path
 
 
-def opened(browser, page, folder):
+def opened(browser: str, page: Path, folder: Path):
     """The page's body attributes after its scripts have run, console lines and requested URLs."""
     log = folder / "net.json"
     command = [browser, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}",
@@ -121,7 +121,7 @@ def requested(log):
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path: Path) -> None:
+def test_request_of_a_page_does_not_go_unnoticed(browser: str, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     page.write_text('<body data-drawn="0"><img src="http://example.com/x.png"></body>')
     assert opened(browser, page, tmp_path)[2] == {"http://example.com/x.png"}
@@ -130,7 +130,7 @@ def test_request_of_a_page_does_not_go_unnoticed(browser, tmp_path: Path) -> Non
 @pytest.mark.browser
 @pytest.mark.slow
 def test_page_of_three_recordings_draws_everything_without_asking_the_network(
-    browser, tmp_path: Path
+    browser: str, tmp_path: Path
 ) -> None:
     bags = [
         record(tmp_path / "box", 1),
@@ -153,7 +153,7 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(
 @pytest.mark.browser
 @pytest.mark.slow
 def test_page_of_a_session_shows_both_arms_with_their_fixtures(
-    browser, teleop: "Run", tmp_path: Path
+    browser: str, teleop: "Run", tmp_path: Path
 ) -> None:
     bag, page = tmp_path / "two", tmp_path / "report.html"
     arms = ("arms=[left,right]", "right/robot=puma560", "right/seed=2", "right/fixture=sphere")
@@ -172,7 +172,7 @@ def test_page_of_a_session_shows_both_arms_with_their_fixtures(
 
 @pytest.mark.browser
 @pytest.mark.slow
-def test_page_tells_when_a_plot_cannot_be_drawn(browser, tmp_path: Path) -> None:
+def test_page_tells_when_a_plot_cannot_be_drawn(browser: str, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     evaluate_bags([record(tmp_path / "live", 1)], None, page, _Silent())
     text = page.read_text()

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from browser import Tab
+from headless import Headless
 from recipes import START_NS, Recipe, state
 from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
@@ -20,8 +22,9 @@ from teleop_core.graph.topics import (
     SLAVE_SETPOINT_CP,
     TELEOP_STATE,
 )
-from teleop_core.kernels.geometry import pose_from_transform
+from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot
+from teleop_core.robots.robot import Robot
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -41,7 +44,7 @@ CARD = """[...document.querySelectorAll('figure.card')].filter((f) =>
     f.querySelector('h3').textContent === 'Replay')[{number}]"""
 
 
-def joints_of(robot, times):
+def joints_of(robot: Robot, times: Array):
     """Joints (N, n) on slow sines about home, within the limits."""
     room = np.minimum(robot.home - robot.lower, robot.upper - robot.home)
     reach = np.where(np.isfinite(room), np.minimum(0.5 * room, 0.1), 0.1)
@@ -49,7 +52,7 @@ def joints_of(robot, times):
     return robot.home + reach * np.sin(2.0 * np.pi * 0.25 * times[:, None] + phases)
 
 
-def record(path, name, duration=DURATION, rate=RATE):
+def record(path: Path, name: str, duration: float = DURATION, rate: int = RATE):
     """A recording of a robot whose joints move; returns times and places of the tip [mm]."""
     robot = load_robot(name)
     times = np.arange(int(duration * rate)) / rate
@@ -91,7 +94,7 @@ def page(tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.fixture(scope="module")
-def tab(page, tmp_path_factory: pytest.TempPathFactory):
+def tab(page, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     with Tab(tmp_path_factory.mktemp("profile"), 1200) as opened:
         opened.open(page[0])
         assert opened.value("document.body.dataset.errors") is None
@@ -99,7 +102,7 @@ def tab(page, tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.fixture(autouse=True)
-def _whole(tab) -> Iterator[None]:
+def _whole(tab: Headless) -> Iterator[None]:
     tab.value("document.querySelectorAll('.times .all').forEach((button) => button.click())")
     tab.settled()
     yield
@@ -107,7 +110,7 @@ def _whole(tab) -> Iterator[None]:
     assert tab.value("document.body.dataset.errors") is None
 
 
-def show(tab, number, time):
+def show(tab, number: int, time: float):
     """Move the slider of a replay; returns what is drawn: tip, robot's last solid, fixture."""
     card = CARD.format(number=number)
     return tab.value(f"""(async () => {{
@@ -130,13 +133,15 @@ def show(tab, number, time):
     }})()""")
 
 
-def recorded(tips, time):
+def recorded(tips: NDArray[np.int64], time: float | Array) -> Array:
     times, places = tips
     return np.array([np.interp(time, times, column) for column in places.T])
 
 
 @pytest.mark.parametrize("number", range(len(ROBOTS)), ids=ROBOTS)
-def test_tip_is_drawn_where_the_recording_says_at_any_time(tab, page, number: int) -> None:
+def test_tip_is_drawn_where_the_recording_says_at_any_time(
+    tab: Headless, page, number: int
+) -> None:
     _, tips = page
     for time in (0.0, 2.3456, 5.0, 7.9):
         shown = show(tab, number, time)
@@ -144,18 +149,18 @@ def test_tip_is_drawn_where_the_recording_says_at_any_time(tab, page, number: in
     assert np.ptp(tips[number][1], axis=0).max() > 20 * TOLERANCE_MM  # it did move
 
 
-def test_last_solid_is_where_the_tip_is(tab, page) -> None:
+def test_last_solid_is_where_the_tip_is(tab: Headless, page) -> None:
     for time in (1.0, 6.5):
         shown = show(tab, 0, time)
         np.testing.assert_allclose(shown["ball"], shown["tip"], atol=TOLERANCE_MM)
 
 
-def test_fixture_is_drawn_while_it_is_on(tab) -> None:
+def test_fixture_is_drawn_while_it_is_on(tab: Headless) -> None:
     shown = [show(tab, 0, time)["isOn"] for time in (1.0, 4.0, 6.0)]
     assert shown == [[False], [True], [False]]
 
 
-def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab, page) -> None:
+def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab: Headless, page) -> None:
     tab.value("""(() => { const [from, to] = document.querySelectorAll('.times input');
         from.value = 2; to.value = 3; to.dispatchEvent(new Event('change')); })()""")
     tab.settled()

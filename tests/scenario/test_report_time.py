@@ -3,10 +3,12 @@
 import json
 import os
 import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from headless import Headless
 from recipes import START_NS, Recipe, state
@@ -63,7 +65,7 @@ PLANE_COLUMNS = """
 
 
 @pytest.fixture(scope="module")
-def chromium():
+def chromium() -> str:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
         reason = f"no browser to open the page with; install one of {', '.join(BROWSERS)}"
@@ -71,7 +73,7 @@ def chromium():
     return found
 
 
-def noisy(count, seed):
+def noisy(count: int, seed: int) -> Recipe:
     """A recording with a moving, noisy tip and a force; limits and a clutch on the way."""
     recipe, rng = Recipe(count), np.random.default_rng(seed)
     t = np.arange(count) * 1e-3
@@ -126,7 +128,9 @@ def tabs():
 
 
 @pytest.fixture
-def opened(chromium, tabs, tmp_path_factory: pytest.TempPathFactory):
+def opened(
+    chromium: str, tabs: int, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[..., object]]:
     """Opens a page at a width; whatever goes wrong in it fails the test."""
     used = []
 
@@ -155,12 +159,12 @@ class _Silent:
         pass
 
 
-def plots(tab):
+def plots(tab: object):
     tab.settled()
     return tab.value(PLOTS)
 
 
-def ranges(tab, recording):
+def ranges(tab: object, recording: str):
     """Visible times of all plots against time of a recording, each once."""
     found = {
         (round(begin, 6), round(end, 6))
@@ -171,7 +175,7 @@ def ranges(tab, recording):
     return sorted(found)
 
 
-def show(tab, begin, end, recording: int = 0) -> None:
+def show(tab: object, begin: float, end: float, recording: int = 0) -> None:
     """Choose the visible time with the fields of a recording."""
     tab.value(
         f"""(() => {{ const bar = document.getElementById('times-{recording}');
@@ -181,7 +185,7 @@ def show(tab, begin, end, recording: int = 0) -> None:
     tab.settled()
 
 
-def area(tab, selector):
+def area(tab: tuple[int, int, float], selector: str):
     """Left, top, width and height of an element that is brought into the window, [px]."""
     return tab.value(
         f"""(() => {{ const part = document.querySelector({json.dumps(selector)});
@@ -190,7 +194,7 @@ def area(tab, selector):
     )
 
 
-def drag(tab, selector, begin, end) -> None:
+def drag(tab: tuple[int, int, float], selector: ArrayLike, begin: ArrayLike, end: str) -> None:
     """Drag over shares of the width and height of an element."""
     left, top, width, height = area(tab, selector)
     tab.drag(*((left + x * width, top + y * height) for x, y in (begin, end)))
@@ -198,7 +202,7 @@ def drag(tab, selector, begin, end) -> None:
     tab.settled()
 
 
-def curve(tab, title, name, recording: str = "one"):
+def curve(tab: object, title: str, name: str, recording: str = "one"):
     (trace,) = [t for t in plots(tab)[f"{recording}/{title}"]["traces"] if t["name"] == name]
     return np.array(trace["x"], float), np.array(trace["y"], float), trace["mode"]
 
@@ -206,7 +210,9 @@ def curve(tab, title, name, recording: str = "one"):
 # -- linked ----------------------------------------------------------------------------------------
 
 
-def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(opened, short) -> None:
+def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(
+    opened: Callable[..., object], short
+) -> None:
     tab = opened(short[0])
     whole = ranges(tab, "two")
     plot = plots(tab)[f"one/{ERROR}"]["id"]
@@ -218,7 +224,7 @@ def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(opened, short
     assert np.allclose([float(field) for field in fields], (begin, end), atol=1e-3)
 
 
-def test_panning_one_plot_moves_all(opened, short) -> None:
+def test_panning_one_plot_moves_all(opened: Callable[..., object], short) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     plot = plots(tab)[f"one/{POSITION}"]["id"]
@@ -230,7 +236,9 @@ def test_panning_one_plot_moves_all(opened, short) -> None:
     assert np.allclose((begin, end), (9.0, 13.0), atol=0.05)
 
 
-def test_double_click_on_any_plot_shows_the_whole_recording(opened, short) -> None:
+def test_double_click_on_any_plot_shows_the_whole_recording(
+    opened: Callable[..., object], short
+) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     plot = plots(tab)[f"one/{FORCE}"]["id"]
@@ -246,7 +254,9 @@ def test_double_click_on_any_plot_shows_the_whole_recording(opened, short) -> No
     assert ranges(tab, "one") == [(0.0, 19.999)]
 
 
-def test_strip_selects_moves_and_resizes_the_visible_time(opened, short) -> None:
+def test_strip_selects_moves_and_resizes_the_visible_time(
+    opened: Callable[..., object], short
+) -> None:
     tab = opened(short[0])
     strip = "#times-0 .strip"
     for begin, end, expected in (
@@ -260,7 +270,7 @@ def test_strip_selects_moves_and_resizes_the_visible_time(opened, short) -> None
         assert np.allclose((first, last), expected, atol=0.1)
 
 
-def test_keys_and_buttons_move_the_visible_time(opened, short) -> None:
+def test_keys_and_buttons_move_the_visible_time(opened: Callable[..., object], short) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     for act, expected in (("later", (11.2, 15.2)), ("earlier", (8.0, 12.0)),
@@ -275,7 +285,7 @@ def test_keys_and_buttons_move_the_visible_time(opened, short) -> None:
     assert np.allclose(ranges(tab, "one"), [(8.4, 12.4)], atol=1e-6)
 
 
-def test_range_beyond_the_recording_is_cut_to_it(opened, short) -> None:
+def test_range_beyond_the_recording_is_cut_to_it(opened: Callable[..., object], short) -> None:
     tab = opened(short[0])
     for begin, end, expected in ((-5.0, 5.0, (0.0, 10.0)), (15.0, 99.0, (0.0, 19.999)),
                                  (7.0, 7.0, (0.0, 19.999)), (19.99, 30.0, (9.989, 19.999)),
@@ -288,7 +298,7 @@ def test_range_beyond_the_recording_is_cut_to_it(opened, short) -> None:
 
 
 @pytest.mark.parametrize("count", [SHORT, LONG])
-def test_zooming_in_shows_every_sample(opened, short, long, count) -> None:
+def test_zooming_in_shows_every_sample(opened: Callable[..., object], short, long, count) -> None:
     (page, recipe), name = (long, "long") if count == LONG else ((short[0], short[1]["one"]), "one")
     tab = opened(page)
     first, last = count - 5000, count - 4900
@@ -321,7 +331,9 @@ def test_zooming_in_shows_every_sample(opened, short, long, count) -> None:
         assert np.abs(np.array(trace["y"]) - measured[at, axis]).max() < ROUNDING_MM
 
 
-def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(opened, long) -> None:
+def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(
+    opened: Callable[..., object], long
+) -> None:
     page, _ = long
     assert page.stat().st_size < LARGEST_PAGE
     tab = opened(page)
@@ -343,7 +355,9 @@ def bounds(shape):
     return [[part[0], part[1]] for part in places]
 
 
-def test_every_plot_against_time_has_the_bands_of_the_state(opened, short) -> None:
+def test_every_plot_against_time_has_the_bands_of_the_state(
+    opened: Callable[..., object], short
+) -> None:
     tab = opened(short[0])
     timed = {name: plot for name, plot in plots(tab).items() if plot["times"]}
     assert len(timed) >= 8
@@ -361,7 +375,7 @@ def test_every_plot_against_time_has_the_bands_of_the_state(opened, short) -> No
 
 
 @pytest.mark.parametrize("title", ["Path in space", "Path per plane"])
-def test_paths_show_the_visible_time(opened, short, title: str) -> None:
+def test_paths_show_the_visible_time(opened: Callable[..., object], short, title: str) -> None:
     tab = opened(short[0])
     show(tab, 5.0, 7.0)
     traces = [t for t in plots(tab)[f"one/{title}"]["traces"] if t["times"]]
@@ -378,7 +392,9 @@ def test_paths_show_the_visible_time(opened, short, title: str) -> None:
             assert np.allclose((min(times), max(times)), (0.0, 19.999), atol=1e-4)
 
 
-def test_long_path_in_a_plane_becomes_the_time_that_was_spent(opened, long) -> None:
+def test_long_path_in_a_plane_becomes_the_time_that_was_spent(
+    opened: Callable[..., object], long
+) -> None:
     tab = opened(long[0])
     kinds = {trace["type"] for trace in plots(tab)["long/Path per plane"]["traces"]}
     assert kinds == {"heatmap", "scatter"}
@@ -388,7 +404,7 @@ def test_long_path_in_a_plane_becomes_the_time_that_was_spent(opened, long) -> N
 
 
 @pytest.mark.parametrize("width", [500, 1200])
-def test_page_fits_into_the_window(opened, short, width: int) -> None:
+def test_page_fits_into_the_window(opened: Callable[..., object], short, width: int) -> None:
     tab = opened(short[0], width)
     assert tab.value("document.documentElement.scrollWidth") <= width
     for name, plot in plots(tab).items():
@@ -396,7 +412,9 @@ def test_page_fits_into_the_window(opened, short, width: int) -> None:
         assert plot["right"] <= width, name
 
 
-def test_page_follows_a_window_that_becomes_narrow_and_wide_again(opened, short) -> None:
+def test_page_follows_a_window_that_becomes_narrow_and_wide_again(
+    opened: Callable[..., object], short
+) -> None:
     tab = opened(short[0])
     for width, columns in ((500, 1), (1200, 3)):
         tab.resize(width, 900)
@@ -406,7 +424,7 @@ def test_page_follows_a_window_that_becomes_narrow_and_wide_again(opened, short)
 
 
 def test_without_scripts_there_are_tables_sketches_and_a_word(
-    chromium, short, tmp_path: Path
+    chromium: str, short, tmp_path: Path
 ) -> None:
     with Headless(chromium, tmp_path) as tab:
         tab.call("Emulation.setScriptExecutionDisabled", value=True)
@@ -424,13 +442,13 @@ def test_without_scripts_there_are_tables_sketches_and_a_word(
         assert tab.value("document.querySelector('.times').clientHeight") == 0
 
 
-def test_table_is_folded_where_scripts_run(opened, short) -> None:
+def test_table_is_folded_where_scripts_run(opened: Callable[..., object], short) -> None:
     tab = opened(short[0])
     assert tab.value("document.querySelectorAll('details.table[open]').length") == 0
     assert "position, RMS" not in tab.value("document.body.innerText")
 
 
-def test_page_in_a_browser_that_cannot_unpack_says_so(chromium, short, tmp_path: Path) -> None:
+def test_page_in_a_browser_that_cannot_unpack_says_so(chromium: str, short, tmp_path: Path) -> None:
     with Headless(chromium, tmp_path) as tab:
         source = "delete window.DecompressionStream"
         tab.call("Page.addScriptToEvaluateOnNewDocument", source=source)

@@ -10,9 +10,11 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels import kernel
+from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.elastic import integrate_elastic
 from teleop_core.slave.plants.hardware import faults_of
+from teleop_core.slave.simulation import SimulationNumbers, SimulationState
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 from teleop_core.slave.transmission import drive
 
@@ -91,7 +93,7 @@ def test_a_gear_that_swings_too_fast_for_the_ticks_is_refused() -> None:
 
 
 @kernel
-def drive_on(p, s, arm, efforts) -> None:
+def drive_on(p: SimulationNumbers, s: SimulationState, arm, efforts: Array) -> None:
     """What drives give for rows of efforts (N, 6); written in their place."""
     for k in range(efforts.shape[0]):
         for i in range(6):

@@ -41,6 +41,7 @@ from teleop_core.graph.topics import (
     TELEOP_STATE,
     Topic,
 )
+from teleop_core.kernels.geometry import Array
 
 JOINTS = ("joint_1", "joint_2")
 COUNT = 6000  # some windows
@@ -350,7 +351,7 @@ def test_accumulator_that_is_asked_for_too_late_is_refused(bag: Bag) -> None:
         def __init__(self, context) -> None:
             pass
 
-        def add(self, window) -> None:
+        def add(self, window: Array | str) -> None:
             pass
 
     class LateMetric(JerkMetric):

@@ -31,7 +31,7 @@ class Led:
 
     def tick(
         self,
-        measured=None,
+        measured: Array | None = None,
         *,
         speaks: bool = True,
         follows: bool = False,

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 
+from mutants import Mutant
 from present import present
 from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
 from teleop_core.base.parameters import build
@@ -16,7 +17,7 @@ from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
 from teleop_core.slave.plants.hardware import faults_of
-from teleop_lab.fitting.fit import FitError, default_free, fit
+from teleop_lab.fitting.fit import FitError, FitResult, default_free, fit
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 from teleop_lab.fitting.rests import rest_positions
 
@@ -25,22 +26,22 @@ ARM = load_robot("rcrt1")
 NAMES = ARM.joint_names
 
 
-def slave(**settings: object):
+def slave(**settings: object) -> ArmParameters:
     given = {"plant.kind": "hardware", "controller.kind": "source_pid"}
     return build(ArmParameters, given | settings)
 
 
 @pytest.fixture(scope="module")
-def published():
+def published() -> RestTable:
     return read_rests(PUBLISHED, ARM)
 
 
 @pytest.fixture(scope="module")
-def found(published):
+def found(published: str) -> FitResult:
     return fit(published, slave())
 
 
-def test_the_plant_has_the_numbers_that_its_fit_finds(found) -> None:
+def test_the_plant_has_the_numbers_that_its_fit_finds(found: FitResult) -> None:
     faults = faults_of(ARM)
     for number in found.numbers:
         kind, _, of = number.name.partition(".")
@@ -56,7 +57,7 @@ def test_the_plant_has_the_numbers_that_its_fit_finds(found) -> None:
         assert abs(value - number.value) < 0.15 * (number.high - number.low), number
 
 
-def test_fitted_rests_are_the_measured_ones_but_for_point_1(found) -> None:
+def test_fitted_rests_are_the_measured_ones_but_for_point_1(found: FitResult) -> None:
     off = (found.predicted - found.measured)[1:, [0, 1, 3]] / present(ARM.drives).encoder_step[
         [0, 1, 3]
     ]
@@ -74,13 +75,13 @@ def test_spread_of_runs_is_the_pooled_deviation_about_the_means_of_their_points(
     np.testing.assert_allclose(table.spread, np.sqrt(squares / (13 - 3)), rtol=1e-12)
 
 
-def test_fitted_spread_of_the_runs_is_the_measured_one(found) -> None:
+def test_fitted_spread_of_the_runs_is_the_measured_one(found: FitResult) -> None:
     ratio = (found.predicted_spread / found.measured_spread)[[0, 1, 3, 4, 5]]
     assert ((ratio > 0.7) & (ratio < 1.3)).all()
 
 
 @pytest.mark.soak
-def test_numbers_that_made_rests_come_back_from_them(published) -> None:
+def test_numbers_that_made_rests_come_back_from_them(published: RestTable) -> None:
     inside = np.clip(published.targets, ARM.lower, ARM.upper)
     truth = {"coulomb": (0.15, 0.4, 1.0, 0.01, 0.0012, 0.0009), "bias": (-0.05,) + (0.0,) * 5,
              "weights": ("m2b_L0b=0.02",), "wander": (0.2,) * 6}  # fmt: skip
@@ -96,17 +97,19 @@ def test_numbers_that_made_rests_come_back_from_them(published) -> None:
         assert abs(again.value(f"wander.{name}") - 0.2) < 0.08
 
 
-def test_plain_squares_believe_point_1_and_weigh_less(published, found) -> None:
+def test_plain_squares_believe_point_1_and_weigh_less(
+    published: RestTable, found: FitResult
+) -> None:
     plain = fit(published, slave(), ["coulomb.theta2", "weight.m2b_L0b"], loss="linear")
     assert plain.value("weight.m2b_L0b") < 0.6 * found.value("weight.m2b_L0b")
 
 
-def test_an_unknown_loss_is_refused(published) -> None:
+def test_an_unknown_loss_is_refused(published: RestTable) -> None:
     with pytest.raises(UnknownNameError, match="cauchy, huber"):
         fit(published, slave(), loss="tukey")
 
 
-def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published) -> None:
+def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published: RestTable) -> None:
     free = default_free(ARM, published)
     assert "coulomb.d3" not in free
     assert "bias.theta1" in free  # approached from both sides
@@ -123,7 +126,7 @@ def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published) ->
     ],
 )
 def test_parameters_that_cannot_be_told_apart_are_named(
-    published, free: list[str], named: list[str]
+    published: RestTable, free: list[str], named: list[str]
 ) -> None:
     with pytest.raises(FitError, match="not identifiable") as caught:
         fit(published, slave(), free)
@@ -132,19 +135,19 @@ def test_parameters_that_cannot_be_told_apart_are_named(
 
 
 @pytest.mark.parametrize("free", [[], ["coulomb.theta1"] * 2])
-def test_nothing_to_fit_is_refused(published, free) -> None:
+def test_nothing_to_fit_is_refused(published: RestTable, free) -> None:
     with pytest.raises(ParameterError, match="free"):
         fit(published, slave(), free)
 
 
-def test_an_unknown_parameter_and_another_plant_are_refused(published) -> None:
+def test_an_unknown_parameter_and_another_plant_are_refused(published: RestTable) -> None:
     with pytest.raises(UnknownNameError, match=r"coulomb\.theta1"):
         fit(published, slave(), ["coulomb.elbow"])
     with pytest.raises(ParameterError, match="hardware"):
         fit(published, slave(**{"plant.kind": "ideal"}))
 
 
-def changed(tmp_path, change):
+def changed(tmp_path: Mutant | Path, change) -> Path:
     table = pd.read_csv(PUBLISHED)
     file = tmp_path / "rests.csv"
     change(table).to_csv(file, index=False)

@@ -80,7 +80,7 @@ def test_own_fixture_is_chosen_by_its_name_and_has_its_parameters(own_parts: Non
     assert np.array_equal(numbers_of(chosen.parameters), (0.05, 0.02, 0.03))
 
 
-def writes_four(offset, shape, out):
+def writes_four(offset, shape, out) -> float:
     for i in range(4):
         out[i] = 0.0
     return 0.0

@@ -30,7 +30,7 @@ vectors = st.tuples(*[st.floats(-4.0, 4.0)] * 3).map(np.array)
 
 
 @kernel
-def angle_between(a, b):
+def angle_between(a, b) -> float:
     return geometry.rotation_angle_between(a, b)
 
 

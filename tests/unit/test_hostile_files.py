@@ -85,7 +85,7 @@ def packed(kind: str) -> bytes:
 @pytest.mark.parametrize("told", [3 * GIGABYTE, 1000], ids=["told", "not told"])
 @pytest.mark.parametrize("kind", BOMBS, scope="module")
 def test_a_small_chunk_that_unpacks_to_gigabytes_is_refused(
-    tmp_path: Path, packed: bytes, little_memory, kind: str, told: int
+    tmp_path: Path, packed: bytes, little_memory: None, kind: str, told: int
 ) -> None:
     path = bomb(tmp_path / "bomb.mcap", kind.partition(" ")[0], packed, told)
     with pytest.raises(RecordingError, match="is damaged") as error:
@@ -115,7 +115,7 @@ def test_a_pipe_in_the_place_of_a_file_is_refused_and_not_waited_for(tmp_path: P
 
 
 def test_a_length_that_a_file_claims_is_never_allocated(
-    tmp_path: Path, little_memory, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, little_memory: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     recorded(tmp_path / "bag")
     file = tmp_path / "bag" / "bag_0.mcap"

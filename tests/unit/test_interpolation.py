@@ -232,7 +232,9 @@ def test_minimum_jerk_way_that_would_swing_beyond_a_limit_stays_at_it() -> None:
     st.integers(2, 90),
     st.sampled_from(INTERPOLATIONS),
 )
-def test_no_way_leaves_the_limits_of_the_joints(places, ticks, interpolation) -> None:
+def test_no_way_leaves_the_limits_of_the_joints(
+    places: list[float], ticks: int, interpolation: str
+) -> None:
     found = slide(interpolation, places, ticks)
     assert found.max() <= TOP
     assert found.min() >= SLIDING.lower[D3]

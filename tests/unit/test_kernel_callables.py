@@ -1,6 +1,7 @@
 """Plain Python functions in the place of kernels."""
 
 import threading
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ ROW, TABLE = types.float64[::1], types.float64[:, ::1]
 
 
 @kernel
-def call_with_row(function, row, count):
+def call_with_row(function: Callable[..., object], row: Array, count: int) -> float:
     total = 0.0
     for i in range(count):
         total += function(row, float(i))
@@ -67,7 +68,7 @@ def test_plain_function_gets_tables_flags_and_counts() -> None:
         return count + 1
 
     @kernel
-    def call(function, table, flag):
+    def call(function: Callable[..., object], table: Array, flag: bool) -> object:
         return function(table, flag, 7)
 
     table = np.zeros((2, 3))
@@ -89,7 +90,7 @@ def test_plain_function_may_return_nothing_and_may_be_any_callable() -> None:
             row[:] = self.calls
 
     @kernel
-    def call(function, row) -> None:
+    def call(function: Callable[..., object], row: Array) -> None:
         function(row)
         function(row)
 
@@ -183,7 +184,7 @@ def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions(
     ],
 )
 def test_signature_that_a_plain_function_cannot_have_is_refused(signature, message: str) -> None:
-    def takes_two(row, x):
+    def takes_two(row, x) -> float:
         return 0.0
 
     with pytest.raises(KernelError, match=message):

@@ -18,7 +18,7 @@ from teleop_core.kernels import (
     kernel_from_source,
     records,
 )
-from teleop_core.kernels.geometry import multiply_quaternions
+from teleop_core.kernels.geometry import Array, multiply_quaternions
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
 
@@ -31,12 +31,12 @@ def uncached(text: str, name: str) -> Callable[..., object]:
 
 
 @inner
-def power(x, n):
+def power(x: float, n: int) -> float:
     return x**n
 
 
 @kernel
-def polynomial(x):
+def polynomial(x: float) -> float:
     return power(x, 2) + power(x, 3)
 
 
@@ -154,7 +154,7 @@ def test_kernel_from_source_calls_what_it_is_given_and_is_made_once() -> None:
 
 
 @kernel
-def turned(product, q, out) -> None:
+def turned(product: Callable[..., object], q: Array, out: Array) -> None:
     product(q, q, out)
 
 
@@ -164,7 +164,7 @@ def take_all(source, target) -> None:
 
 
 @kernel
-def hand_on(take, source, target) -> None:
+def hand_on(take: Callable[..., object], source: Array, target: Array) -> None:
     take(source, target)
 
 

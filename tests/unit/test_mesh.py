@@ -240,7 +240,7 @@ def test_a_mesh_that_encloses_nothing_is_refused_in_one_line(
     assert "\n" not in str(caught.value)
 
 
-def pressed(file: Path, *settings: str):
+def pressed(file: Path, *settings: str) -> VirtualTime:
     """Session that presses a mesh."""
     texts = ["world=mesh", f"world.mesh.file={file}", *settings]
     return VirtualTime(configure("palpation", settings=texts))

@@ -43,11 +43,11 @@ EXPECTED = {
 
 
 @kernel
-def _change(s, event):
+def _change(s: OperatingState, event: int) -> int:
     return change(s, event)
 
 
-def make(state: State, **fields: object):
+def make(state: State, **fields: object) -> OperatingState:
     found = record(OperatingState)
     found["state"], found["is_homed"] = state, 1
     for name, value in fields.items():

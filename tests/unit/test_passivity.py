@@ -298,7 +298,7 @@ YIELDING = {
 """Settings of architectures before a slave that yields."""
 
 
-def drawn(rng, kind, architecture: str = "position_force"):
+def drawn(rng: np.random.Generator, kind: str, architecture: str = "position_force"):
     """Settings of a session drawn at random: world, gains, hand and network."""
     stiffness = 10.0 ** rng.uniform(1.5, 4.7)
     there = rng.uniform(0.0, 0.5)
@@ -350,7 +350,7 @@ def check_ports(rows: NDArray[np.void]) -> None:
             assert mine[:, HEARD].max() <= most
 
 
-def left_at_the_hand(rows, scale):
+def left_at_the_hand(rows: NDArray[np.void], scale: float) -> float:
     """Least that the hand's port had left to give in a touch, by forces and places alone [J]."""
     hand, force = rows["master_energy"], rows["master_servo_cf"][:-1, :3]
     steps = np.diff(rows["master_measured_cp"][:, :3], axis=0)

@@ -37,7 +37,7 @@ def pose(
 class Run:
     """A hand that is asked as the operator asks it, some ticks at a time."""
 
-    def __init__(self, hand=None, **parameters: float) -> None:
+    def __init__(self, hand: RemoteHand | None = None, **parameters: float) -> None:
         self.hand = hand or RemoteHand(RemoteParameters(**parameters))
         self.rows, self.last = np.zeros((0, 13)), 0.0
 

@@ -168,7 +168,7 @@ def test_a_name_is_used_once_unless_a_cell_is_run_again(registered: Callable[...
     assert load_robot("my_arm") is second
 
 
-def needs_a_length(length):
+def needs_a_length(length) -> Robot:
     return robot_from_table(TABLE)
 
 
@@ -241,7 +241,7 @@ def test_an_error_in_a_plain_function_reaches_the_caller_of_a_batch() -> None:
 def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(
     registered: Callable[..., object],
 ) -> None:
-    def ik(T, seed, q):
+    def ik(T: Array, seed: Array, q) -> int:
         return 0
 
     with pytest.raises(PartError, match="crank"):

@@ -54,7 +54,9 @@ class Axis:
 
 
 @kernel
-def answer(gains, step, limit, count, goal, trace) -> None:
+def answer(
+    gains: float | Array, step: int, limit: Array, count: float, goal: float, trace: Array
+) -> None:
     """Write positions of one axis under the law, tick by tick; a count of 0 rounds nothing."""
     memory, effort, setpoint = np.zeros((1, 4)), np.zeros(1), np.full(1, goal)
     seen, zero, q, dq = np.zeros(1), np.zeros(1), 0.0, 0.0
@@ -158,7 +160,7 @@ def test_without_integral_action_the_weight_leaves_the_law_as_it_is() -> None:
     assert efforts[0] == efforts[1]
 
 
-def slave_step_trace(name, axis, size):
+def slave_step_trace(name, axis, size) -> Array:
     """Ways (ticks,) of an axis of the ideal plant after a step, with the reference filter off."""
     robot = ROBOTS[name]
     start = robot.home.copy()

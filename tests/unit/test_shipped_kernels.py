@@ -116,7 +116,9 @@ def test_kernels_that_were_compiled_here_come_before_shipped_ones(tree: Path) ->
 
 
 @pytest.mark.parametrize("content", [b"", b"no kernel"])
-def test_kernels_are_compiled_where_shipped_ones_are_broken(shipped, tree, content: bytes) -> None:
+def test_kernels_are_compiled_where_shipped_ones_are_broken(
+    shipped: tuple[Path, str], tree: Path, content: bytes
+) -> None:
     for file in (tree / "teleop_core/kernels" / FOLDER.name).rglob("*.nbc"):
         file.write_bytes(content)
     count, bits = wheels.run(tree, None, SCRIPT).split()

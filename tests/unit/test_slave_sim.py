@@ -51,7 +51,7 @@ class Bench:
         self.slave = SimulatedArm(ArmParameters(**{"start": AT_HOME} | values))
         self.row, self.now_ns = self.slave.signals, 0
 
-    def tick(self, command: Array | None = None, stamp_ns=None) -> CommandStatus:
+    def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> CommandStatus:
         """One tick, with a command or without; returns the status."""
         self.now_ns += TICK_NS
         if command is not None:

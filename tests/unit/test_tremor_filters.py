@@ -514,7 +514,7 @@ def test_the_slave_trembles_less_and_a_second_run_has_the_same_bits(kind: str) -
     assert calm < 0.4 * trembling
 
 
-def touches(scenario, seconds, *given: object):
+def touches(scenario: str, seconds: float, *given: object):
     """Energies of the contacts of a session: shares given back."""
     rows = session(*given, scenario=scenario).run(round(1000 * seconds))
     contact = rows["master_contact"]

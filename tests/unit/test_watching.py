@@ -104,11 +104,11 @@ def test_kernels_that_are_compiled_are_counted() -> None:
     before = compiled_count()
 
     @njit
-    def inner(x):
+    def inner(x: float) -> float:
         return x + 1.0
 
     @njit
-    def outer(x):
+    def outer(x: float):
         return inner(x) * 2.0
 
     assert not is_compiling()

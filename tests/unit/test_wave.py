@@ -33,7 +33,18 @@ SLAVE = np.array([0.2, 5e-3, 0.01, 2e-3, 1.0])
 
 
 @kernel
-def drive(ways, there, back, stiffness, preload, impedance, slave, hand, arm, seen) -> None:
+def drive(
+    ways: Array,
+    there: Array | NDArray[np.int64],
+    back: NDArray[np.int64],
+    stiffness: float,
+    preload: float,
+    impedance: float,
+    slave: Array,
+    hand: Array,
+    arm: Array,
+    seen: Array,
+) -> None:
     """Lead an arm that lags before a spring below z = 0; write both ports and what is seen.
 
     ``ways`` (N, 3) are of the hand [m]; ``there`` and ``back`` (N,) the number of the row that
