@@ -6,6 +6,7 @@ import shutil
 import socket
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ class Tab(Headless):
         self.call("Page.reload")
         self.until("!window.isOld && document.querySelector('canvas')")
 
-    def shows(self, text, seconds: int = 60) -> None:
+    def shows(self, text: Any, seconds: int = 60) -> None:
         """Wait until a text can be read on the page."""
         self.until(f"document.body.innerText.includes({json.dumps(text)})", seconds)
 
@@ -82,7 +83,7 @@ class Tab(Headless):
         for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
             self.mouse(kind, x, y)
 
-    def place(self, text):
+    def place(self, text: Any) -> Any:
         """Middle of the last visible element with a text, once it rests and nothing covers it [px].
 
         A click there reaches it, or the promise fails.
@@ -148,7 +149,7 @@ class Tab(Headless):
             self.value("new Promise(requestAnimationFrame)")
         self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
-    def seen_at(self, node, point):
+    def seen_at(self, node, point) -> Any:
         """Pixel at which a point of a node of viser's scene is seen, both as they are drawn.
 
         Args:
@@ -172,18 +173,18 @@ class Tab(Headless):
         """Expression of the place of a node of viser's scene in its parent's frame [m]."""
         return f"{VIEWER}.nodeRefFromName[{json.dumps(node)}].position.toArray()"
 
-    def faults(self):
+    def faults(self) -> list[Any]:
         """Errors that mean something."""
         self.value("0")  # what was said before has been heard then
         return [line for line in self.errors if not any(advice in line for advice in ADVICE)]
 
-    def hosts(self):
+    def hosts(self) -> set[Any]:
         """All hosts that the page asked for anything."""
         self.value("0")
         addresses = [url for url in self.asked if not url.startswith(("data:", "blob:"))]
         return {url.split("/")[2] for url in addresses}
 
-    def _note(self, event) -> None:
+    def _note(self, event: Any) -> None:
         super()._note(event)
         method, told = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown" or told.get("type") in {"error", "assert"}:

@@ -1,6 +1,6 @@
 """A hand at a device of others, for tests of nodes."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sensor_msgs.msg import Joy
@@ -44,7 +44,7 @@ class Hand:
 
         self._peer.wait(engaged, "motion_scaling at work")
 
-    def moved(self, *buttons: object):
+    def moved(self, *buttons: object) -> Any:
         """How far the answers to some hundred samples go [m]."""
 
         def answered() -> bool:

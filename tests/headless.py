@@ -7,6 +7,7 @@ import select
 import subprocess
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -62,7 +63,7 @@ class Headless:
         os.close(self._in)
         self._out.close()
 
-    def call(self, method: str, **parameters: object):
+    def call(self, method: str, **parameters: object) -> Any:
         """Answer to a command of the DevTools protocol."""
         number = next(self._numbers)
         message = {"id": number, "method": method, "params": parameters}
@@ -86,7 +87,7 @@ class Headless:
         message, _, self._heard = self._heard.partition(b"\0")
         return message
 
-    def _note(self, event) -> None:
+    def _note(self, event: Any) -> None:
         if event.get("method") == "Runtime.exceptionThrown":
             details = event["params"]["exceptionDetails"]
             self.said.append(details.get("exception", {}).get("description", details["text"]))
@@ -99,7 +100,7 @@ class Headless:
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
                   deviceScaleFactor=1, mobile=False)  # fmt: skip
 
-    def value(self, script: str):
+    def value(self, script: str) -> Any:
         """Value of an expression in the page; promises are waited for."""
         answer = self.call("Runtime.evaluate", expression=script, returnByValue=True,
                            awaitPromise=True)  # fmt: skip

@@ -1,7 +1,7 @@
 """Led tip: a tip that is led along any way through an object, what it feels and what it loses."""
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def needle(
 
 
 @kernel
-def _stored_in_button(p: SimulationNumbers, s, depth):
+def _stored_in_button(p: SimulationNumbers, s: Any, depth) -> Any:
     """Energy that a button can give back [J] by what moves along its normal."""
     rising, falling = min(depth, p.click_travel), min(depth, p.stroke) - p.click_travel
     energy = 0.5 * p.click_force * rising * rising / p.click_travel
@@ -68,7 +68,7 @@ def _stored_in_button(p: SimulationNumbers, s, depth):
 
 
 @kernel
-def _stored(p: SimulationNumbers, s):
+def _stored(p: SimulationNumbers, s: Any) -> Any:
     """Energy that the object can give back [J]: by its surface, or by springs of the channel."""
     stiffness, depth, square = p.world_stiffness, max(-s.gap, 0.0), 0.0
     for k in range(3):
@@ -86,7 +86,7 @@ def _stored(p: SimulationNumbers, s):
 @kernel
 def _lead(
     p: SimulationNumbers,
-    contacts,
+    contacts: Any,
     arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
     way: Array,
     felt: Array,

@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -125,7 +126,7 @@ def bag1(path: Path, packing: Writer1.CompressionFormat | None = None) -> bytes:
     return path.read_bytes()
 
 
-def bag2(path: Path, storage: StoragePlugin, mode=None) -> bytes:
+def bag2(path: Path, storage: StoragePlugin, mode: Any = None) -> bytes:
     store = get_typestore(Stores.ROS2_JAZZY)
     writer = Writer2(path, version=9, storage_plugin=storage)
     if mode is not None:

@@ -1,5 +1,7 @@
 """State commands in any order, beside ticks and faults: flags agree, and nothing moves unasked."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import strategies as st
@@ -26,7 +28,7 @@ def arm(standstill: str) -> SimulatedArm:
 ARMS = {standstill: arm(standstill) for standstill in ("hold", "brake")}
 
 
-def play(slave: SimulatedArm, words) -> None:
+def play(slave: SimulatedArm, words: Any) -> None:
     """Send words one by one; after each the flags must agree and the setpoint keep its limits."""
     row, ns = slave.signals, 10**9
     reach = slave.robot.drives.speed_limit * 1e-3

@@ -1,6 +1,7 @@
 """A search of scipy's finds no assembly of legs that ours calls unassemblable."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ FOUND = 1e-10
 STARTS = 16
 
 
-def turned(vector):
+def turned(vector: Any) -> Any:
     """Rotation of a rotation vector (Rodrigues)."""
     angle = np.linalg.norm(vector) + 1e-12
     x, y, z = vector / angle
@@ -23,12 +24,12 @@ def turned(vector):
     return np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K
 
 
-def platform_gaps(x, legs):
+def platform_gaps(x, legs) -> Any:
     ends = x[:3] + PAIRED.platform @ turned(x[3:]).T
     return np.linalg.norm(ends - PAIRED.base, axis=1) - legs
 
 
-def ball_joint_gaps(angles, legs, b: float = 1.0, a: float = 0.5):
+def ball_joint_gaps(angles, legs, b: float = 1.0, a: float = 0.5) -> Any:
     headings = 2.0 * math.pi / 3.0 * np.arange(3)
     out = b - legs * np.cos(angles)
     S = np.column_stack((out * np.cos(headings), out * np.sin(headings), legs * np.sin(angles)))
@@ -39,7 +40,7 @@ def any_platform(rng) -> Array:
     return np.concatenate((rng.uniform([-0.2, -0.2, 0.0], [0.2, 0.2, 0.35]), rng.normal(0, 1.2, 3)))
 
 
-def any_angles(rng):
+def any_angles(rng) -> Any:
     return rng.uniform(-math.pi, math.pi, 3)
 
 
@@ -50,7 +51,7 @@ SEARCHES = {
 }
 
 
-def finds(name: str, legs, rng: np.random.Generator) -> bool:
+def finds(name: str, legs: Any, rng: np.random.Generator) -> bool:
     """Whether Newton steps of MINPACK close the loops from some random start."""
     gaps, start, _ = SEARCHES[name]
     for _ in range(STARTS):

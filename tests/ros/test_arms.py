@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -58,7 +58,7 @@ def test_a_recorder_in_a_namespace_records_the_topics_of_its_arm(
     recorder = peer.start("recorder", arm="left", out=str(tmp_path / "bag"))
     stamp = 0
 
-    def heard():
+    def heard() -> Any:
         nonlocal stamp
         stamp += MS
         peer.send(LEFT_MASTER, stamp, REST)

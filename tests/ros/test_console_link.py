@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def live(tmp_path_factory: pytest.TempPathFactory):
             yield session, link, out
 
 
-def state(link: int):
+def state(link: int) -> Any:
     """State of the arm as the page sees it."""
     return link.view().arms[""].operation_text.split(",")[0].split(":")[0]
 
@@ -52,7 +52,7 @@ def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(liv
     first = dict(link.view().arms[""].stamp_ns)
     name = topics.SLAVE_MEASURED_JS.name
 
-    def fresh():
+    def fresh() -> Any:
         """View of an arm at rest, of which joints and tip are of one place."""
         view = link.view()
         arm = view.arms[""]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -73,7 +74,7 @@ def arrow(tab: Headless, axis: int, way: float = PULLED):
     return tab.seen_at(GRIP, begin), tab.seen_at(GRIP, end)
 
 
-def pull(tab: Headless, axis: int, way: float = PULLED):
+def pull(tab: Headless, axis: int, way: float = PULLED) -> Any:
     """Take an arrow of the stylus and pull it along itself; the button stays down."""
     grip, goal = arrow(tab, axis, way)
     tab.mouse("mouseMoved", *grip)
@@ -82,7 +83,7 @@ def pull(tab: Headless, axis: int, way: float = PULLED):
     return goal
 
 
-def rest(tab) -> None:
+def rest(tab: Headless) -> None:
     """Wait until the slave is drawn in one place for half a second."""
     tab.value(f"""new Promise((done) => {{
         let last = [], since = 0;
@@ -96,7 +97,7 @@ def rest(tab) -> None:
     }})""")
 
 
-def saved(page: str, console: float, name: str | Path):
+def saved(page: str, console: float, name: str | Path) -> Any:
     """What has been recorded until now, closed under a name."""
     page.fill("name", name)
     page.click("Save as")
@@ -105,7 +106,7 @@ def saved(page: str, console: float, name: str | Path):
     return console.folder / name
 
 
-def way(stream: tc.Stream):
+def way(stream: tc.Stream) -> Any:
     """Where a tip went from the begin to the end of a recording [m]."""
     return stream[["x", "y", "z"]][-1] - stream[["x", "y", "z"]][0]
 

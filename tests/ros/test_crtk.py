@@ -71,14 +71,14 @@ class StockClient:
     def spin(self) -> None:
         self.peer._executor.spin_once(timeout_sec=0.02)
 
-    def wait(self, condition: Callable[[], object] | Callable[[], bool], what: str):
+    def wait(self, condition: Callable[[], object] | Callable[[], bool], what: str) -> Any:
         def turn() -> object:
             self.spin()
             return condition()
 
         return self.peer.wait(turn, what)
 
-    def send(self, name: str, message) -> None:
+    def send(self, name: str, message: Any) -> None:
         if name not in self.commands:
             own = self.peer.node.create_publisher(type(message), f"{self.arm}/{name}", 10)
             self.commands[name] = own
@@ -87,11 +87,11 @@ class StockClient:
             message.header.stamp = self.peer.node.get_clock().now().to_msg()
         self.commands[name].publish(message)
 
-    def state(self):
+    def state(self) -> tuple[Any, Any, Any] | None:
         found = self.newest.get("operating_state")
         return found and (found.state, found.is_homed, found.is_busy)
 
-    def reaches(self, state: tuple[str, bool, bool]):
+    def reaches(self, state: tuple[str, bool, bool]) -> Any:
         return self.wait(lambda: self.state() == state, f"{state}, not {self.state()}")
 
     def joints(self) -> Array:
@@ -145,7 +145,7 @@ def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(
     client.send("move_jp", JointState(position=[a - 0.05 for a in MIDDLE]))
     client.peer.wait_value("slave", "refused.slave/move_jp", lambda count: count == 1)
 
-    def resumed():  # which an arm refuses that is not known to be at rest yet
+    def resumed() -> Any:  # which an arm refuses that is not known to be at rest yet
         client.send("state_command", crtk.StringStamped(string="resume"))
         return client.state() == ("ENABLED", True, False)
 
@@ -183,7 +183,7 @@ def test_speeds_end_with_the_messages_and_hold_ends_a_move(client: StockClient) 
     assert client.joints()[2] > goal[2] + 0.001
 
 
-def six(wrench) -> Array:
+def six(wrench: Any) -> Array:
     force, torque = wrench.force, wrench.torque
     return np.array([force.x, force.y, force.z, torque.x, torque.y, torque.z])
 
@@ -202,7 +202,9 @@ def test_a_measured_force_is_told_along_the_tip_and_about_the_base_under_its_sta
         p, q = newest["measured_cp"].pose.position, newest["measured_cp"].pose.orientation
         return np.array([p.x, p.y, p.z, q.w, q.x, q.y, q.z])
 
-    def told():  # between the zeros of the simulated sensor; the pose is one of the arm at rest
+    def told() -> (
+        bool | tuple[Any, Any] | None
+    ):  # between the zeros of the simulated sensor; the pose is one of the arm at rest
         client.send("measured_cf", message)
         client.spin()
         if not {"body/measured_cf", "spatial/measured_cf", "measured_cp"} <= newest.keys():
@@ -317,7 +319,7 @@ class ForeignArm(Node):
             self.pose.publish(pose)
 
 
-def findings_of(fault, *, may_move):
+def findings_of(fault, *, may_move) -> dict[Any, Any]:
     """What is found of a foreign arm with this fault, by topic."""
     with foreign_arm(fault) as arm:
         return {found.row.name: found for found in examine(arm, may_move=may_move)}
@@ -352,24 +354,28 @@ LOOKED = ("", "stamp", "nan", "length", "unit", "type", "qos", "no state")
 MOVED = ("honest", "moves paused", "any word", "never busy", "frozen", "scaled", "late", "speeds")
 
 
-def examined(faults: tuple[str, str, str, str, str, str, str, str], *, may_move: bool):
+def examined(
+    faults: tuple[str, str, str, str, str, str, str, str], *, may_move: bool
+) -> dict[Any, Any]:
     """What is found of foreign arms, by fault: several at once, since each test mostly waits."""
     with ThreadPoolExecutor(4) as pool:
         return {fault: pool.submit(findings_of, fault, may_move=may_move) for fault in faults}
 
 
 @pytest.fixture(scope="module")
-def by_looking():
+def by_looking() -> Any:
     return examined(LOOKED, may_move=False)
 
 
 @pytest.fixture(scope="module")
-def by_moving():
+def by_moving() -> Any:
     return examined(MOVED, may_move=True)
 
 
 @pytest.mark.slow
-def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(by_moving) -> None:
+def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(
+    by_moving: Any,
+) -> None:
     found = by_moving["honest"].result()
     verdicts = {name: one.verdict for name, one in found.items()}
     sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js",
@@ -392,7 +398,7 @@ def test_a_foreign_arm_without_fault_passes_and_is_only_moved_by_what_it_takes(b
     ],
 )
 def test_faults_of_a_foreign_arm_are_found_by_looking(
-    by_looking, fault: str, topic: str, note: str
+    by_looking: Any, fault: str, topic: str, note: str
 ) -> None:
     found = by_looking[fault].result()[topic]
     assert found.verdict is Verdict.FAILED
@@ -409,7 +415,7 @@ def test_faults_of_a_foreign_arm_are_found_by_looking(
     ],
 )
 def test_faults_of_a_foreign_arm_are_found_by_trying(
-    by_moving, fault: str, topic: str, note: str
+    by_moving: Any, fault: str, topic: str, note: str
 ) -> None:
     found = by_moving[fault].result()[topic]
     assert found.verdict is Verdict.FAILED
@@ -427,7 +433,7 @@ def test_faults_of_a_foreign_arm_are_found_by_trying(
     ],
 )
 def test_an_arm_that_lies_about_where_it_is_is_found_by_moving_it(
-    by_moving, fault: str, topics: tuple[str, ...], note: str
+    by_moving: Any, fault: str, topics: tuple[str, ...], note: str
 ) -> None:
     found = by_moving[fault].result()
     for topic in topics:
@@ -462,7 +468,7 @@ def test_what_an_interrupted_test_leaves_is_told() -> None:
         assert "the arm is ENABLED and may be off by 0.01 rad" in left_behind(arm, may_move=True)
 
 
-def test_nothing_is_commanded_when_only_looking(by_looking) -> None:
+def test_nothing_is_commanded_when_only_looking(by_looking: Any) -> None:
     found = by_looking[""].result()
     assert found["move_jp"].verdict is Verdict.SKIPPED
     assert found["state_command"].note == "read only"

@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -91,7 +92,7 @@ def env(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return given | {"PYTHONPATH": str(module), "LD_LIBRARY_PATH": libraries}
 
 
-def run(env: str | dict[str, str] | list[object], *arguments: object):
+def run(env: str | dict[str, str] | list[object], *arguments: object) -> Any:
     named = env | {"ROS_DOMAIN_ID": free_domain()}
     command = [sys.executable, "-c", *arguments]
     done = subprocess.run(

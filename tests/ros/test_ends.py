@@ -58,7 +58,7 @@ tc.register_stage(
 '''
 
 
-def change(peer: "Peer", name: str, transition):
+def change(peer: "Peer", name: str, transition: Any) -> Any:
     """Whether a transition was made, asked for by service."""
     request = ChangeState.Request(transition=Transition(id=transition))
     return peer.call(ChangeState, f"/{name}/change_state", request).success
@@ -105,7 +105,7 @@ def composed(compose: Callable[..., object]) -> object:
 
 @pytest.mark.parametrize("name", ["slave", "recorder"])
 def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
-    peer: "Peer", composed, tmp_path: Path, name: str
+    peer: "Peer", composed: object, tmp_path: Path, name: str
 ) -> None:
     peer.wait_value("slave", "ticks", lambda ticks: ticks > 100)
     assert change(peer, name, Transition.TRANSITION_ACTIVE_SHUTDOWN)

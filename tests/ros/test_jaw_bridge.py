@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from std_msgs.msg import Float64MultiArray
@@ -43,7 +43,7 @@ class Gripper:
     def _see(self, message) -> None:
         self.witnessed = list(message.data)
 
-    def angle(self):
+    def angle(self) -> Any:
         return self.measured.values[-1][0] if self.measured.take() else None
 
     def command(self, angle: float, until: Callable[[], object], what: str) -> None:

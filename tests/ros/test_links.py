@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from functools import reduce
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -125,7 +125,7 @@ def is_led(setpoints) -> bool:
     return len(in_force) > 1500 and len(set(in_force)) > 300
 
 
-def is_free(reach):
+def is_free(reach: Any) -> Any:
     """Which answers (N,) of the inverse kinematics nothing keeps from what was asked for."""
     return np.array(reach)[:, topics.SLAVE_REACH.columns.index("limit")] == topics.Limit.NONE
 
@@ -188,7 +188,7 @@ def recorded(
         session.close()
 
 
-def common(*series: object):
+def common(*series: object) -> list[Any]:
     """Values of some series at the stamps that all have."""
     stamps = reduce(np.intersect1d, (one.stamp_ns for one in series))
     assert len(stamps) > 500

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
@@ -50,7 +50,7 @@ def is_running(show: Console) -> re.Match[str] | None:
     return re.search(r"\d/600 s  ", show.file.getvalue())
 
 
-def children(name: str = ""):
+def children(name: str = "") -> list[Any]:
     """Processes of nodes that this test has started."""
     found = []
     for process in psutil.Process().children(recursive=True):

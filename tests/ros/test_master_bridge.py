@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -166,7 +166,7 @@ def test_three_motions_write_what_the_bridge_needs(peer: "Peer", tmp_path: Path)
     device, file, said = Device(peer), tmp_path / "mine.yaml", ""
     with command(peer, "touch/pose", "--out", file) as asking:
 
-        def asks(text: str, count):
+        def asks(text: str, count: Any) -> Any:
             """Whether the command has asked so often; what it says comes without an end of line."""
             nonlocal said
             peer.spin()

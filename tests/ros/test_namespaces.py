@@ -5,7 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 import yaml
@@ -55,7 +55,7 @@ def start(peer: "Peer", tmp_path: Path) -> Iterator[Callable[..., object]]:
         process.wait()
 
 
-def parameter(peer: "Peer", node: str, name: str):
+def parameter(peer: "Peer", node: str, name: str) -> Any:
     request = GetParameters.Request(names=[name])
     return peer.call(GetParameters, f"{node}/get_parameters", request).values[0]
 
@@ -78,7 +78,7 @@ def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
     peer.wait_state("left/slave", "active")
     assert parameter(peer, "/left/slave", "command_timeout").double_value == 0.25
 
-    def inside():
+    def inside() -> set[Any]:
         names = peer.node.get_node_names_and_namespaces()
         return {name for name, where in names if where == "/left"}
 

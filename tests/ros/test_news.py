@@ -1,6 +1,6 @@
 """What nodes say in their logs, once, for people who look on."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.ros
 HOME = load_robot("rcrt1").home
 
 
-def said(node: "NodeProcess", text: str):
+def said(node: "NodeProcess", text: str) -> list[Any]:
     return [line for line in node.stderr.read_text().splitlines() if text in line]
 
 

@@ -36,7 +36,7 @@ def test_haptic_master_sends_one_sample_per_millisecond_on_all_its_topics(peer: 
     listeners = {topic: peer.listen(topic) for topic in STAGES.find("haptic_master").writes}
     peer.start("haptic_master")
 
-    def common():
+    def common() -> set[Any]:
         """Stamps that came on all topics, each of which is found at another moment."""
         for listener in listeners.values():
             listener.take()
@@ -54,7 +54,7 @@ def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer: "Peer"
     forces = peer.listen(topics.MASTER_SERVO_CF)
     peer.start("motion_scaling")
 
-    def received():
+    def received() -> Any:
         peer.send(topics.MASTER_MEASURED_CP, 1 * MS, REST)
         status = peer.status("motion_scaling")
         return status and status.number("received.master/measured_cp") > 0
@@ -94,7 +94,7 @@ def test_a_button_that_was_pressed_and_released_while_the_node_stood_still_was_p
         ):
             peer.send(topic, stamp, values)
 
-    def is_fine():
+    def is_fine() -> Any:
         send(0.0, 0.0, 0.0)
         asked = GetParameters.Request(names=["mode"])
         answer = peer.call(GetParameters, "/motion_scaling/get_parameters", asked)
@@ -206,7 +206,7 @@ def heard_by_recorder(peer: "Peer") -> int:
     """
     stamp = 0
 
-    def heard():
+    def heard() -> Any:
         nonlocal stamp
         stamp += MS
         peer.send(topics.MASTER_MEASURED_CP, stamp, REST)
@@ -359,7 +359,7 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer: "Peer") -> None:
     assert moved() == pytest.approx(0.25e-3, rel=1e-6)
 
 
-def change(peer: "Peer", name: str, transition):
+def change(peer: "Peer", name: str, transition: Any) -> Any:
     request = ChangeState.Request(transition=Transition(id=transition))
     return peer.call(ChangeState, f"/{name}/change_state", request).success
 

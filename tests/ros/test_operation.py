@@ -3,7 +3,7 @@
 import signal
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
@@ -43,7 +43,7 @@ class Streamer:
         self,
         condition: str | Callable[[], object] | Callable[[], str | bool] | Callable[[], bool],
         what: str,
-    ):
+    ) -> Any:
         """Send commands until something is so."""
 
         def turn() -> object:
@@ -69,7 +69,7 @@ def state(peer: "int | Peer") -> State | None:
     return None if status is None else State(int(float(status["state"])))
 
 
-def operation(peer: "Peer"):
+def operation(peer: "Peer") -> Any:
     """Newest report of the slave's operation, by name."""
     if not hasattr(peer, "operation"):
         from teleop_core.bags.reports import read_reports
@@ -113,7 +113,7 @@ def test_a_stop_message_stops_the_setpoint_within_two_ticks_and_reset_and_enable
     assert not command(peer, "reset")[0]  # still pressed
     button.publish(Bool(data=False))
 
-    def is_reset():
+    def is_reset() -> Any:
         return command(peer, "reset")[0]
 
     streamer.until(is_reset, "a reset after the release")
@@ -203,7 +203,7 @@ def still_slave(peer: "Peer", button: Publisher) -> Callable[[], object]:
     """Function that stops the process of a slave that knows the button, and returns it."""
     slave = psutil.Process(peer.nodes[0].process.pid)
 
-    def stand_still():
+    def stand_still() -> Any:
         slave.send_signal(signal.SIGSTOP)
         peer.wait(lambda: slave.status() == psutil.STATUS_STOPPED, "a slave that stands still")
         return slave

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "bags" / "example"
 PRESS, RELEASE = (0, 0, 1), (0, 0, 0)
 
 
-def mode(peer: "Peer"):
+def mode(peer: "Peer") -> Any:
     request = GetParameters.Request(names=["mode"])
     answer = peer.call(GetParameters, "/motion_scaling/get_parameters", request)
     return answer.values[0].string_value
@@ -32,7 +32,7 @@ def mode(peer: "Peer"):
 def press(peer: "Peer", hand: Hand, expected: str) -> None:
     """Press the mode button until the parameter shows the mode, and release it."""
 
-    def shown():
+    def shown() -> Any:
         hand.move(*PRESS)
         return mode(peer) == expected
 

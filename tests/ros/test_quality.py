@@ -21,7 +21,7 @@ pytestmark = pytest.mark.ros
 JS = topics.SLAVE_MEASURED_JS
 
 
-def heard(peer: "Peer", topic: Topic, qos: QoSProfile):
+def heard(peer: "Peer", topic: Topic, qos: QoSProfile) -> list[Any]:
     """Messages of a subscription as a stock client makes it."""
     found = []
     peer.node.create_subscription(message_type(topic.kind.ros_type), topic.name, found.append, qos)

@@ -1,7 +1,7 @@
 """Start, stop, split and mark a recording by services: whatever is closed can be read."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from std_srvs.srv import Trigger
@@ -37,7 +37,7 @@ class Session:
         key = f"received.{MASTER.name}"
         before = self.peer.status("recorder").number(key)
 
-        def heard():
+        def heard() -> Any:
             self._stamp += MS
             self.peer.send(MASTER, self._stamp, REST)
             return self.peer.status("recorder").number(key) >= before + count

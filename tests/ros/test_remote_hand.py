@@ -92,7 +92,7 @@ def at_rest(listener: "Listener", count: int = 1000) -> Callable[[], object]:
 @pytest.mark.slow
 @pytest.mark.alone
 def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(
-    peer: "Peer", session
+    peer: "Peer", session: object
 ) -> None:
     peer.wait(lambda: "nobody holds" in peer.status("operator").message, "a hand that waits")
     peer.wait_value("operator", "has_begun", lambda n: n == 1)
@@ -133,7 +133,7 @@ def test_a_node_of_its_own_hears_buttons_and_refuses_what_is_no_pose(peer: "Peer
     peer.wait(lambda: buttons.take() and buttons.values[-1][0] == 1.0, "a pressed clutch")
     person = Person(peer)
 
-    def follows():
+    def follows() -> Any:
         poses.take()
         return np.abs(poses.values[-1][:3] - rest_pose()[:3] - [0.01, 0.0, 0.0]).max() < 1e-4
 

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Callable, Collection, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def short_session(
     return run
 
 
-def off_grid(bag):
+def off_grid(bag: Any) -> Any:
     """Largest distance of a master reading from the Phantom's grid, in its steps."""
     steps = bag.read(topics.MASTER_MEASURED_CP).values[:, :3] / GRID
     return np.abs(steps - np.rint(steps)).max()
@@ -169,7 +169,7 @@ def test_a_stewart_slave_goes_where_a_pose_says_from_process_to_process(peer: "P
     for name in ("slave", "inverse_kinematics"):
         peer.wait_state(name, "active")
 
-    def arrived():
+    def arrived() -> Any:
         nonlocal stamp
         stamp += MS
         send_pose(peer, stamp, goal)

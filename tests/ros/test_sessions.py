@@ -41,7 +41,7 @@ STEADY: dict[str, Any] = {
 }  # fmt: skip
 
 
-def drive(peer: "Peer", topic: Topic, wanted, listener: "Listener", start: int = 0) -> int:
+def drive(peer: "Peer", topic: Topic, wanted: Any, listener: "Listener", start: int = 0) -> int:
     """Send a value until the slave's setpoints carry its stamp; returns that stamp."""
     stamp = start
 
@@ -75,7 +75,7 @@ def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
         """Publish until one more is refused for this reason."""
         name = f"refused.slave/servo_jp.{key}"
 
-        def refused():
+        def refused() -> Any:
             nonlocal last
             last += MS
             publish(last)
@@ -87,7 +87,7 @@ def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
     near = HOME - 0.002 * np.eye(6)[0]
     publisher = peer.publisher(topics.SLAVE_SERVO_JP)
 
-    def typed(names, position) -> Callable[..., object]:
+    def typed(names: list[Any] | tuple[str, ...], position: Any) -> Callable[..., object]:
         def publish(stamp: int) -> None:
             message = JointState(name=list(names), position=list(map(float, position)))
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
@@ -105,7 +105,7 @@ def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
     last = max(setpoints.stamps)
     good = drive(peer, topics.SLAVE_SERVO_JP, wanted, setpoints, last)
 
-    def backwards():
+    def backwards() -> Any:
         peer.send(topics.SLAVE_SERVO_JP, good - MS, near)
         status = peer.status("slave")
         return status and status.number("refused.slave/servo_jp.not_newer") > 0
@@ -122,8 +122,8 @@ def test_poses_that_are_not_unit_or_not_finite_are_refused(peer: "Peer") -> None
     peer.start("inverse_kinematics")
     stamp = 0
 
-    def refuse(key: str, pose) -> None:
-        def refused():
+    def refuse(key: str, pose: Callable[..., object] | list[Any]) -> None:
+        def refused() -> Any:
             nonlocal stamp
             stamp += MS
             peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ def recorded(composed_session: NDArray[np.int64]) -> Bag:
         return Bag(bag)
 
 
-def change(peer: "Peer", name: str, transition) -> None:
+def change(peer: "Peer", name: str, transition: Any) -> None:
     request = ChangeState.Request(transition=Transition(id=transition))
     assert peer.call(ChangeState, f"/{name}/change_state", request).success
 
@@ -87,7 +87,9 @@ def test_a_composed_session_computes_what_virtual_time_computes(recorded: Bag) -
     assert np.array_equal(live_poses, virtual["master_measured_cp"])
 
 
-def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer: "Peer", session) -> None:
+def test_an_outside_master_takes_over_when_the_inside_one_is_off(
+    peer: "Peer", session: object
+) -> None:
     change(peer, "haptic_master", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("haptic_master", "inactive")
     commands = peer.listen(topics.SLAVE_SERVO_CP)
@@ -107,7 +109,7 @@ def test_an_outside_master_takes_over_when_the_inside_one_is_off(peer: "Peer", s
     peer.wait(moved, "slave commands that follow the outside master")
 
 
-def test_the_inside_master_comes_back_without_a_jump(peer: "Peer", session) -> None:
+def test_the_inside_master_comes_back_without_a_jump(peer: "Peer", session: object) -> None:
     measured = peer.listen(topics.SLAVE_MEASURED_JS)
     # Few samples are no stream, of which an outage would pause the arm.
     peer.wait(
@@ -128,7 +130,7 @@ def test_the_inside_master_comes_back_without_a_jump(peer: "Peer", session) -> N
     assert np.abs(np.diff(np.array(measured.values)[:, :6], axis=0)).max() < 0.01
 
 
-def test_a_node_may_leave_a_composed_session_in_any_moment(peer: "Peer", session) -> None:
+def test_a_node_may_leave_a_composed_session_in_any_moment(peer: "Peer", session: object) -> None:
     for _ in range(20):
         for transition in (
             Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
@@ -196,7 +198,7 @@ subprocess.run([sys.executable, "-c", started], check=True)
     assert said[1] == "0"
 
 
-def rest_of(measured: "Listener"):
+def rest_of(measured: "Listener") -> Any:
     """Joints of an arm that has not moved for 500 samples; nothing before."""
     measured.take()
     joints = np.array(measured.values)[-500:, :6]
@@ -206,7 +208,7 @@ def rest_of(measured: "Listener"):
 
 @pytest.mark.alone
 def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(
-    peer: "Peer", session
+    peer: "Peer", session: object
 ) -> None:
     change(peer, "inverse_kinematics", Transition.TRANSITION_DEACTIVATE)
     peer.wait_state("inverse_kinematics", "inactive")
@@ -216,7 +218,7 @@ def test_a_flood_of_commands_is_not_followed_faster_and_drops_no_step(
     status = peer.status("slave")
     known = [(status.number("received.slave/servo_jp"), status.number("dropped_time_ms"))]
 
-    def flooded_without_loss():
+    def flooded_without_loss() -> Any:
         """Send far more than the slave takes, until it has got a thousand and dropped no step.
 
         A machine that stood still for a moment costs a flood; one that the slave cannot bear

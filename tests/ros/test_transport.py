@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
@@ -54,7 +54,7 @@ while True:
 """
 
 
-def plain(**said: object):
+def plain(**said: object) -> dict[str | Any, str | Any]:
     """Environment of a user who has said nothing but this."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith(MIDDLEWARE)}
     return kept | said

@@ -65,14 +65,14 @@ def test_a_second_master_is_refused_and_the_first_one_goes_on(peer: "Peer") -> N
     for number in range(1, stamp):  # so that their numbers are apart
         first.publish(form.encode_one(number, pose))
 
-    def heard():
+    def heard() -> Any:
         first.publish(form.encode_one(stamp, pose))
         return peer.status("motion_scaling").number("received.master/measured_cp") > 0
 
     peer.wait(heard, "the first one, which owns the topic from then on")
     commands = peer.listen(topics.SLAVE_SERVO_CP)  # which carry the stamps of their poses on
 
-    def refused():
+    def refused() -> Any:
         """Report that tells of it; a later one is of a time without messages."""
         nonlocal stamp
         stamp += 2
@@ -115,7 +115,7 @@ def test_a_recorder_does_not_take_a_second_publisher_for_losses(
         first.publish(data)
     sent = 1000
 
-    def recorded():
+    def recorded() -> Any:
         nonlocal sent
         for _ in range(20):
             first.publish(data)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import chain, repeat
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ STEP = 2.5  # 1.2 of a rated speed, over two periods at most, in steps of one at
 
 
 @pytest.fixture
-def bridge(tmp_path: Path):
+def bridge(tmp_path: Path) -> list[Any]:
     """Command of the bridge that leads the arm."""
     file = tmp_path / "arm.yaml"
     file.write_text(
@@ -59,7 +60,7 @@ def witness(domain: int) -> Iterator[Callable[[], object]]:
     said = []
     node.create_subscription(Float64MultiArray, "witness", lambda m: said.append(list(m.data)), 10)
 
-    def newest():
+    def newest() -> list[Any]:
         while not said or np.isnan(said[-1][0]):
             executor.spin_once(0.1)
         for _ in range(100):
@@ -89,7 +90,9 @@ def arm(*others: object):
     assert set(codes) == {0}
 
 
-def led(tmp_path: Path, bridge, seed: int, *settings: object, operator: tuple[object, ...] = ()):
+def led(
+    tmp_path: Path, bridge: Any, seed: int, *settings: object, operator: tuple[object, ...] = ()
+):
     """A recorded session that leads the arm, and what the controller witnessed."""
     out = tmp_path / f"bag_{seed}"
     live = [
@@ -107,7 +110,7 @@ def led(tmp_path: Path, bridge, seed: int, *settings: object, operator: tuple[ob
     return tc.open_recording(out), first, largest
 
 
-def goes_home_and_follows(recording: tc.Recording, first, largest) -> None:
+def goes_home_and_follows(recording: tc.Recording, first: Any, largest: Any) -> None:
     assert first <= STEP
     assert largest <= STEP
     measured, setpoints = recording["slave/measured_js"], recording["slave/setpoint_js"]
@@ -122,12 +125,16 @@ def goes_home_and_follows(recording: tc.Recording, first, largest) -> None:
     assert went.max() > 0.8 * asked.max()
 
 
-def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(tmp_path: Path, bridge) -> None:
+def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(
+    tmp_path: Path, bridge: list[Any]
+) -> None:
     goes_home_and_follows(*led(tmp_path, bridge, 1))
 
 
 @pytest.mark.soak
-def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path: Path, bridge) -> None:
+def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(
+    tmp_path: Path, bridge: list[Any]
+) -> None:
     pytest.importorskip("pygame")
     pad = [sys.executable, str(ROOT / "tests/padded_operator.py"), "operator"]
     operator = [*pad, "--ros-args", "-p", "kind:=gamepad"]
@@ -139,7 +146,7 @@ def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path: Pa
 
 @pytest.mark.soak
 def test_a_person_at_the_console_leads_it_without_a_jump(
-    tmp_path: Path, bridge, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, bridge: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     remote = ["operator=remote", "operator.patience=0.0", "teleop.duration=3600.0"]
     remote += ["operator.remote.timeout=1.5"]  # a busy console is no reason to let go
@@ -168,12 +175,14 @@ def test_a_person_at_the_console_leads_it_without_a_jump(
 
 
 @pytest.mark.soak
-def test_it_starts_twenty_times_without_a_jump(tmp_path: Path, bridge) -> None:
+def test_it_starts_twenty_times_without_a_jump(tmp_path: Path, bridge: list[Any]) -> None:
     for seed in range(2, 22):
         goes_home_and_follows(*led(tmp_path, bridge, seed))
 
 
-def test_the_drill_stops_it_and_finds_it_lost_as_a_simulated_arm(tmp_path: Path, bridge) -> None:
+def test_the_drill_stops_it_and_finds_it_lost_as_a_simulated_arm(
+    tmp_path: Path, bridge: list[Any]
+) -> None:
     names = ("stop_topic", "kill_slave_sim")
     code, text, outcomes = run_drill(
         tmp_path, *names, "--drives", shlex.join(bridge), "--arm", shlex.join(CONTROLLER),

@@ -1,7 +1,7 @@
 """What RViz and Foxglove get of a running session, and what its recording holds of it."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_
     # Somebody who comes late gets the description all the same.
     peer.node.create_subscription(String, "/robot_description", described.append, LATCHED)
 
-    def told():
+    def told() -> list[Any]:
         peer.spin()
         return described
 
@@ -78,7 +78,7 @@ def test_a_robot_that_is_not_the_recorders_is_not_drawn_as_this_one(
     publisher = peer.publisher(SLAVE_MEASURED_JS)
     key = f"received.{MASTER_MEASURED_CP.name}"
 
-    def heard():
+    def heard() -> Any:
         stamp_ns = next(stamps)
         publisher.publish(form.encode_one(stamp_ns, joints))
         peer.send(MASTER_MEASURED_CP, stamp_ns, np.array(REST))

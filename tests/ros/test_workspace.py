@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import pytest
@@ -49,7 +49,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-def colcon(workspace: Path, *arguments: object):
+def colcon(workspace: Path, *arguments: object) -> Any:
     path = f"{COLCON.parent}:{os.environ['PATH']}"
     done = subprocess.run(
         [COLCON, *arguments], cwd=workspace, capture_output=True, text=True, timeout=900,

@@ -36,7 +36,7 @@ def page(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         assert console.end() == 0, console.text
 
 
-def go_to(page, time: float) -> None:
+def go_to(page: Headless, time: float) -> None:
     """Write a time [s] beside its slider."""
     page.fill("time", f"{time:.3f}")
     page.key("Enter")

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterator
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
 
 import numpy as np
 import pytest
@@ -178,7 +179,7 @@ def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab: 
         assert server.drivers.pages == (page,)  # its connection is well: a worker answers
 
 
-def gizmo_tip(tab) -> tuple[int, int]:
+def gizmo_tip(tab: Headless) -> tuple[int, int]:
     """A point of the upward arrow of a gizmo at the origin [px]: where the cursor grabs it."""
     tab.value("new Promise((done) => setTimeout(done, 500))")
     return (CENTER[0], CENTER[1] - 40)
@@ -217,7 +218,7 @@ def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_se
         dead.close()
 
 
-def cloud(seed: int):
+def cloud(seed: int) -> dict[Any, Any]:
     points = np.random.default_rng(seed).normal(size=(20_000, 3)).astype(np.float32)
     return {"points": points, "colors": np.zeros((20_000, 3), np.uint8)}
 

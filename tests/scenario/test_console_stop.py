@@ -1,6 +1,7 @@
 """The page's emergency stop: in view at any scroll, and seen by all pages when pressed."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -69,7 +70,7 @@ def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pr
         assert not tab.faults()
 
 
-def gizmos(server: ConsoleServer):
+def gizmos(server: ConsoleServer) -> list[Any]:
     """All styli's handles that the server shows."""
     return list(server.viser.scene._handle_from_transform_controls_name.values())
 

@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -46,7 +46,7 @@ def imported(teleop: "Run", hand: Path, tmp_path_factory: pytest.TempPathFactory
     return out, teleop("import", hand, "--out", out).stdout
 
 
-def next_command(text) -> list[str]:
+def next_command(text: Any) -> list[str]:
     return present(re.search(r"next: teleop (.*)", text))[1].split()
 
 

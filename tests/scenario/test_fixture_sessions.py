@@ -19,13 +19,13 @@ READING = 0.11
 pytestmark = pytest.mark.slow
 
 
-def session(kind, **settings: object) -> tc.Recording:
+def session(kind: Any, **settings: object) -> tc.Recording:
     """Ten seconds of a person who aims beyond the fixture."""
     more: dict[str, Any] = {**SETTINGS.get(kind, {}), **settings}
     return tc.run("coarse_box", duration=SECONDS, fixture=kind, **more)
 
 
-def ways(recording: tc.Recording, kind):
+def ways(recording: tc.Recording, kind: Any):
     """Depths (N,) and ways (N, 3) [m] of the hand from its fixture while it is on, and pushes."""
     on = recording["teleop/state"]["is_fixture_on"] > 0
     begin = recording["teleop/state"].time[np.argmax(on)]

@@ -20,13 +20,13 @@ PEOPLE = runpy.run_path(str(EXAMPLE))["PEOPLE"] | {"tremor_um": (57.0, 69.0)}
 SINGLE = 0.1
 
 
-def figures(name: str, **changes: object):
+def figures(name: str, **changes: object) -> list[Any]:
     """A figure of the hand, of each seed."""
     return [score.value(f"motion.hand.{name}") for score in scores(**changes)]
 
 
 @cache
-def scores(**changes: Any):
+def scores(**changes: Any) -> list[Any]:
     return [tc.run("human", seed=seed, **changes).score() for seed in SEEDS]
 
 

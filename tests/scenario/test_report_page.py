@@ -6,7 +6,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def browser() -> str:
     return found
 
 
-def record(path: Path, seed: int, fixture=None, count: int = 6000) -> Path:
+def record(path: Path, seed: int, fixture: dict[Any, Any] | None = None, count: int = 6000) -> Path:
     """A live-looking recording: a tip on a curve through a fixture, with delays and a noisy hand.
 
     ``fixture`` are names and texts that describe it; None for a box, as older recordings have it.
@@ -106,7 +106,7 @@ def opened(browser: str, page: Path, folder: Path):
     return attributes, said, requested(log)
 
 
-def requested(log):
+def requested(log) -> set[Any]:
     """URLs for which a page asked the network, from Chromium's log of it."""
     # One event per line; whether the end is written depends on how the browser ends.
     lines = [line.rstrip(",") for line in log.read_text(errors="replace").splitlines()]

@@ -44,7 +44,7 @@ CARD = """[...document.querySelectorAll('figure.card')].filter((f) =>
     f.querySelector('h3').textContent === 'Replay')[{number}]"""
 
 
-def joints_of(robot: Robot, times: Array):
+def joints_of(robot: Robot, times: Array) -> Any:
     """Joints (N, n) on slow sines about home, within the limits."""
     room = np.minimum(robot.home - robot.lower, robot.upper - robot.home)
     reach = np.where(np.isfinite(room), np.minimum(0.5 * room, 0.1), 0.1)
@@ -110,7 +110,7 @@ def _whole(tab: Headless) -> Iterator[None]:
     assert tab.value("document.body.dataset.errors") is None
 
 
-def show(tab, number: int, time: float):
+def show(tab: Headless, number: int, time: float) -> Any:
     """Move the slider of a replay; returns what is drawn: tip, robot's last solid, fixture."""
     card = CARD.format(number=number)
     return tab.value(f"""(async () => {{

@@ -5,6 +5,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,7 +120,7 @@ def long(tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.fixture(scope="module")
-def tabs():
+def tabs() -> Iterator[dict[Any, Any]]:
     """Tabs by page and width; drawing a page takes seconds."""
     found = {}
     yield found
@@ -134,7 +135,7 @@ def opened(
     """Opens a page at a width; whatever goes wrong in it fails the test."""
     used = []
 
-    def open_page(page, width: int = 1200):
+    def open_page(page, width: int = 1200) -> Any:
         if (page, width) not in tabs:
             tabs[page, width] = Headless(chromium, tmp_path_factory.mktemp("profile"), width)
             tabs[page, width].open(page)
@@ -159,12 +160,12 @@ class _Silent:
         pass
 
 
-def plots(tab: object):
+def plots(tab: object) -> Any:
     tab.settled()
     return tab.value(PLOTS)
 
 
-def ranges(tab: object, recording: str):
+def ranges(tab: object, recording: str) -> list[Any]:
     """Visible times of all plots against time of a recording, each once."""
     found = {
         (round(begin, 6), round(end, 6))
@@ -185,7 +186,7 @@ def show(tab: object, begin: float, end: float, recording: int = 0) -> None:
     tab.settled()
 
 
-def area(tab: tuple[int, int, float], selector: str):
+def area(tab: tuple[int, int, float], selector: str) -> Any:
     """Left, top, width and height of an element that is brought into the window, [px]."""
     return tab.value(
         f"""(() => {{ const part = document.querySelector({json.dumps(selector)});
@@ -348,7 +349,7 @@ def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(
 # -- bands -----------------------------------------------------------------------------------------
 
 
-def bounds(shape):
+def bounds(shape: Any) -> list[Any]:
     """Begins and ends of a band's stretches."""
     corners = shape["path"].replace("Z", "").split("M")[1:]
     places = [[float(corner.split(",")[0]) for corner in part.split("L")] for part in corners]

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -296,7 +297,9 @@ def test_the_arcs_of_the_swivel_hold_a_legal_posture_without_any_search(
 
 
 @kernel
-def psi_of(branch, elbow, seed: Array, limits: Array, geometry: Array, work: Array) -> float:
+def psi_of(
+    branch: Any, elbow: Any, seed: Array, limits: Array, geometry: Array, work: Array
+) -> float:
     """Psi [rad] that is taken of a branch; infinity where none is legal."""
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
     K, arcs = geometry[constants_at(7) :], np.empty(ARCS)
@@ -306,7 +309,7 @@ def psi_of(branch, elbow, seed: Array, limits: Array, geometry: Array, work: Arr
 
 @kernel
 def write_at(
-    branch, psi, elbow, seed: Array, limits: Array, geometry: Array, work: Array, q
+    branch: Any, psi: Any, elbow, seed: Array, limits: Array, geometry: Array, work: Array, q
 ) -> None:
     """Write the joints (8,) of a branch at psi [rad], by whole turns into limits if any are."""
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
@@ -357,7 +360,7 @@ def test_seven_axes_use_their_freedom_to_follow_paths_within_speeds_and_limits(
 
 
 @kernel
-def least_move(T, seed: Array, limits: Array, geometry: Array, q) -> bool:
+def least_move(T: Any, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
     return swivel._least_move(T, seed, limits, geometry, q)
 
 

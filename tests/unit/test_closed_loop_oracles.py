@@ -85,7 +85,7 @@ class Mechanism:
         x[first : first + len(numbers)] = numbers
         return x
 
-    def q(self, x: Array, joints=None) -> Array:
+    def q(self, x: Array, joints: Any = None) -> Array:
         """Joint vector of a configuration."""
         return x[[self.model.idx_qs[j] for j in joints or self.motors]]
 

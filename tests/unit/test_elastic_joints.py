@@ -1,6 +1,7 @@
 """Elastic joints, late and weak drives: each acts as its formula says, none by default."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -93,7 +94,41 @@ def test_a_gear_that_swings_too_fast_for_the_ticks_is_refused() -> None:
 
 
 @kernel
-def drive_on(p: SimulationNumbers, s: SimulationState, arm, efforts: Array) -> None:
+def drive_on(
+    p: SimulationNumbers,
+    s: SimulationState,
+    arm: tuple[
+        Any,
+        Any,
+        Any,
+        Any,
+        Any,
+        Any,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Array,
+        Any,
+        Array,
+        Array,
+        Array,
+        Array,
+    ],
+    efforts: Array,
+) -> None:
     """What drives give for rows of efforts (N, 6); written in their place."""
     for k in range(efforts.shape[0]):
         for i in range(6):

@@ -4,6 +4,7 @@ import io
 import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -359,7 +360,7 @@ def test_accumulator_that_is_asked_for_too_late_is_refused(bag: Bag) -> None:
             super().__init__(context)
             self._context = context
 
-        def values(self):
+        def values(self) -> dict[Any, Any]:
             return {"rms": self._context.shared(Late)}
 
     with pytest.raises(EvaluationError, match="Late is asked for too late"):

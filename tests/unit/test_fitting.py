@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -147,7 +148,7 @@ def test_an_unknown_parameter_and_another_plant_are_refused(published: RestTable
         fit(published, slave(**{"plant.kind": "ideal"}))
 
 
-def changed(tmp_path: Mutant | Path, change) -> Path:
+def changed(tmp_path: Mutant | Path, change: Any) -> Path:
     table = pd.read_csv(PUBLISHED)
     file = tmp_path / "rests.csv"
     change(table).to_csv(file, index=False)

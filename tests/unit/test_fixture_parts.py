@@ -86,7 +86,7 @@ def writes_four(offset, shape, out) -> float:
     return 0.0
 
 
-def reads_beyond(offset, shape, out):
+def reads_beyond(offset, shape, out) -> Any:
     return offset[0] - shape[3]
 
 

@@ -296,7 +296,7 @@ class WedgeParameters:
 
 
 @kernel
-def wedge_depth(offset, shape, out):
+def wedge_depth(offset, shape, out) -> Any:
     """Depth beyond the deeper of two planes: one round leads in only where one is crossed."""
     first, second = offset[0] - 0.01, shape[0] * offset[0] + shape[1] * offset[1] - 0.01
     depth = max(first, second, 0.0)

@@ -1,6 +1,7 @@
 """Geometry kernels against scipy's rotations, and at the angles where formulas break."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pinocchio
@@ -30,7 +31,7 @@ vectors = st.tuples(*[st.floats(-4.0, 4.0)] * 3).map(np.array)
 
 
 @kernel
-def angle_between(a, b) -> float:
+def angle_between(a: Any, b: Any) -> float:
     return geometry.rotation_angle_between(a, b)
 
 

@@ -57,7 +57,7 @@ class Bench:
         self.rows = []
         self.run(OPEN, 2)
 
-    def tick(self, command: float | None = None, tip=None, *, is_seen: bool = True) -> None:
+    def tick(self, command: float | None = None, tip: Any = None, *, is_seen: bool = True) -> None:
         row, told, now_ns = self.row, self.told, int(self.row["now_ns"]) + TICK_NS
         row["now_ns"] = told["now_ns"] = now_ns
         if command is not None:

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ def call_with_row(function: Callable[..., object], row: Array, count: int) -> fl
 
 def test_plain_function_serves_in_place_of_a_kernel() -> None:
     @kernel
-    def compiled(row, x):
+    def compiled(row, x) -> Any:
         row[0] += x
         return row[0]
 
@@ -45,10 +46,10 @@ def test_plain_function_serves_in_place_of_a_kernel() -> None:
 
 def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_each_time() -> None:
     @kernel
-    def compiled(row):
+    def compiled(row) -> Any:
         return row[0]
 
-    def plain(row):
+    def plain(row) -> Any:
         return row[0]
 
     whole, real = types.int64(ROW), types.float64(ROW)

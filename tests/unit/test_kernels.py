@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -131,7 +132,7 @@ def test_record_has_its_fields_as_attributes_and_shares_its_memory() -> None:
 
 def test_field_named_like_something_that_numpy_numbers_have_is_the_field() -> None:
     @kernel
-    def total(row):
+    def total(row: Any) -> Any:
         row.min = 3.0
         return row.size + row.min
 

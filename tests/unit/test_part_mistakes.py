@@ -249,7 +249,7 @@ class Nameless(Metric):
     def add(self, window) -> None:
         """Take nothing."""
 
-    def values(self):
+    def values(self) -> dict[Any, Any]:
         return {}
 
 

@@ -1,6 +1,7 @@
 """Passivity: power of a port, energies that only grow, and laws over networks drawn at random."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -298,7 +299,9 @@ YIELDING = {
 """Settings of architectures before a slave that yields."""
 
 
-def drawn(rng: np.random.Generator, kind: str, architecture: str = "position_force"):
+def drawn(
+    rng: np.random.Generator, kind: str, architecture: str = "position_force"
+) -> tuple[Any, ...]:
     """Settings of a session drawn at random: world, gains, hand and network."""
     stiffness = 10.0 ** rng.uniform(1.5, 4.7)
     there = rng.uniform(0.0, 0.5)

@@ -1,6 +1,7 @@
 """RCRT-1 dynamics: closed form against a Lagrangian, pinocchio and energy; the drive table."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pinocchio
@@ -108,7 +109,7 @@ def lagrangian_velocity_effort(q: Array, dq: Array) -> Array:
     return rate @ dq - 0.5 * np.array([dq @ slopes[m] @ dq for m in range(3)])
 
 
-def potential(q: NDArray[np.complex128]):
+def potential(q: NDArray[np.complex128]) -> Any:
     """Potential energy of links 2 and 3; also of complex joints."""
     a1, a2, a3 = links(q)
     height = (a1 @ a2 @ PSEUDO[1])[2, 3] + (a1 @ a2 @ a3 @ PSEUDO[2])[2, 3]

@@ -1,6 +1,7 @@
 """Setpoint weight of the PID: no step overshoots, on any axis, of any size, saturated or not."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -160,7 +161,7 @@ def test_without_integral_action_the_weight_leaves_the_law_as_it_is() -> None:
     assert efforts[0] == efforts[1]
 
 
-def slave_step_trace(name, axis, size) -> Array:
+def slave_step_trace(name: Any, axis: Any, size) -> Array:
     """Ways (ticks,) of an axis of the ideal plant after a step, with the reference filter off."""
     robot = ROBOTS[name]
     start = robot.home.copy()

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -514,7 +515,7 @@ def test_the_slave_trembles_less_and_a_second_run_has_the_same_bits(kind: str) -
     assert calm < 0.4 * trembling
 
 
-def touches(scenario: str, seconds: float, *given: object):
+def touches(scenario: str, seconds: float, *given: object) -> Any:
     """Energies of the contacts of a session: shares given back."""
     rows = session(*given, scenario=scenario).run(round(1000 * seconds))
     contact = rows["master_contact"]
@@ -542,7 +543,7 @@ def test_a_tank_pays_by_the_way_of_the_stylus_itself() -> None:
 
 def test_a_filter_of_ones_own_is_one_call_and_a_wrong_one_is_refused(own_parts: None) -> None:  # noqa: F811
     @kernel
-    def half(numbers, memory, value, period):
+    def half(numbers, memory, value, period) -> Any:
         memory[0] += 0.5 * (value - memory[0])
         return memory[0]
 

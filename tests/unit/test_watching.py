@@ -108,7 +108,7 @@ def test_kernels_that_are_compiled_are_counted() -> None:
         return x + 1.0
 
     @njit
-    def outer(x: float):
+    def outer(x: float) -> float:
         return inner(x) * 2.0
 
     assert not is_compiling()
