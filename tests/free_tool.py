@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,7 +63,7 @@ def _place(
 
 
 @kernel
-def stored(p: object, contacts: NDArray[np.void]) -> float:
+def stored(p: Any, contacts: NDArray[np.void]) -> float:
     """Energy in the springs of all points that touch [J]."""
     energy = 0.0
     for point in range(contacts.shape[0]):
@@ -77,7 +78,7 @@ def stored(p: object, contacts: NDArray[np.void]) -> float:
 
 @kernel
 def _drag(
-    p: object,
+    p: Any,
     contacts: NDArray[np.void],
     arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
     q: Array,
@@ -110,7 +111,7 @@ def _drag(
 
 @kernel
 def _fly(
-    p: object,
+    p: Any,
     s: SimulationState,
     contacts: NDArray[np.void],
     arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],

@@ -119,7 +119,7 @@ def _lead(
 
 
 def lead(
-    way: Array, name: str = "plane", parameters: object = None, **numbers: float
+    way: Array, name: str = "plane", parameters: Any = None, **numbers: float
 ) -> tuple[Array, Array, object]:
     """Forces (ticks, 3) [N], energy lost (ticks,) [J] and state of a tip led through places.
 

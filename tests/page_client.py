@@ -106,7 +106,7 @@ class PageClient:
         finally:
             self.is_cut = True
 
-    def _take(self, message: Mapping[str, object]) -> None:
+    def _take(self, message: Mapping[str, Any]) -> None:
         kind = message["type"]
         content = message.get("updates", message.get("props", {})).get("content", "")
         if "t-status" in content:

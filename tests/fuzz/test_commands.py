@@ -135,7 +135,7 @@ def bag2(path: Path, storage: StoragePlugin, mode: Any = None) -> bytes:
     return next(file for file in path.iterdir() if file.suffix != ".yaml").read_bytes()
 
 
-def _write(writer: Writer1 | Writer2, store: Typestore, serialise: Callable[..., object]) -> None:
+def _write(writer: Writer1 | Writer2, store: Typestore, serialise: Callable[..., Any]) -> None:
     known = {}
     with writer:
         for topic, stamp, message in messages(store):

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import strategies as st
 
 from fuzzing import fuzz
+from present import present
 from teleop_core.slave.operation import Fault, OperationParameters, State
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
@@ -31,7 +32,7 @@ ARMS = {standstill: arm(standstill) for standstill in ("hold", "brake")}
 def play(slave: SimulatedArm, words: Any) -> None:
     """Send words one by one; after each the flags must agree and the setpoint keep its limits."""
     row, ns = slave.signals, 10**9
-    reach = slave.robot.drives.speed_limit * 1e-3
+    reach = present(slave.robot.drives).speed_limit * 1e-3
     for word in words:
         ticks = word if isinstance(word, int) and not isinstance(word, bool | Fault) else 1
         if isinstance(word, str):

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ KINDS = ("joint_state", "forward_command", "joint_trajectory", "crtk")
 ROBOT = load_robot("rcrt1")
 JOINTS = ("base", "shoulder", "slide", "roll", "pitch", "yaw")
 STANDS = np.array([0.1, 1.9, 0.4, 0.0, 0.1, 0.0])
-NAMED = {
+NAMED: dict[str, Any] = {
     "joints": [f"{ours}={theirs}" for ours, theirs in zip(ROBOT.joint_names, JOINTS, strict=True)],
     "signs": [1.0, -1.0, 1.0, 1.0, 1.0, 1.0],
     "order": list(reversed(JOINTS)),
@@ -87,7 +87,7 @@ class RealArm:
 
 
 @contextmanager
-def real_arm(peer: "Peer", kind: str = "joint_state", **parameters: object) -> Iterator[RealArm]:
+def real_arm(peer: "Peer", kind: str = "joint_state", **parameters: Any) -> Iterator[RealArm]:
     """A real arm of a kind that stands off its home, led from there."""
     env = environment() | {"ROS_DOMAIN_ID": peer.domain}
     controller = subprocess.Popen([sys.executable, str(CONTROLLER), kind], env=env)

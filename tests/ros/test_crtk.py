@@ -60,7 +60,7 @@ class StockClient:
             peer.node.create_subscription(kind, f"{arm}/{name}", self.taker(name), 10)
         self.commands = {}
 
-    def taker(self, name: str) -> Callable[..., object]:
+    def taker(self, name: str) -> Callable[..., Any]:
         def take(message) -> None:
             self.newest[name] = message
             if name == "operating_state":

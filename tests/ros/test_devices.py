@@ -4,7 +4,7 @@ import signal
 import time
 from collections.abc import Iterator
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ class Clock:
         self._hand, self._ticks, self._begin = hand, 0, time.monotonic()
         self.row = np.zeros(12)
 
-    def until(self, condition: object, what: str) -> None:
+    def until(self, condition: Any, what: str) -> None:
         deadline = time.monotonic() + 30.0
         while not condition():
             assert time.monotonic() < deadline, what

@@ -98,14 +98,14 @@ def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer: "P
 
 
 @pytest.fixture
-def composed(compose: Callable[..., object]) -> object:
+def composed(compose: Callable[..., object]) -> Any:
     """Process of the composed session, all its nodes active."""
     return compose(operator={"approach_time": 1.0, "patience": 0.0})
 
 
 @pytest.mark.parametrize("name", ["slave", "recorder"])
 def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
-    peer: "Peer", composed: object, tmp_path: Path, name: str
+    peer: "Peer", composed: Any, tmp_path: Path, name: str
 ) -> None:
     peer.wait_value("slave", "ticks", lambda ticks: ticks > 100)
     assert change(peer, name, Transition.TRANSITION_ACTIVE_SHUTDOWN)
@@ -128,7 +128,7 @@ def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
     ],
 )
 def test_no_node_outlives_the_command_and_the_recording_is_closed(
-    start: Callable[..., object], number, composed_option: tuple[str, ...]
+    start: Callable[..., Any], number, composed_option: tuple[str, ...]
 ) -> None:
     session = start(*composed_option)
     session.wait_running()
@@ -146,7 +146,7 @@ def test_no_node_outlives_the_command_and_the_recording_is_closed(
 
 
 def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_first(
-    start: Callable[..., object],
+    start: Callable[..., Any],
 ) -> None:
     session = start("--composed")
     session.wait_running()
@@ -160,7 +160,7 @@ def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_fir
 
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
 def test_a_stage_that_never_comes_back_is_found_within_a_second(
-    start: Callable[..., object], tmp_path: Path, composed_option: tuple[str, ...]
+    start: Callable[..., Any], tmp_path: Path, composed_option: tuple[str, ...]
 ) -> None:
     parts = tmp_path / "hangs.py"
     parts.write_text(HANGS)
@@ -182,7 +182,7 @@ def test_a_stage_that_never_comes_back_is_found_within_a_second(
 
 
 def test_a_second_session_in_the_same_domain_is_refused_though_another_user_started_it(
-    start: Callable[..., object], tmp_path: Path
+    start: Callable[..., Any], tmp_path: Path
 ) -> None:
     domain = {"ROS_DOMAIN_ID": free_domain()}
     first = start("--composed", env=domain)
@@ -196,7 +196,7 @@ def test_a_second_session_in_the_same_domain_is_refused_though_another_user_star
     assert first.wait() == 0, first.text
 
 
-def test_a_process_that_stands_still_ends_the_session(start: Callable[..., object]) -> None:
+def test_a_process_that_stands_still_ends_the_session(start: Callable[..., Any]) -> None:
     session = start()
     session.wait_running()
     (node,) = session.nodes("inverse_kinematics")
@@ -207,7 +207,7 @@ def test_a_process_that_stands_still_ends_the_session(start: Callable[..., objec
 
 
 def test_a_session_starts_with_no_kernel_compiled_on_a_busy_machine(
-    start: Callable[..., object], tmp_path: Path
+    start: Callable[..., Any], tmp_path: Path
 ) -> None:
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
@@ -239,7 +239,7 @@ def test_sessions_start_and_end_again_and_again(
 
 @pytest.mark.parametrize("composed_option", [(), ("--composed",)], ids=["five", "composed"])
 def test_a_session_that_a_shell_started_in_the_background_ends_like_any(
-    start: Callable[..., object], composed_option: tuple[str, ...]
+    start: Callable[..., Any], composed_option: tuple[str, ...]
 ) -> None:
     session = start(*composed_option, duration=1.0, ignores=(signal.SIGINT, signal.SIGQUIT))
     for name in NODES:  # from then on nothing is started or compiled

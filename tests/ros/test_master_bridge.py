@@ -17,6 +17,7 @@ from geometry_msgs.msg import Pose, PoseStamped, TransformStamped, WrenchStamped
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import Joy
 
+from present import present
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
@@ -170,24 +171,24 @@ def test_three_motions_write_what_the_bridge_needs(peer: "Peer", tmp_path: Path)
             """Whether the command has asked so often; what it says comes without an end of line."""
             nonlocal said
             peer.spin()
-            assert asking.poll() in {None, 0}, asking.stderr.read()
+            assert asking.poll() in {None, 0}, present(asking.stderr).read()
             if select.select([asking.stdout], [], [], 0.0)[0]:
-                said += os.read(asking.stdout.fileno(), 4096).decode()
+                said += os.read(present(asking.stdout).fileno(), 4096).decode()
             return said.count(text) > count
 
         # To the right, up and towards the person: the device's y, z and x, a decimetre each.
         for k, way in enumerate(100.0 * ROWS + 3.0):
             peer.wait(lambda k=k: asks("hold the stylus still", k), "the begin of a motion")
-            asking.stdin.write("\n")
-            asking.stdin.flush()
+            present(asking.stdin).write("\n")
+            present(asking.stdin).flush()
             peer.wait(lambda k=k: asks("hold it there", k), "the end of a motion")
             device.place = device.place + way
             for _ in range(50):  # messages of the place before are on the way
                 peer.spin()
-            asking.stdin.write("\n")
-            asking.stdin.flush()
+            present(asking.stdin).write("\n")
+            present(asking.stdin).flush()
         peer.wait(lambda: peer.spin() or asking.poll() is not None, "its end")
-        assert asking.returncode == 0, asking.stderr.read()
+        assert asking.returncode == 0, present(asking.stderr).read()
     found = yaml.safe_load(file.read_text())["master_bridge"]["ros__parameters"]
     assert found == {
         "pose_topic": "/touch/pose", "pose_message": "geometry_msgs/msg/PoseStamped",
@@ -199,7 +200,7 @@ def test_a_topic_that_is_not_there_is_told_with_those_that_are(peer: "Peer") -> 
     Device(peer)
     with command(peer, "nowhere/pose") as asking:
         peer.wait(lambda: peer.spin() or asking.poll() is not None, "its end")
-        told = asking.stderr.read()
+        told = present(asking.stderr).read()
     assert asking.returncode == 2
     assert "/nowhere/pose is not there" in told
     assert "/touch/pose" in told

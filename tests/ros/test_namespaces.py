@@ -32,7 +32,7 @@ MEASURED = topics.SLAVE_MEASURED_CP.name
 
 
 @pytest.fixture
-def start(peer: "Peer", tmp_path: Path) -> Iterator[Callable[..., object]]:
+def start(peer: "Peer", tmp_path: Path) -> Iterator[Callable[..., Any]]:
     """Starter of a composed session with a parameter file; it ends with the test."""
     started = []
 
@@ -71,7 +71,7 @@ def recorded(peer: "Peer", process: Array, tmp_path: Array | Path, *slaves: obje
 
 @pytest.mark.slow
 def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
-    peer: "Peer", start: Callable[..., object], tmp_path: Path
+    peer: "Peer", start: Callable[..., Any], tmp_path: Path
 ) -> None:
     groups = {"operator": PATIENCE, "slave": RCRT1 | {"command_timeout": 0.25}}
     process = start(groups, "-r", "__ns:=/left", "-r", "__node:=arm")
@@ -97,7 +97,7 @@ def test_a_composed_session_that_is_given_a_name_keeps_the_names_of_its_nodes(
 
 @pytest.mark.slow
 def test_arms_of_a_session_in_a_namespace_stay_apart_below_it(
-    peer: "Peer", start: Callable[..., object], tmp_path: Path
+    peer: "Peer", start: Callable[..., Any], tmp_path: Path
 ) -> None:
     puma = {"robot": "puma560"}
     groups = {

@@ -199,7 +199,7 @@ def test_a_press_that_releases_follow_at_once_stops_the_arm(
 
 
 @pytest.fixture
-def still_slave(peer: "Peer", button: Publisher) -> Callable[[], object]:
+def still_slave(peer: "Peer", button: Publisher) -> Callable[[], Any]:
     """Function that stops the process of a slave that knows the button, and returns it."""
     slave = psutil.Process(peer.nodes[0].process.pid)
 
@@ -213,7 +213,7 @@ def still_slave(peer: "Peer", button: Publisher) -> Callable[[], object]:
 
 @pytest.mark.parametrize("released", [35, 6000])
 def test_a_press_while_the_slave_stands_still_stops_the_arm(
-    peer: "Peer", button: Publisher, still_slave: Callable[[], object], released: int
+    peer: "Peer", button: Publisher, still_slave: Callable[[], Any], released: int
 ) -> None:
     say(button, pressed=0, released=1)
     slave = still_slave()

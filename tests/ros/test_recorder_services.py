@@ -24,7 +24,7 @@ MASTER = topics.MASTER_MEASURED_CP
 class Session:
     """A recorder and a master that sends to it."""
 
-    def __init__(self, peer: "Peer", **parameters: object) -> None:
+    def __init__(self, peer: "Peer", **parameters: Any) -> None:
         self.peer, self._stamp = peer, 0
         self.node = peer.start("recorder", **parameters)
 

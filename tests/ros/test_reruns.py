@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,7 +33,7 @@ def abort_outside_python():
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Callable[..., object]:
+def run(tmp_path: Path) -> Callable[..., Any]:
     """Run a test of this body in a pytest of its own: its output, and how often the test ran."""
 
     def result(body, *options: object):
@@ -50,13 +51,13 @@ def run(tmp_path: Path) -> Callable[..., object]:
 
 
 @pytest.mark.parametrize("fault", ["assert False", "raise TimeoutError", "raise AssertionError"])
-def test_any_failure_of_ours_is_not_rerun(run: Callable[..., object], fault: str) -> None:
+def test_any_failure_of_ours_is_not_rerun(run: Callable[..., Any], fault: str) -> None:
     code, out, runs = run(f"def test_it():\n    count()\n    {fault}\n")
     assert (code, runs) == (1, 1)
     assert "reruns because of the middleware" not in out
 
 
-def test_a_proven_loss_is_rerun_counted_and_named(run: Callable[..., object]) -> None:
+def test_a_proven_loss_is_rerun_counted_and_named(run: Callable[..., Any]) -> None:
     body = "def test_it():\n    if count() == 1:\n        raise MiddlewareLossError('3 of a/b')\n"
     code, out, runs = run(body)
     assert (code, runs) == (0, 2)
@@ -64,14 +65,14 @@ def test_a_proven_loss_is_rerun_counted_and_named(run: Callable[..., object]) ->
     assert "test_it: middleware_faults.MiddlewareLossError: 3 of a/b" in out
 
 
-def test_a_loss_that_comes_every_time_is_a_failure(run: Callable[..., object]) -> None:
+def test_a_loss_that_comes_every_time_is_a_failure(run: Callable[..., Any]) -> None:
     code, out, runs = run("def test_it():\n    count()\n    raise MiddlewareLossError('all')\n")
     assert (code, runs) == (1, 3)
     assert "MiddlewareLossError 2" in out
 
 
 def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(
-    run: Callable[..., object],
+    run: Callable[..., Any],
 ) -> None:
     body = "def test_it():\n    if count() == 1:\n        abort_outside_python()\n"
     code, out, runs = run(body, "-n", "1")
@@ -79,7 +80,7 @@ def test_a_crash_in_a_thread_of_the_middleware_is_rerun_and_named(
     assert "reruns because of the middleware: MiddlewareCrashError 1" in out
 
 
-def test_a_crash_in_our_own_code_is_a_failure(run: Callable[..., object]) -> None:
+def test_a_crash_in_our_own_code_is_a_failure(run: Callable[..., Any]) -> None:
     body = "def test_it():\n    if count() == 1:\n        ctypes.string_at(0)\n"
     code, out, _ = run(body, "-n", "1")
     assert code == 1

@@ -42,7 +42,7 @@ MS = 1_000_000
 @pytest.fixture
 def short_session(
     peer: "Peer", session_until: Callable[..., tuple[Bag, str]]
-) -> Callable[..., object]:
+) -> Callable[..., Any]:
     """Recording of two seconds of a live session, and joints (n,) that moved less than in virtual
     time.
 
@@ -83,9 +83,9 @@ def off_grid(bag: Any) -> Any:
 
 @pytest.mark.parametrize("name", SLAVES)
 def test_every_slave_follows_the_hand_through_a_live_session(
-    short_session: Callable[..., object],
+    short_session: Callable[..., Any],
     name: tuple[
-        Sequence[object | NotSetType], Collection[MarkDecorator | Mark], str | _HiddenParam | None
+        Sequence[Any | NotSetType], Collection[MarkDecorator | Mark], str | _HiddenParam | None
     ],
 ) -> None:
     bag, is_short = short_session(f"robot={name}")
@@ -94,7 +94,7 @@ def test_every_slave_follows_the_hand_through_a_live_session(
 
 
 def test_the_mma_leads_a_live_session_with_its_own_encoders(
-    short_session: Callable[..., object],
+    short_session: Callable[..., Any],
 ) -> None:
     bag, is_short = short_session("device.handle=mma")
     assert not is_short.any()

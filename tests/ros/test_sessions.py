@@ -199,9 +199,9 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer: "Peer") -> None:
     np.testing.assert_allclose(answer(is_foreign=True), ours, atol=1e-12)
 
 
-def chain(peer: "Peer", master: dict[str, object] = STEADY) -> None:
+def chain(peer: "Peer", master: dict[str, Any] = STEADY) -> None:
     # On a busy machine nothing is paused, held or aligned anew while the hand moves.
-    calm = {
+    calm: dict[str, Any] = {
         "slave": {"operation__longest_outage": 0.0, "command_timeout": LONGEST_TIMEOUT},
         "motion_scaling": {"feedback_timeout": LONGEST_TIMEOUT},
     }

@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import psutil
 import pytest
@@ -57,21 +57,21 @@ def say(button: Publisher, released: int) -> None:
         button.publish(Bool(data=is_pressed))
 
 
-def stand_still(peer: "Peer", reader: object) -> float:
+def stand_still(peer: "Peer", reader: Any) -> float:
     reader.send_signal(signal.SIGSTOP)
     process = psutil.Process(reader.pid)
     peer.wait(lambda: process.status() == psutil.STATUS_STOPPED, "a reader that stands still")
     return time.monotonic()
 
 
-def go_on(peer: "Peer", reader: object, since: float) -> None:
+def go_on(peer: "Peer", reader: Any, since: float) -> None:
     """Go on after a standstill of a third of a second at least."""
     peer.wait(lambda: time.monotonic() > since + 0.3, "a standstill")
     reader.send_signal(signal.SIGCONT)
 
 
 def test_a_press_that_is_the_first_word_of_a_button_is_heard_though_the_middleware_lost_it(
-    peer: "Peer", start: Callable[..., object]
+    peer: "Peer", start: Callable[..., Any]
 ) -> None:
     """The middleware keeps the newest messages for who stands still; no number tells of others."""
     reader, button = start(1), button_of(peer)
@@ -83,7 +83,7 @@ def test_a_press_that_is_the_first_word_of_a_button_is_heard_though_the_middlewa
 
 
 def test_presses_of_buttons_that_were_made_while_the_listener_stood_still_are_heard(
-    peer: "Peer", start: Callable[..., object]
+    peer: "Peer", start: Callable[..., Any]
 ) -> None:
     """A button keeps its last ten messages for who has not found it yet.
 

@@ -45,7 +45,7 @@ SETTINGS = {
 
 
 @pytest.fixture
-def session(compose: Callable[..., object]) -> object:
+def session(compose: Callable[..., object]) -> Any:
     """Process of the composed session, all its nodes active."""
     return compose(**SETTINGS)
 
@@ -130,7 +130,7 @@ def test_the_inside_master_comes_back_without_a_jump(peer: "Peer", session: obje
     assert np.abs(np.diff(np.array(measured.values)[:, :6], axis=0)).max() < 0.01
 
 
-def test_a_node_may_leave_a_composed_session_in_any_moment(peer: "Peer", session: object) -> None:
+def test_a_node_may_leave_a_composed_session_in_any_moment(peer: "Peer", session: Any) -> None:
     for _ in range(20):
         for transition in (
             Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,

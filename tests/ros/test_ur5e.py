@@ -90,9 +90,7 @@ def arm(*others: object):
     assert set(codes) == {0}
 
 
-def led(
-    tmp_path: Path, bridge: Any, seed: int, *settings: object, operator: tuple[object, ...] = ()
-):
+def led(tmp_path: Path, bridge: Any, seed: int, *settings: object, operator: tuple[Any, ...] = ()):
     """A recorded session that leads the arm, and what the controller witnessed."""
     out = tmp_path / f"bag_{seed}"
     live = [
@@ -159,7 +157,10 @@ def test_a_person_at_the_console_leads_it_without_a_jump(
         ):
             seen = link.view().arms[""]
             wait_until(lambda: link.view() and "ENABLED, homed" in seen.operation_text, "homed")
-            tip, stylus = present(seen.get(SLAVE_MEASURED_CP))[:3], seen.get(MASTER_MEASURED_CP)[:7]
+            tip, stylus = (
+                present(seen.get(SLAVE_MEASURED_CP))[:3],
+                present(seen.get(MASTER_MEASURED_CP))[:7],
+            )
             ways = chain(np.linspace(0.0, _PULLED, 100), repeat(_PULLED))  # a grip moves nothing
 
             def is_pulled() -> bool:

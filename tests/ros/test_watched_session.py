@@ -11,7 +11,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def watched(composed_session: Callable[..., object]) -> Iterator[Any]:
+def watched(composed_session: Callable[..., Any]) -> Iterator[Any]:
     """Peer of a session that goes on while tests look at it."""
     operator = {"approach_time": 1.0, "patience": 0.0}
     scaling = {"reach_force": {"is_on": False}}

@@ -131,7 +131,7 @@ def tabs() -> Iterator[dict[Any, Any]]:
 @pytest.fixture
 def opened(
     chromium: str, tabs: int, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Callable[..., object]]:
+) -> Iterator[Callable[..., Any]]:
     """Opens a page at a width; whatever goes wrong in it fails the test."""
     used = []
 
@@ -160,7 +160,7 @@ class _Silent:
         pass
 
 
-def plots(tab: object) -> Any:
+def plots(tab: Any) -> Any:
     tab.settled()
     return tab.value(PLOTS)
 
@@ -176,7 +176,7 @@ def ranges(tab: object, recording: str) -> list[Any]:
     return sorted(found)
 
 
-def show(tab: object, begin: float, end: float, recording: int = 0) -> None:
+def show(tab: Any, begin: float, end: float, recording: int = 0) -> None:
     """Choose the visible time with the fields of a recording."""
     tab.value(
         f"""(() => {{ const bar = document.getElementById('times-{recording}');
@@ -212,7 +212,7 @@ def curve(tab: object, title: str, name: str, recording: str = "one"):
 
 
 def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(
-    opened: Callable[..., object], short
+    opened: Callable[..., Any], short
 ) -> None:
     tab = opened(short[0])
     whole = ranges(tab, "two")
@@ -225,7 +225,7 @@ def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(
     assert np.allclose([float(field) for field in fields], (begin, end), atol=1e-3)
 
 
-def test_panning_one_plot_moves_all(opened: Callable[..., object], short) -> None:
+def test_panning_one_plot_moves_all(opened: Callable[..., Any], short) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     plot = plots(tab)[f"one/{POSITION}"]["id"]
@@ -238,7 +238,7 @@ def test_panning_one_plot_moves_all(opened: Callable[..., object], short) -> Non
 
 
 def test_double_click_on_any_plot_shows_the_whole_recording(
-    opened: Callable[..., object], short
+    opened: Callable[..., Any], short
 ) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
@@ -256,7 +256,7 @@ def test_double_click_on_any_plot_shows_the_whole_recording(
 
 
 def test_strip_selects_moves_and_resizes_the_visible_time(
-    opened: Callable[..., object], short
+    opened: Callable[..., Any], short
 ) -> None:
     tab = opened(short[0])
     strip = "#times-0 .strip"
@@ -271,7 +271,7 @@ def test_strip_selects_moves_and_resizes_the_visible_time(
         assert np.allclose((first, last), expected, atol=0.1)
 
 
-def test_keys_and_buttons_move_the_visible_time(opened: Callable[..., object], short) -> None:
+def test_keys_and_buttons_move_the_visible_time(opened: Callable[..., Any], short) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     for act, expected in (("later", (11.2, 15.2)), ("earlier", (8.0, 12.0)),
@@ -299,7 +299,7 @@ def test_range_beyond_the_recording_is_cut_to_it(opened: Callable[..., object], 
 
 
 @pytest.mark.parametrize("count", [SHORT, LONG])
-def test_zooming_in_shows_every_sample(opened: Callable[..., object], short, long, count) -> None:
+def test_zooming_in_shows_every_sample(opened: Callable[..., Any], short, long, count) -> None:
     (page, recipe), name = (long, "long") if count == LONG else ((short[0], short[1]["one"]), "one")
     tab = opened(page)
     first, last = count - 5000, count - 4900
@@ -333,7 +333,7 @@ def test_zooming_in_shows_every_sample(opened: Callable[..., object], short, lon
 
 
 def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(
-    opened: Callable[..., object], long
+    opened: Callable[..., Any], long
 ) -> None:
     page, _ = long
     assert page.stat().st_size < LARGEST_PAGE
@@ -357,7 +357,7 @@ def bounds(shape: Any) -> list[Any]:
 
 
 def test_every_plot_against_time_has_the_bands_of_the_state(
-    opened: Callable[..., object], short
+    opened: Callable[..., Any], short
 ) -> None:
     tab = opened(short[0])
     timed = {name: plot for name, plot in plots(tab).items() if plot["times"]}
@@ -405,7 +405,7 @@ def test_long_path_in_a_plane_becomes_the_time_that_was_spent(
 
 
 @pytest.mark.parametrize("width", [500, 1200])
-def test_page_fits_into_the_window(opened: Callable[..., object], short, width: int) -> None:
+def test_page_fits_into_the_window(opened: Callable[..., Any], short, width: int) -> None:
     tab = opened(short[0], width)
     assert tab.value("document.documentElement.scrollWidth") <= width
     for name, plot in plots(tab).items():
@@ -414,7 +414,7 @@ def test_page_fits_into_the_window(opened: Callable[..., object], short, width: 
 
 
 def test_page_follows_a_window_that_becomes_narrow_and_wide_again(
-    opened: Callable[..., object], short
+    opened: Callable[..., Any], short
 ) -> None:
     tab = opened(short[0])
     for width, columns in ((500, 1), (1200, 3)):
@@ -443,7 +443,7 @@ def test_without_scripts_there_are_tables_sketches_and_a_word(
         assert tab.value("document.querySelector('.times').clientHeight") == 0
 
 
-def test_table_is_folded_where_scripts_run(opened: Callable[..., object], short) -> None:
+def test_table_is_folded_where_scripts_run(opened: Callable[..., Any], short) -> None:
     tab = opened(short[0])
     assert tab.value("document.querySelectorAll('details.table[open]').length") == 0
     assert "position, RMS" not in tab.value("document.body.innerText")

@@ -97,7 +97,7 @@ def test_each_of_two_arms_keeps_its_own_file(tmp_path: Path) -> None:
     (tmp_path / "scara.yaml").write_text(TABLE)
     right = {"right/robot": str(tmp_path / "scara.yaml"), "right/geometry": []}
     recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
-    before = replayed(present(recording.path)), replayed(recording.path, "right/")
+    before = replayed(present(recording.path)), replayed(present(recording.path), "right/")
     assert before[0].shape[1] != before[1].shape[1]
     path.unlink()
     longer(tmp_path / "scara.yaml")

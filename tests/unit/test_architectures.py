@@ -1,6 +1,7 @@
 """Architectures: what the hand feels of the slave, by each law, and over a network."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -147,7 +148,7 @@ def test_an_architecture_of_ones_own_is_one_call_and_remembers_twelve_numbers() 
     ],
 )
 def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(
-    wrong: Callable[..., object],
+    wrong: Callable[..., Any],
 ) -> None:
     with pytest.raises(PartError, match="architecture"):
         tc.register_architecture(tc.Architecture("wrong", tc.NoParameters, wrong))

@@ -1,5 +1,7 @@
 """Button: a spring that snaps and a stop, its presses, and its energy."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -22,7 +24,7 @@ def press(
     damping: float = 0.0,
     way: Array | None = None,
     **numbers: float,
-) -> tuple[Array, Array, Array, object]:
+) -> tuple[Array, Array, Array, Any]:
     """Depths (ticks,) [m] and pushes (ticks,) [N] of a tip led through heights over the button.
 
     The energy lost (ticks,) [J] and the state of the simulation come after them.

@@ -339,7 +339,7 @@ def test_the_file_of_corrections_is_the_arm_that_was_found(name: str) -> None:
     assert arm.task_mask == robot.task_mask
     for entry in ("lower", "upper", "home", "start"):
         assert np.allclose(getattr(arm, entry), getattr(robot, entry), rtol=0, atol=1e-15)
-    assert np.allclose(present(arm.drives).speed_limit, robot.drives.speed_limit)
+    assert np.allclose(present(arm.drives).speed_limit, present(robot.drives).speed_limit)
     assert not present(arm.drives).assumed
 
 

@@ -3,6 +3,7 @@
 import bisect
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> tc.Recording:
 
 
 @pytest.fixture(scope="module")
-def messages(session: tc.Recording) -> dict[str, list[tuple[int, object]]]:
+def messages(session: tc.Recording) -> dict[str, list[tuple[int, Any]]]:
     """Times of recording [ns] and messages of some topics, as rosbags reads them."""
     found = {}
     with AnyReader([session.path]) as reader:
@@ -42,14 +43,14 @@ def link(session: tc.Recording) -> RecordedLink:
     return RecordedLink(session.bag)
 
 
-def last(messages: list[tuple[int, object]], time_ns: int) -> object:
+def last(messages: list[tuple[int, object]], time_ns: int) -> Any:
     """Last message that was recorded by a time."""
     return messages[bisect.bisect_right([log for log, _ in messages], time_ns) - 1][1]
 
 
 @pytest.mark.parametrize("time", [0.0, 0.7774, 2.5, 4.1239, 6.0, 1e9])
 def test_a_view_has_what_others_read_as_the_last_sample_by_that_time(
-    link: RecordedLink, messages: dict[str, list[tuple[int, object]]], time: float
+    link: RecordedLink, messages: dict[str, list[tuple[int, Any]]], time: float
 ) -> None:
     link.seek(time)
     seen = link.view().arms[""]

@@ -39,7 +39,7 @@ def master(hand: HandParameters = CALM, **device: Any) -> HeldMaster:
     return HeldMaster(STILL, HapticMasterParameters(hand=hand, device=DeviceParameters(**device)))
 
 
-def push(device: HeldMaster, forces: Array) -> Iterator[object]:
+def push(device: HeldMaster, forces: Array) -> Iterator[Any]:
     """Places (N, 3) [m], forces (N, 3) [N] and contacts (N, 5) of ticks with commanded forces."""
     rows = []
     for force in forces:

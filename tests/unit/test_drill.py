@@ -122,7 +122,7 @@ def test_the_hand_goes_round_at_constant_speed_once_it_has_set_in() -> None:
     assert np.linalg.norm(hand.circle(hand.PERIOD)[:3] - hand.circle(0.0)[:3]) < 1e-6
 
 
-def sent(distortion: Callable[..., object], count: int = 100) -> list[Sample]:
+def sent(distortion: Callable[..., Any], count: int = 100) -> list[Sample]:
     """Samples that leave, of one every two milliseconds."""
     out = []
     for number in range(count):

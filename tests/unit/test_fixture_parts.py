@@ -71,7 +71,7 @@ def test_own_fixture_is_chosen_by_its_name_and_has_its_parameters(own_parts: Non
         out[:] = 0.0
         return 0.0
 
-    def outline(parameters: object) -> Array:
+    def outline(parameters: Any) -> Array:
         return np.array([(0.0, 0.0, 0.0), (parameters.widths[0], 0.0, parameters.height)])
 
     register_fixture(Fixture("my_cone", ConeParameters, depth, outline))

@@ -37,7 +37,7 @@ def motion(
     seed: int = 1,
     parameters: HumanParameters | None = None,
     **values: float | tuple[float, float, float],
-) -> Callable[..., object]:
+) -> Callable[..., Any]:
     setting = Setting(region(**values), np.zeros((6, 4)), seed)
     return OPERATORS.find("human").make(parameters or HumanParameters(), setting)
 

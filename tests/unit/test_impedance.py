@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def on_the_slave(force: Array) -> Array:
     return np.column_stack((-force[:, 2], -force[:, 0], force[:, 1]))
 
 
-def slave(**values: float) -> tuple[object, Callable[..., float]]:
+def slave(**values: float) -> tuple[Any, Callable[..., float]]:
     """A stage at work, and a call that gives it a command after some ticks: where the tip goes."""
     stage = IMPEDANCE.run(build(ImpedanceParameters, values))
     row = stage.signals

@@ -103,7 +103,7 @@ class Maker:
 
 def write2(
     path: Path,
-    messages: list[tuple[str, int, object]],
+    messages: list[tuple[str, int, Any]],
     storage: StoragePlugin = StoragePlugin.MCAP,
     compression: CompressionMode | None = None,
 ) -> Path:
@@ -123,7 +123,7 @@ def write2(
 
 def write1(
     path: Path,
-    messages: list[tuple[str, int, object]],
+    messages: list[tuple[str, int, Any]],
     compression: Writer1.CompressionFormat | None = None,
 ) -> Path:
     """ROS 1 bag."""
@@ -147,13 +147,13 @@ def poses(
     stamps: NDArray[np.int64] = STAMPS,
     logs: NDArray[np.int64] = LOGS,
     **more: str,
-) -> list[tuple[str, int, object]]:
+) -> list[tuple[str, int, Any]]:
     maker = Maker(is_ros2)
     return [(topic, logs[i], maker.pose(i, kind, stamps[i], **more)) for i in range(len(logs))]
 
 
 def presses(
-    buttons: Callable[..., object],
+    buttons: Callable[..., Any],
     topic: str = "/joy",
     stamps: NDArray[np.int64] = STAMPS,
     is_ros2: bool = True,

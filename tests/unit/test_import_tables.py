@@ -77,7 +77,7 @@ def test_every_form_of_text_gives_the_same_motion(name: str, tmp_path: Path) -> 
 
 @pytest.mark.parametrize(("name", "pack"), [("a.csv.gz", gzip.compress), ("a.bz2", bz2.compress)])
 def test_packed_text_is_read_by_what_it_is_not_how_it_is_called(
-    name: str, pack: Callable[..., object], tmp_path: Path
+    name: str, pack: Callable[..., Any], tmp_path: Path
 ) -> None:
     (tmp_path / name).write_bytes(pack(frame().to_csv(index=False).encode()))
     assert_same_motion(imported(tmp_path / name, tmp_path)[1])

@@ -18,7 +18,7 @@ ROW, TABLE = types.float64[::1], types.float64[:, ::1]
 
 
 @kernel
-def call_with_row(function: Callable[..., object], row: Array, count: int) -> float:
+def call_with_row(function: Callable[..., Any], row: Array, count: int) -> float:
     total = 0.0
     for i in range(count):
         total += function(row, float(i))

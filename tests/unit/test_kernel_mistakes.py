@@ -4,6 +4,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="it is the compiler that
 ROW = types.float64[::1]
 
 
-def uncached(text: str, name: str) -> Callable[..., object]:
+def uncached(text: str, name: str) -> Callable[..., Any]:
     """Kernel of a text; it has no file, so every process compiles it."""
     space = {"kernel": kernel, "inner": inner}
     exec(text, space)

@@ -24,7 +24,7 @@ from teleop_core.kernels.geometry import Array, multiply_quaternions
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
 
 
-def uncached(text: str, name: str) -> Callable[..., object]:
+def uncached(text: str, name: str) -> Callable[..., Any]:
     """Kernel of a text; it has no file, so every process compiles it."""
     space = {"kernel": kernel, "inner": inner}
     exec(text, space)

@@ -231,7 +231,7 @@ def turned() -> Trimesh:
     ],
 )
 def test_a_mesh_that_encloses_nothing_is_refused_in_one_line(
-    make: Callable[..., object], name: str, requirement: str, tmp_path: Path
+    make: Callable[..., Any], name: str, requirement: str, tmp_path: Path
 ) -> None:
     make().export(tmp_path / "bad.obj")
     with pytest.raises(ParameterError, match=requirement) as caught:

@@ -45,7 +45,7 @@ def path_of(kind: str, seed: int = 1, **values: float) -> Callable[[Array], tupl
 
 def motion_of(
     kind: str, seed: int, **values: float | tuple[float, float, float]
-) -> Callable[..., object]:
+) -> Callable[..., Any]:
     if kind == "recorded":
         return following("recorded", *RECORDED).make(NoParameters(), None)
     given = {"center": CENTER, "size": SIZE, "tilt": TILT, "approach_time": 2.0, "period": 4.0}
@@ -295,7 +295,7 @@ def test_own_operator_is_made_with_its_parameters_the_seed_and_its_phases(own_pa
 
     made = []
 
-    def make(parameters: object, setting: Setting) -> Callable[..., object]:
+    def make(parameters: Any, setting: Setting) -> Callable[..., Any]:
         made.append((parameters.height, setting.seed, setting.phases.shape))
         return lambda times: np.zeros((len(times), 3))
 

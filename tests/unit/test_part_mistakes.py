@@ -36,7 +36,7 @@ def rest(parameters, state, signals, dt) -> None:
 def stage(
     name: str = "echo",
     parameters: "NoParameters | TooFast | type[object]" = NoParameters,
-    step: Callable[..., object] = rest,
+    step: Callable[..., Any] = rest,
     reads: tuple[Topic] = (SLAVE_MEASURED_CP,),
     **more: Any,
 ) -> Stage:
@@ -254,6 +254,6 @@ class Nameless(Metric):
 
 
 @pytest.mark.parametrize("part", [Nameless, Nameless(None), object()], ids=["class", "one", "none"])
-def test_metric_class_without_a_name_or_no_class_is_refused(part: object) -> None:
+def test_metric_class_without_a_name_or_no_class_is_refused(part: Any) -> None:
     with pytest.raises(PartError, match=r"^metric '\w+' must be .*(own name|a class below)"):
         evaluation.register_metric(part)

@@ -72,7 +72,7 @@ def operator(
 def motion(
     path: Path,
     **options: Any,
-) -> Callable[..., object]:
+) -> Callable[..., Any]:
     found, parameters, setting = operator(path, **options)
     return found.make(parameters, setting)
 

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,7 +17,7 @@ from teleop_core.slave.controllers import CONTROLLERS
 BUILT_IN = {"here": "teleop_core.graph.topics:ALL", "json": "json:loads"}
 
 
-def registry(trial: Callable[[object], None] | None = None, **builtin: object) -> Registry:
+def registry(trial: Callable[[object], None] | None = None, **builtin: Any) -> Registry:
     return Registry("part", "parts_of_nobody", {**BUILT_IN, **builtin}, check, trial)
 
 

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ class Run:
         self.rows, self.last = np.zeros((0, 13)), 0.0
 
     def for_time(
-        self, duration: float, wanted: Callable[..., object] | None = None, period: float = 0.02
+        self, duration: float, wanted: Callable[..., Any] | None = None, period: float = 0.02
     ) -> Array:
         """Go on; ``wanted(time)`` says what pose comes every so often, or None for silence."""
         due = 0.0

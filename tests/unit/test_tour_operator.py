@@ -1,6 +1,7 @@
 """Tour: stops in order, rests, a smooth line through all points, times set apart."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,7 +65,7 @@ def test_line_meets_every_point() -> None:
 
 def motion(
     leg: float = 1.0, period: float = 8.0, rotation: float = 0.3
-) -> tuple[Callable[..., object], float]:
+) -> tuple[Callable[..., Any], float]:
     common = build(
         OperatorParameters,
         {"kind": "tour", "tour.points": POINTS, "tour.leg_time": leg, "period": period,

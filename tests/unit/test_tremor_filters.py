@@ -597,7 +597,9 @@ def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
     score = tc.run("human", duration=20.0, stages="tremor_filter").score()
     assert 40.0 < score.value("tremor_filter.before_um") < 80.0
     assert 0.2 < score.value("tremor_filter.left_share") < 0.5
-    after = score.value("tremor_filter.before_um") * score.value("tremor_filter.left_share")
+    after = present(score.value("tremor_filter.before_um")) * present(
+        score.value("tremor_filter.left_share")
+    )
     assert score.value("tremor_filter.after_um") == pytest.approx(after)
     assert score.value("tremor_filter.delay_ms") == pytest.approx(9.5, abs=0.5)
     assert score.value("tremor_filter.gain") == pytest.approx(1.0, abs=0.01)

@@ -1,6 +1,7 @@
 """URDFs of all robots load in a physics engine, which places their links as their bodies are."""
 
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -28,7 +29,7 @@ def relative(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
     return np.concatenate((turn.T @ (child[:3] - parent[:3]), quaternion))
 
 
-def placed(xml: str, joints: dict[str, float], poses: dict[str, np.ndarray]) -> dict[str, object]:
+def placed(xml: str, joints: dict[str, float], poses: dict[str, np.ndarray]) -> dict[str, Any]:
     """Placements of all links by Pinocchio, with joints by name and floating links where told."""
     model = pinocchio.buildModelFromXML(xml, True)  # with joints that follow others
     tree = {j.get("name"): j for j in ElementTree.fromstring(xml).iter("joint")}
@@ -91,7 +92,9 @@ def test_our_own_reader_finds_the_same_tip_and_limits(name: str, tmp_path: Path)
     read = tc.load_robot(str(path), tip="tip")
     assert read.joint_names == robot.joint_names
     np.testing.assert_array_equal(read.limits(1.0), robot.limits(1.0))
-    np.testing.assert_array_equal(present(read.drives).effort_limit, robot.drives.effort_limit)
+    np.testing.assert_array_equal(
+        present(read.drives).effort_limit, present(robot.drives).effort_limit
+    )
     q = np.random.default_rng(3).uniform(robot.lower, robot.upper, (200, robot.n))
     np.testing.assert_allclose(read.fk(q), robot.fk(q), rtol=0.0, atol=1e-9)
 
@@ -207,11 +210,11 @@ def test_a_body_that_follows_one_joint_is_a_mimic_and_one_of_two_joints_floats()
     xml = ElementTree.fromstring(urdf_of(tc.load_robot("parallelogram")))
     followers = {j.get("name"): j.find("mimic") for j in xml.iter("joint")}
     coupler, rocker = followers["theta1_coupler"], followers["theta1_rocker"]
-    assert (present(coupler).get("joint"), float(present(coupler.get("multiplier")))) == (
+    assert (present(coupler).get("joint"), float(present(present(coupler).get("multiplier")))) == (
         "theta1",
         -1.0,
     )
-    assert (present(rocker).get("joint"), float(present(rocker.get("multiplier")))) == (
+    assert (present(rocker).get("joint"), float(present(present(rocker).get("multiplier")))) == (
         "theta1",
         1.0,
     )

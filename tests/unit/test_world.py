@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import coal
 import numpy as np
@@ -182,7 +183,7 @@ def test_an_object_that_the_tip_begins_in_is_refused_with_its_depth() -> None:
     ],
 )
 def test_an_object_that_is_none_is_refused_when_it_is_registered(
-    distance: Callable[..., object], expected: str
+    distance: Callable[..., Any], expected: str
 ) -> None:
     part = WORLD_OBJECTS.find("box")
     with pytest.raises(PartError, match=expected):
