@@ -2,7 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -34,7 +35,7 @@ def valid(group: type[object], **values: SearchStrategy) -> SearchStrategy:
 
     def make(
         chosen: Mapping[str, float | tuple[float, float, float]],
-    ) -> BoxParameters | SphereParameters:
+    ) -> Any:
         try:
             return group(**chosen)
         except ParameterError:
@@ -66,7 +67,7 @@ KINDS = {
 }  # fmt: skip
 
 
-def found(name: str, parameters: BoxParameters, offset: Array) -> tuple[float, Array]:
+def found(name: str, parameters: Any, offset: Sequence[float] | Array) -> tuple[float, Array]:
     """Depth and way of a fixture at a place (3,)."""
     out = np.full(3, math.nan)
     depth = FIXTURES.find(name).depth(np.array(offset, dtype=float), numbers_of(parameters), out)
@@ -84,7 +85,7 @@ def beyond_cylinder(p: CylinderParameters, points: Array) -> float:
     return np.maximum(np.hypot(x, y) - 0.5 * p.diameter, ends)
 
 
-def beyond_half_space(p: HalfSpaceParameters, points: Array) -> float:
+def beyond_half_space(p: HalfSpaceParameters, points: Array) -> Any:
     return -p.room - turned(p.normal, points)[..., 2]
 
 
@@ -100,13 +101,13 @@ def beyond_line(p: LineParameters, points: Array) -> float:
     return np.sqrt(x**2 + y**2 + over**2) - p.tolerance
 
 
-def beyond_path(p: PathParameters, points: Array) -> float:
+def beyond_path(p: PathParameters, points: Array) -> Any:
     along = pieces(p).reshape(-1, 3)
     apart = [np.linalg.norm(point - along, axis=1).min() for point in points.reshape(-1, 3)]
     return np.reshape(apart, points.shape[:-1]) - p.tolerance
 
 
-def turned(direction: tuple[float, float, float], points: Array) -> Array:
+def turned(direction: Sequence[float] | Array, points: Array) -> Array:
     """Points in axes at right angles whose z is a direction; no matter how the others look."""
     axes = np.linalg.svd(np.array([direction]))[2]  # rows: the direction or against it, two others
     z = points @ (np.array(direction) / math.hypot(*direction))

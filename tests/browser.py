@@ -61,7 +61,7 @@ class Tab(Headless):
         for domain in ("Network", "Log"):
             self.call(f"{domain}.enable")
 
-    def visit(self, url) -> None:
+    def visit(self, url: Any) -> None:
         """Open a page of a server and wait until its scene is there."""
         self.call("Page.navigate", url=url)
         self.until("document.querySelector('canvas')")
@@ -76,7 +76,7 @@ class Tab(Headless):
         """Wait until a text can be read on the page."""
         self.until(f"document.body.innerText.includes({json.dumps(text)})", seconds)
 
-    def click(self, text) -> None:
+    def click(self, text: Any) -> None:
         """Click what has this text: a button, a tab, a label."""
         self.shows(text)
         x, y = self.place(text)
@@ -110,7 +110,7 @@ class Tab(Headless):
             throw new Error('nothing that can be clicked says ' + {json.dumps(text)});
         }})()""")
 
-    def fill(self, label, text) -> None:
+    def fill(self, label: Any, text: Any) -> None:
         """Write a text, in place of what stands there, into the field beside a label."""
         self.shows(label)
         self.value(f"""(() => {{
@@ -123,7 +123,7 @@ class Tab(Headless):
         }})()""")
         self.call("Input.insertText", text=text)
 
-    def key(self, name) -> None:
+    def key(self, name: Any) -> None:
         """Press and release a key."""
         code, number = KEYS.get(name, (f"Key{name.upper()}", ord(name.upper()[0])))
         text = {"text": name} if len(name) == 1 else {}
@@ -132,7 +132,7 @@ class Tab(Headless):
                       windowsVirtualKeyCode=number, **text)  # fmt: skip
             text = {}
 
-    def pull(self, begin, end, steps: int = 20) -> None:
+    def pull(self, begin: Any, end: Any, steps: int = 20) -> None:
         """Drag slowly, as a hand does, from one point to another [px]; the button stays down."""
         self.mouse("mouseMoved", *begin)
         self.mouse("mousePressed", *begin)
@@ -140,7 +140,7 @@ class Tab(Headless):
             self.mouse("mouseMoved", *point)
             self.value("new Promise(requestAnimationFrame)")
 
-    def swipe(self, begin, end, steps: int = 20) -> None:
+    def swipe(self, begin: Any, end: Any, steps: int = 20) -> None:
         """The same by a finger, which is lifted at the end."""
         points = np.linspace(begin, end, steps + 1)
         for kind, where in zip(["Start"] + ["Move"] * steps, points, strict=True):
@@ -149,7 +149,7 @@ class Tab(Headless):
             self.value("new Promise(requestAnimationFrame)")
         self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
-    def seen_at(self, node, point) -> Any:
+    def seen_at(self, node: Any, point: Any) -> Any:
         """Pixel at which a point of a node of viser's scene is seen, both as they are drawn.
 
         Args:
@@ -169,7 +169,7 @@ class Tab(Headless):
                     box.y + box.height * (0.5 - 0.5 * y / w)];
         }})()""")
 
-    def place_of(self, node) -> str:
+    def place_of(self, node: Any) -> str:
         """Expression of the place of a node of viser's scene in its parent's frame [m]."""
         return f"{VIEWER}.nodeRefFromName[{json.dumps(node)}].position.toArray()"
 
@@ -204,7 +204,7 @@ def until(condition: Callable[..., object], what: str, seconds: float = 60.0) ->
     return wait_until(condition, what, seconds)
 
 
-def handshake(port: int, path: str = "/", **headers: object):
+def handshake(port: int, path: str = "/", **headers: Any):
     """First line of the answer to the opening of a WebSocket, and the socket it came on."""
     opened = socket.create_connection(("127.0.0.1", port), timeout=20)
     told = {

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class Desk:
     def let_go(self, arm: str) -> None:
         pass
 
-    def press_button(self, arm, name) -> None:
+    def press_button(self, arm: Any, name: Any) -> None:
         self.asked.append(name)
 
     def parameters(self) -> dict[tuple[str, str], ParameterInfo]:
@@ -71,16 +72,16 @@ class Desk:
     def changes(self) -> dict[str, object]:
         return {}
 
-    def change(self, node, name, value) -> str:
+    def change(self, node: Any, name: Any, value: Any) -> str:
         self.asked.append(name)
         return ""
 
-    def save(self, name) -> None:
+    def save(self, name: Any) -> None:
         self.asked.append("save")
 
 
 @contextmanager
-def shown(desk: Desk) -> Iterator[tuple[ConsoleServer, Desk]]:
+def shown(desk: Any) -> Iterator[tuple[ConsoleServer, Desk]]:
     """Server of the page of a desk, drawn as the command draws it, and the desk."""
     ends = threading.Event()
     with ConsoleServer(0) as server:

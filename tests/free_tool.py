@@ -1,7 +1,7 @@
 """Free tool: a rigid tool with several points that is dragged or flies through an object."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ JOINTS = 6  # the tip's place along the base, and turns about the base's axes
 
 
 @kernel
-def free_acceleration(q, dq, net, dynamics, ddq) -> None:
+def free_acceleration(q: Any, dq: Any, net: Any, dynamics: Any, ddq: Any) -> None:
     """Of a body with mass [kg], inertia [kg·m²] about the tip in all directions, and gravity (3,).
 
     Its centre of mass is its tip.
@@ -54,7 +54,7 @@ def _turn(axis: Array, by: Array) -> None:
 
 @kernel
 def _place(
-    arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
+    arm: Any,
     q: Array,
     axis: Array,
 ) -> None:
@@ -80,7 +80,7 @@ def stored(p: Any, contacts: NDArray[np.void]) -> float:
 def _drag(
     p: Any,
     contacts: NDArray[np.void],
-    arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
+    arm: Any,
     q: Array,
     axis: Array,
     steps: Array,
@@ -114,7 +114,7 @@ def _fly(
     p: Any,
     s: SimulationState,
     contacts: NDArray[np.void],
-    arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
+    arm: Any,
     acceleration: Callable[..., object],
     dynamics: Array,
     q: Array,
@@ -149,7 +149,7 @@ def drag(
     axis: ArrayLike,
     steps: Array,
     name: str = "plane",
-    parameters: HoleParameters | None = None,
+    parameters: Any = None,
     points: int = 5,
     **numbers: float,
 ) -> tuple[Array, Array, Array]:
@@ -174,9 +174,9 @@ def drag(
 
 def fly(
     begin: tuple[float, float, float],
-    speed: ArrayLike,
+    speed: Sequence[float] | Array,
     ticks: int,
-    axis: ArrayLike = (0.0, 0.0, -1.0),
+    axis: Sequence[float] | Array = (0.0, 0.0, -1.0),
     name: str = "plane",
     parameters: HoleParameters | None = None,
     points: int = 1,
@@ -184,7 +184,7 @@ def fly(
     inertia: float = 1.0,
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
     **numbers: float,
-) -> dict[str, Array]:
+) -> Any:
     """Motion of a body that only the object and gravity push, a dict of arrays (ticks, ...).
 
     Its keys: ``place`` (3,) [m] and ``turn`` (3,) [rad] of the tip, ``speed`` (6,), ``felt`` (6,)

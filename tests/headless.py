@@ -9,8 +9,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from numpy.typing import ArrayLike
-
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
     "--no-first-run", "--disable-background-networking", "--disable-component-update",
@@ -25,7 +23,7 @@ class Headless:
     """One tab; everything it says on the console is in ``said``."""
 
     def __init__(
-        self, browser: str, folder: Path, width: int = 1200, height: int = 900, flags=FLAGS
+        self, browser: str, folder: Path, width: int = 1200, height: int = 900, flags: Any = FLAGS
     ) -> None:
         (read_here, write_there), (read_there, write_here) = os.pipe(), os.pipe()
 
@@ -107,7 +105,7 @@ class Headless:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
-    def open(self, file) -> None:
+    def open(self, file: Any) -> None:
         """Open a report page and wait until it has drawn everything."""
         self.call("Page.navigate", url=file.as_uri())
         self.until(
@@ -127,13 +125,13 @@ class Headless:
         """Wait until no plot is behind the visible time."""
         self.until("[...document.querySelectorAll('.times')].every((bar) => !bar.dataset.busy)")
 
-    def mouse(self, kind: str, x, y, clicks: int = 1) -> None:
+    def mouse(self, kind: str, x: Any, y: Any, clicks: int = 1) -> None:
         """Move, press or release the left button, in pixels of the window."""
         button = "none" if kind == "mouseMoved" else "left"
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button,
                   buttons=int(kind != "mouseReleased"), clickCount=clicks)  # fmt: skip
 
-    def drag(self, begin: ArrayLike, end: tuple[int, int, int]) -> None:
+    def drag(self, begin: Any, end: Any) -> None:
         """Drag from one point to another."""
         self.mouse("mouseMoved", *begin)
         self.mouse("mousePressed", *begin)
@@ -142,7 +140,7 @@ class Headless:
             self.mouse("mouseMoved", *point)
         self.mouse("mouseReleased", *end)
 
-    def picture(self, file, clip=None) -> None:
+    def picture(self, file: Any, clip: Any = None) -> None:
         """Screenshot of the page, or of a part of it: left, top, width and height [px]."""
         size = self.call("Page.getLayoutMetrics")["cssContentSize"]
         left, top, width, height = clip or (0, 0, size["width"], size["height"])

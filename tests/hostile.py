@@ -6,6 +6,7 @@ Each is done over a real WebSocket; none moves the arm, or keeps the stop from s
 import math
 import socket
 from contextlib import ExitStack, suppress
+from typing import Any
 
 import msgspec
 from websockets.frames import Frame, Opcode
@@ -245,7 +246,7 @@ def drives_to_where_no_stylus_is(watcher: PageClient, driver: PageClient) -> Non
     driver.drag(more=1)
 
 
-def occupies_the_server_with_presses(watcher, driver) -> None:
+def occupies_the_server_with_presses(watcher: Any, driver: Any) -> None:
     for _ in range(60):
         driver.click("Initialize")
 

@@ -11,16 +11,15 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.kinematics import FK
 from teleop_core.slave.simulation import SimulationNumbers
 from teleop_core.slave.world import WORLD_OBJECTS
-from teleop_core.slave.world.button import ButtonNumbers, ButtonParameters
+from teleop_core.slave.world.button import ButtonNumbers
 from teleop_core.slave.world.contact import ContactState, add_push, touch
-from teleop_core.slave.world.height_field import HeightFieldParameters
 
 DT = 1e-3
 PIECES = 16  # pieces of way in a tick, along each of which the push does its work
 
 
 @kernel
-def straight(q, geometry, jacobian) -> None:
+def straight(q: Any, geometry: Any, jacobian: Any) -> None:
     """Jacobian of a tip whose joints are its place, and its turns about the base's axes if six."""
     jacobian[:] = 0.0
     for k in range(jacobian.shape[1]):
@@ -41,9 +40,7 @@ class Needle(NamedTuple):
     J: np.ndarray
 
 
-def needle(
-    name: str, parameters: ButtonParameters | HeightFieldParameters | None = None, joints: int = 3
-) -> Needle:
+def needle(name: str, parameters: Any = None, joints: int = 3) -> Needle:
     """A needle before an object, with the defaults of its parameters if there are no others."""
     part = WORLD_OBJECTS.find(name)
     return Needle(
@@ -54,7 +51,7 @@ def needle(
 
 
 @kernel
-def _stored_in_button(p: SimulationNumbers, s: Any, depth) -> Any:
+def _stored_in_button(p: SimulationNumbers, s: Any, depth: Any) -> Any:
     """Energy that a button can give back [J] by what moves along its normal."""
     rising, falling = min(depth, p.click_travel), min(depth, p.stroke) - p.click_travel
     energy = 0.5 * p.click_force * rising * rising / p.click_travel
@@ -87,7 +84,7 @@ def _stored(p: SimulationNumbers, s: Any) -> Any:
 def _lead(
     p: SimulationNumbers,
     contacts: Any,
-    arm: tuple[object, object, Array, Array, Array, Array, Array, Array, Array],
+    arm: Any,
     way: Array,
     felt: Array,
     lost: Array,
@@ -118,9 +115,7 @@ def _lead(
                 energy -= push[k] * (way[i + 1, k] - way[i, k])
 
 
-def lead(
-    way: Array, name: str = "plane", parameters: Any = None, **numbers: float
-) -> tuple[Array, Array, object]:
+def lead(way: Array, name: str = "plane", parameters: Any = None, **numbers: float) -> Any:
     """Forces (ticks, 3) [N], energy lost (ticks,) [J] and state of a tip led through places.
 
     Args:

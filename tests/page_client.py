@@ -125,7 +125,7 @@ class PageClient:
             self.elements[message["props"]["label"]] = message["uuid"]
 
 
-def ask(port: int, path: str, **headers: str) -> tuple[int, bytes | dict[str, str | bool]]:
+def ask(port: int, path: str, **headers: str) -> Any:
     """Status and body of an answer to a request with some headers."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
     connection.request("GET", path, headers={n.replace("_", "-"): v for n, v in headers.items()})

@@ -1,9 +1,9 @@
 """Arms of each class with a closed form, as URDF texts: random axes and real arms."""
 
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from teleop_core.kernels.geometry import Array
 
@@ -63,7 +63,7 @@ def parallel_axes(rng: np.random.Generator, kind: str) -> list[tuple[Array, Arra
 
 def urdf(
     axes: list[tuple[Array, Array]],
-    limits: list[tuple[float, float]],
+    limits: Any,
     tool: tuple[float, float, float] = (0.1, -0.05, 0.12),
     name: str = "random",
 ) -> str:
@@ -85,7 +85,7 @@ def urdf(
     )
 
 
-def row(values: ArrayLike) -> str:
+def row(values: Any) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 

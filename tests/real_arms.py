@@ -13,8 +13,8 @@ modules: they agree to 5e-12.
 """
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from random_arms import row
 
@@ -44,7 +44,7 @@ def urdf_of(name: str, effort: float | None = None) -> str:
     )
 
 
-def _body(arm: Mapping[str, str | list[float | list[float | None]]], i: int) -> str:
+def _body(arm: Any, i: int) -> str:
     if "bodies" not in arm:
         return ""
     mass, *numbers = arm["bodies"][i]

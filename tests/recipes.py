@@ -1,6 +1,7 @@
 """Recipes: recordings made for a test, of a slave at rest to which something is done."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,7 +64,7 @@ class Recipe:
     def values(self, topic: Topic) -> Array:
         return self.rows[topic][1]
 
-    def drop(self, topic: Topic, lost: ArrayLike | range) -> None:
+    def drop(self, topic: Any, lost: ArrayLike | range) -> None:
         kept = np.setdiff1d(np.arange(len(self.rows[topic][0])), lost)
         self.rows[topic] = tuple(column[kept] for column in self.rows[topic])
 

@@ -40,7 +40,7 @@ class Desk:
     def step(
         self,
         move: tuple[float, float, float] = (0, 0, 0),
-        turn=None,
+        turn: Any = None,
         *,
         stamp_step_ns: int = TICK_NS,
         does_follow: bool = True,

@@ -206,7 +206,7 @@ def test_any_file_of_others_is_imported_or_refused(folder: Path, name: str) -> N
 
 
 @pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
-def test_any_compressed_recording_is_imported_or_refused(folder: Path, mode) -> None:
+def test_any_compressed_recording_is_imported_or_refused(folder: Path, mode: Any) -> None:
     path, out = folder / f"packed_{mode.name}", folder / "unpacked"
     whole = bag2(path, StoragePlugin.MCAP, mode)
     file = next(file for file in path.iterdir() if file.suffix != ".yaml")

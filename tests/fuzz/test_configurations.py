@@ -1,5 +1,7 @@
 """Parameter files, settings and what recordings store of them, broken in many ways."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import strategies as st
@@ -48,7 +50,7 @@ ANY_KEY = st.one_of(
 @fuzz(
     "settings", key=ANY_KEY, value=TEXTS, equals=st.sampled_from(("=", "=", "=", "==", "", " = "))
 )
-def test_any_setting_is_taken_or_refused(key, value, equals) -> None:
+def test_any_setting_is_taken_or_refused(key: Any, value: Any, equals: Any) -> None:
     layer = parse_setting(key + equals + value)
     Configuration.from_layers([BASE, layer])
 

@@ -3,6 +3,7 @@
 import shutil
 import warnings
 from pathlib import Path
+from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -114,7 +115,7 @@ def chunks(draw: st.DrawFn) -> tuple[str, bytes]:
 
 @pytest.mark.slow
 @fuzz("chunks", chunk=chunks(), size=SIZES)
-def test_any_chunk_is_unpacked_to_its_size_or_refused(chunk, size) -> None:
+def test_any_chunk_is_unpacked_to_its_size_or_refused(chunk: Any, size: Any) -> None:
     name, data = chunk
     try:
         out = compression.decompress(name, data, size)

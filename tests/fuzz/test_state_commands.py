@@ -59,7 +59,7 @@ def play(slave: SimulatedArm, words: Any) -> None:
 @pytest.mark.slow
 @fuzz("state commands", words=st.lists(WORDS, max_size=12), standstill=st.sampled_from(list(ARMS)))
 def test_any_words_leave_flags_that_agree_and_a_setpoint_within_its_limits(
-    words, standstill
+    words: Any, standstill: Any
 ) -> None:
     slave = ARMS[standstill]
     slave.reset()

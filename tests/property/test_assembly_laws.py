@@ -24,23 +24,23 @@ def turned(vector: Any) -> Any:
     return np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K
 
 
-def platform_gaps(x, legs) -> Any:
+def platform_gaps(x: Any, legs: Any) -> Any:
     ends = x[:3] + PAIRED.platform @ turned(x[3:]).T
     return np.linalg.norm(ends - PAIRED.base, axis=1) - legs
 
 
-def ball_joint_gaps(angles, legs, b: float = 1.0, a: float = 0.5) -> Any:
+def ball_joint_gaps(angles: Any, legs: Any, b: float = 1.0, a: float = 0.5) -> Any:
     headings = 2.0 * math.pi / 3.0 * np.arange(3)
     out = b - legs * np.cos(angles)
     S = np.column_stack((out * np.cos(headings), out * np.sin(headings), legs * np.sin(angles)))
     return np.linalg.norm(np.roll(S, -1, axis=0) - S, axis=1) - math.sqrt(3.0) * a
 
 
-def any_platform(rng) -> Array:
+def any_platform(rng: Any) -> Array:
     return np.concatenate((rng.uniform([-0.2, -0.2, 0.0], [0.2, 0.2, 0.35]), rng.normal(0, 1.2, 3)))
 
 
-def any_angles(rng) -> Any:
+def any_angles(rng: Any) -> Any:
     return rng.uniform(-math.pi, math.pi, 3)
 
 

@@ -1,5 +1,7 @@
 """Random faults in virtual time: no joint ever steps farther than its drive can, nothing is NaN."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -112,7 +114,7 @@ def test_no_joint_steps_farther_than_its_drive_can_whatever_happens(robot: str) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", list(PLANTS))
-def test_after_any_faults_the_arm_can_be_made_to_follow_again(plant) -> None:
+def test_after_any_faults_the_arm_can_be_made_to_follow_again(plant: Any) -> None:
     for seed in range(20):
         chaos = Chaos("rcrt1", seed)
         for _ in range(30):

@@ -379,7 +379,7 @@ class Peer:
 
 
 @contextmanager
-def _made_peer() -> Iterator[Peer]:
+def _made_peer() -> Any:
     with tempfile.TemporaryDirectory() as folder:
         made = Peer(Path(folder))
         try:

@@ -44,7 +44,7 @@ class RealArm:
         peer.node.create_subscription(Float64MultiArray, "witness", self._see, 10)
         self._misbehave = peer.node.create_publisher(String, "misbehave", 10)
 
-    def _see(self, message) -> None:
+    def _see(self, message: Any) -> None:
         self.witnessed = list(message.data)
 
     def misbehave(self, how: str) -> None:

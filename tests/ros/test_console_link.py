@@ -30,7 +30,7 @@ def live(tmp_path_factory: pytest.TempPathFactory):
     """A session behind a page, its link, and where it is recorded."""
     out = tmp_path_factory.mktemp("console") / "bag"
     texts = ["operator=remote", "teleop.duration=3600.0", "operator.patience=0.0", CALM]
-    said = []
+    said: list[Any] = []
     with ConsoleSession(api.configuration(None, texts=texts), out, said.append) as session:
         link = session.link()
         with link:
@@ -47,7 +47,7 @@ def state(link: int) -> Any:
     return link.view().arms[""].operation_text.split(",")[0].split(":")[0]
 
 
-def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(live) -> None:
+def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(live: Any) -> None:
     _, link, out = live
     first = dict(link.view().arms[""].stamp_ns)
     name = topics.SLAVE_MEASURED_JS.name
@@ -67,7 +67,7 @@ def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(liv
     np.testing.assert_allclose(link.arms[0].robot.fk(q)[:3, 3], tip, atol=1e-3)
 
 
-def test_commands_are_obeyed_and_answered(live) -> None:
+def test_commands_are_obeyed_and_answered(live: Any) -> None:
     _, link, _ = live
     wait_until(lambda: state(link) == "ENABLED", "enabled")
     assert link.command("pause")[0]
@@ -79,7 +79,7 @@ def test_commands_are_obeyed_and_answered(live) -> None:
     wait_until(lambda: state(link) == "ENABLED", "enabled again")
 
 
-def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(live) -> None:
+def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(live: Any) -> None:
     _, link, _ = live
     link.press(is_pressed=True)
     wait_until(lambda: state(link) == "FAULT", "stopped")
@@ -89,7 +89,9 @@ def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(li
     wait_until(lambda: link.command("enable")[0], "enabled")
 
 
-def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_parameter(live) -> None:
+def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_parameter(
+    live: Any,
+) -> None:
     _, link, _ = live
     wait_until(lambda: state(link) == "ENABLED", "enabled")
     for mode in ("fine", "coarse"):
@@ -98,7 +100,7 @@ def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_paramet
         wait_until(lambda mode=mode: link.changes().get(("motion_scaling", "mode")) == mode, mode)
 
 
-def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(live) -> None:
+def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(live: Any) -> None:
     _, link, _ = live
     known = link.parameters()
     gain = known["motion_scaling", "fine_gain"]
@@ -112,7 +114,7 @@ def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(l
     assert link.change("nobody", "fine_gain", 0.3)
 
 
-def test_the_buttons_of_the_stylus_switch_mode_and_box(live) -> None:
+def test_the_buttons_of_the_stylus_switch_mode_and_box(live: Any) -> None:
     _, link, _ = live
     before = link.view().arms[""].state["is_fine"]
     link.press_button("", "mode")
@@ -124,7 +126,7 @@ def test_the_buttons_of_the_stylus_switch_mode_and_box(live) -> None:
     assert (found[1] > 0.0).all()
 
 
-def test_a_saved_recording_is_there_under_its_name_and_the_next_one_goes_on(live) -> None:
+def test_a_saved_recording_is_there_under_its_name_and_the_next_one_goes_on(live: Any) -> None:
     session, link, out = live
     for name in ("", "a/b", "..", "a b"):
         with pytest.raises(ParameterError):
@@ -157,7 +159,7 @@ def test_of_a_session_in_a_namespace_the_link_knows_arm_and_recorder(
 
 
 def test_a_second_session_of_the_process_is_alone_and_its_energies_are_seen(
-    live, tmp_path: Path
+    live: Any, tmp_path: Path
 ) -> None:
     first, *_ = live
     stages = ["teleop.stages=[network,passivity]", "reflection.passivity=tdpa"]

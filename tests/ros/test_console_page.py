@@ -47,7 +47,7 @@ def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess
 
 
 @pytest.fixture(scope="module")
-def page(console: ConsoleProcess, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+def page(console: ConsoleProcess, tmp_path_factory: Any) -> Iterator[Headless]:
     """The page in a browser that drives."""
     with Tab(tmp_path_factory.mktemp("browser"), *SIZE) as tab:
         tab.visit(console.url)
@@ -56,7 +56,7 @@ def page(console: ConsoleProcess, tmp_path_factory: pytest.TempPathFactory) -> I
         yield tab
 
 
-def ready(tab: Headless) -> None:
+def ready(tab: Any) -> None:
     """Wait until the slave follows; where it paused because this machine stood still, resume.
 
     A session begins enabled, on its way to where it starts: it follows nobody until it is there.
@@ -67,14 +67,14 @@ def ready(tab: Headless) -> None:
     tab.shows("ENABLED, homed", 120)
 
 
-def arrow(tab: Headless, axis: int, way: float = PULLED):
+def arrow(tab: Any, axis: int, way: float = PULLED):
     """Where an arrow of the stylus is seen, and where it would be a way farther [px]."""
     begin, end = np.zeros(3), np.zeros(3)
     begin[axis], end[axis] = ARROW, ARROW + way
     return tab.seen_at(GRIP, begin), tab.seen_at(GRIP, end)
 
 
-def pull(tab: Headless, axis: int, way: float = PULLED) -> Any:
+def pull(tab: Any, axis: int, way: float = PULLED) -> Any:
     """Take an arrow of the stylus and pull it along itself; the button stays down."""
     grip, goal = arrow(tab, axis, way)
     tab.mouse("mouseMoved", *grip)
@@ -83,7 +83,7 @@ def pull(tab: Headless, axis: int, way: float = PULLED) -> Any:
     return goal
 
 
-def rest(tab: Headless) -> None:
+def rest(tab: Any) -> None:
     """Wait until the slave is drawn in one place for half a second."""
     tab.value(f"""new Promise((done) => {{
         let last = [], since = 0;
@@ -97,7 +97,7 @@ def rest(tab: Headless) -> None:
     }})""")
 
 
-def saved(page: str, console: float, name: str | Path) -> Any:
+def saved(page: Any, console: Any, name: Any) -> Any:
     """What has been recorded until now, closed under a name."""
     page.fill("name", name)
     page.click("Save as")
@@ -112,13 +112,13 @@ def way(stream: tc.Stream) -> Any:
 
 
 def test_page_of_a_session_opens_without_errors_and_asks_no_other_host(
-    page: Headless, console: ConsoleProcess
+    page: Any, console: ConsoleProcess
 ) -> None:
     assert not page.faults()
     assert page.hosts() == {console.url.split("/")[2]}
 
 
-def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page: Headless) -> None:
+def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page: Any) -> None:
     for told in ("at most 20 mm/s", "at most what its joints make"):
         page.click("Gentle")
         page.shows(told)
@@ -126,7 +126,7 @@ def test_button_of_ones_own_acts_on_the_session_and_says_what_it_did(page: Headl
 
 @pytest.mark.parametrize(("axis", "by"), [(0, "mouse"), (1, "mouse"), (1, "finger")])
 def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(
-    page: Headless, console: ConsoleProcess, axis: int, by: str
+    page: Any, console: ConsoleProcess, axis: int, by: str
 ) -> None:
     ready(page)
     saved(page, console, f"before_{axis}_{by}")
@@ -147,7 +147,7 @@ def test_stylus_that_is_pulled_moves_the_slave_by_gain_and_axes(
 
 @pytest.mark.parametrize("way_in", ["button", "key"])
 def test_emergency_stop_stops_by_button_and_key_until_it_is_released(
-    page: Headless, console: ConsoleProcess, way_in: str
+    page: Any, console: ConsoleProcess, way_in: str
 ) -> None:
     ready(page)
     if way_in == "button":
@@ -164,7 +164,7 @@ def test_emergency_stop_stops_by_button_and_key_until_it_is_released(
     page.shows("ENABLED", 60)
 
 
-def test_page_that_is_loaded_again_goes_on_driving(page: Headless) -> None:
+def test_page_that_is_loaded_again_goes_on_driving(page: Any) -> None:
     page.reload()
     page.shows("drives", 60)
     ready(page)
@@ -175,7 +175,7 @@ def test_page_that_is_loaded_again_goes_on_driving(page: Headless) -> None:
 
 
 def test_browser_that_is_closed_in_motion_leaves_the_slave_still(
-    page: Headless, console: ConsoleProcess, tmp_path: Path
+    page: Any, console: Any, tmp_path: Path
 ) -> None:
     ready(page)
     begin = page.value(page.place_of(TIP))
@@ -202,9 +202,7 @@ def test_browser_that_is_closed_in_motion_leaves_the_slave_still(
     assert after["teleop/state"]["is_clutched"][-1] == 1.0
 
 
-def test_recording_that_was_saved_is_scored_by_a_button(
-    page: Headless, console: ConsoleProcess
-) -> None:
+def test_recording_that_was_saved_is_scored_by_a_button(page: Any, console: ConsoleProcess) -> None:
     ready(page)
     page.mouse("mouseReleased", *pull(page, 0))
     saved(page, console, "to_score")
@@ -215,7 +213,7 @@ def test_recording_that_was_saved_is_scored_by_a_button(
 
 
 def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused(
-    page: Headless, console: ConsoleProcess
+    page: Any, console: ConsoleProcess
 ) -> None:
     ready(page)
     page.click("Settings")

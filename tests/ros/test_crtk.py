@@ -61,7 +61,7 @@ class StockClient:
         self.commands = {}
 
     def taker(self, name: str) -> Callable[..., Any]:
-        def take(message) -> None:
+        def take(message: Any) -> None:
             self.newest[name] = message
             if name == "operating_state":
                 self.was_busy = self.was_busy or message.is_busy
@@ -252,18 +252,18 @@ class ForeignArm(Node):
         self.create_subscription(JointState, "PSM/servo_jp", self.servo, 10)
         self.create_timer(0.01, self.tick)
 
-    def command(self, message) -> None:
+    def command(self, message: Any) -> None:
         word = {"pause": "PAUSED", "resume": "ENABLED"}.get(message.string)
         if "any word" in self.faults:
             word = word or "DISABLED"
         self.state = word or self.state
 
-    def move(self, message) -> None:
+    def move(self, message: Any) -> None:
         if self.state == "ENABLED" or "moves paused" in self.faults:
             self.goal = list(message.position)
             self.busy_until = time.monotonic() + 0.15
 
-    def servo(self, message) -> None:
+    def servo(self, message: Any) -> None:
         if self.state == "ENABLED":
             self.goal = list(message.position)
 
@@ -319,7 +319,7 @@ class ForeignArm(Node):
             self.pose.publish(pose)
 
 
-def findings_of(fault, *, may_move) -> dict[Any, Any]:
+def findings_of(fault: Any, *, may_move: Any) -> dict[Any, Any]:
     """What is found of a foreign arm with this fault, by topic."""
     with foreign_arm(fault) as arm:
         return {found.row.name: found for found in examine(arm, may_move=may_move)}

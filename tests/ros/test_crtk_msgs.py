@@ -92,7 +92,7 @@ def env(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return given | {"PYTHONPATH": str(module), "LD_LIBRARY_PATH": libraries}
 
 
-def run(env: str | dict[str, str] | list[Any], *arguments: object) -> Any:
+def run(env: Any, *arguments: object) -> Any:
     named = env | {"ROS_DOMAIN_ID": free_domain()}
     command = [sys.executable, "-c", *arguments]
     done = subprocess.run(

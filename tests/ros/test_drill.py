@@ -4,6 +4,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,7 +23,7 @@ SOAK = ("braking_weak", "second_publishers")
 @pytest.mark.parametrize(
     "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.soak) for name in SOAK)]
 )
-def test_a_broken_safety_is_found(name) -> None:
+def test_a_broken_safety_is_found(name: Any) -> None:
     """The others, and both forms of each: make drill-mutants."""
     command = [sys.executable, str(ROOT / "tests/mutants.py"), name, "--composed"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)

@@ -69,7 +69,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., object]]:
     """Starter of a live session."""
     started = []
 
-    def start(*arguments: object, **options: Any) -> LiveProcess:
+    def start(*arguments: Any, **options: Any) -> LiveProcess:
         started.append(LiveProcess(tmp_path, *arguments, **options))
         return started[-1]
 
@@ -80,7 +80,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., object]]:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_node_that_was_shut_down_by_service_still_ends_well(
-    peer: "Peer", tmp_path: Path, number
+    peer: "Peer", tmp_path: Path, number: Any
 ) -> None:
     node = peer.start("recorder", out=str(tmp_path / "bag"))
     assert change(peer, "recorder", Transition.TRANSITION_ACTIVE_SHUTDOWN)
@@ -128,7 +128,7 @@ def test_a_composed_session_of_which_a_node_was_shut_down_ends_well(
     ],
 )
 def test_no_node_outlives_the_command_and_the_recording_is_closed(
-    start: Callable[..., Any], number, composed_option: tuple[str, ...]
+    start: Callable[..., Any], number: Any, composed_option: tuple[str, ...]
 ) -> None:
     session = start(*composed_option)
     session.wait_running()

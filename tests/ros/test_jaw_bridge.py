@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,7 +40,7 @@ class Gripper:
         self.setpoint = peer.listen(SLAVE_JAW_SETPOINT_JS)
         peer.node.create_subscription(Float64MultiArray, "witness", self._see, 10)
 
-    def _see(self, message) -> None:
+    def _see(self, message: Any) -> None:
         self.witnessed = list(message.data)
 
     def angle(self) -> Any:
@@ -65,7 +65,7 @@ class Gripper:
 
 
 @contextmanager
-def gripper(peer: "Peer", kind: str) -> Iterator[Gripper]:
+def gripper(peer: "Peer", kind: str) -> Any:
     env = environment() | {"ROS_DOMAIN_ID": peer.domain}
     controller = subprocess.Popen([sys.executable, str(CONTROLLER), kind, "gripper"], env=env)
     try:

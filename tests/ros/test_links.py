@@ -119,7 +119,7 @@ def both_ways(topic: Topic, is_enough: Callable[..., object], *settings: object)
     return pytest.mark.parametrize("recorded", ways, ids=["processes", "composed"], indirect=True)
 
 
-def is_led(setpoints) -> bool:
+def is_led(setpoints: Any) -> bool:
     """Whether commands have been in force for a second and a half, and many different ones."""
     in_force = [stamp for stamp in setpoints.stamps if stamp > topics.NO_COMMAND_NS]
     return len(in_force) > 1500 and len(set(in_force)) > 300
@@ -188,7 +188,7 @@ def recorded(
         session.close()
 
 
-def common(*series: object) -> list[Any]:
+def common(*series: Any) -> list[Any]:
     """Values of some series at the stamps that all have."""
     stamps = reduce(np.intersect1d, (one.stamp_ns for one in series))
     assert len(stamps) > 500
@@ -248,7 +248,7 @@ def test_stages_of_a_user_run_between_ours_compiled_and_plain(recorded: Bag) -> 
     assert off[is_free(limits)].max() < 1e-3 + 1e-9
 
 
-def push(peer: "Peer", first, second) -> None:
+def push(peer: "Peer", first: Any, second: Any) -> None:
     """Send one sample of each source that is given."""
     now = time.time_ns()
     for topic, force in ((topics.MASTER_SERVO_CF, first), (HELPER, second)):

@@ -55,7 +55,7 @@ class Device:
     def stop(self) -> None:
         self.node.destroy_timer(self._timer)
 
-    def _push(self, message) -> None:
+    def _push(self, message: Any) -> None:
         force = message.wrench.force
         self.force = np.array([force.x, force.y, force.z])
 
@@ -83,9 +83,7 @@ def started(peer: "Peer", kind: str = "PoseStamped") -> Device:
     return device
 
 
-def turning(
-    peer: "Peer", condition: Callable[[], object] | Callable[[], int | bool]
-) -> Callable[[], object]:
+def turning(peer: "Peer", condition: Any) -> Callable[[], object]:
     """A condition, looked at once the test's own node had a turn."""
     return lambda: peer.spin() or condition()
 
@@ -154,7 +152,7 @@ def test_a_device_is_given_forces_along_its_own_axes_and_none_once_it_is_silent(
 # -- map-device ------------------------------------------------------------------------------------
 
 
-def command(peer: "Peer", *arguments: object) -> subprocess.Popen[str]:
+def command(peer: "Peer", *arguments: object) -> Any:
     words = [sys.executable, "-m", "teleop_core.cli", "map-device", *map(str, arguments)]
     env = environment() | {"ROS_DOMAIN_ID": peer.domain, "PYTHONUNBUFFERED": "1"}
     return subprocess.Popen(

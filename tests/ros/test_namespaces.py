@@ -36,7 +36,7 @@ def start(peer: "Peer", tmp_path: Path) -> Iterator[Callable[..., Any]]:
     """Starter of a composed session with a parameter file; it ends with the test."""
     started = []
 
-    def started_with(groups, *arguments: object) -> subprocess.Popen[bytes]:
+    def started_with(groups: Any, *arguments: Any) -> subprocess.Popen[bytes]:
         groups = {"recorder": {"out": str(tmp_path / "bag")}} | groups
         file = tmp_path / "session.yaml"
         content = {name: {"ros__parameters": values} for name, values in groups.items()}
@@ -60,7 +60,7 @@ def parameter(peer: "Peer", node: str, name: str) -> Any:
     return peer.call(GetParameters, f"{node}/get_parameters", request).values[0]
 
 
-def recorded(peer: "Peer", process: Array, tmp_path: Array | Path, *slaves: object) -> Bag:
+def recorded(peer: "Peer", process: Array, tmp_path: Any, *slaves: Any) -> Bag:
     """Recording of a session, ended when these slaves have worked for two seconds."""
     for slave in slaves:
         peer.wait_value(slave, "ticks", lambda ticks: ticks > 2000)

@@ -266,7 +266,7 @@ def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_every_node_ends_with_0(peer: "Peer", tmp_path: Path, number) -> None:
+def test_every_node_ends_with_0(peer: "Peer", tmp_path: Path, number: Any) -> None:
     for name in STAGES:
         parameters: dict[str, Any] = {"out": str(tmp_path / "bag")} if name == "recorder" else {}
         peer.start(name, wait="", **parameters)
@@ -366,7 +366,7 @@ def change(peer: "Peer", name: str, transition: Any) -> Any:
 
 @pytest.mark.parametrize("name", list(STAGES))
 def test_a_supervisor_drives_the_lifecycle_twice(
-    peer: "Peer", tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name
+    peer: "Peer", tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: Any
 ) -> None:
     monkeypatch.chdir(tmp_path)  # the recorder makes bags/ here
     node = peer.start(name, autostart=False, wait="unconfigured")
@@ -432,7 +432,7 @@ def test_wrong_parameter_files_end_with_one_line_and_2(
 
 @pytest.mark.parametrize("name", [*STAGES, "teleop_session"])
 def test_help_of_an_executable_names_its_topics_and_starts_nothing(
-    name, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    name: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", [name, "--help"])
     assert main() == 0

@@ -41,7 +41,7 @@ class Streamer:
 
     def until(
         self,
-        condition: str | Callable[[], object] | Callable[[], str | bool] | Callable[[], bool],
+        condition: Any,
         what: str,
     ) -> Any:
         """Send commands until something is so."""
@@ -69,7 +69,7 @@ def state(peer: "int | Peer") -> State | None:
     return None if status is None else State(int(float(status["state"])))
 
 
-def operation(peer: "Peer") -> Any:
+def operation(peer: Any) -> Any:
     """Newest report of the slave's operation, by name."""
     if not hasattr(peer, "operation"):
         from teleop_core.bags.reports import read_reports
@@ -153,7 +153,7 @@ def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer
     button.publish(Bool(data=True))
     for arm in ("left", "right"):
 
-        def is_stopped(arm=arm) -> bool:
+        def is_stopped(arm: Any = arm) -> bool:
             answer = peer.call(Trigger, f"/{arm}/slave/resume", Trigger.Request())
             return not answer.success and "FAULT" in answer.message
 

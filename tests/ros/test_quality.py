@@ -21,9 +21,9 @@ pytestmark = pytest.mark.ros
 JS = topics.SLAVE_MEASURED_JS
 
 
-def heard(peer: "Peer", topic: Topic, qos: QoSProfile) -> list[Any]:
+def heard(peer: "Peer", topic: Topic, qos: QoSProfile) -> Any:
     """Messages of a subscription as a stock client makes it."""
-    found = []
+    found: list[Any] = []
     peer.node.create_subscription(message_type(topic.kind.ros_type), topic.name, found.append, qos)
     return found
 

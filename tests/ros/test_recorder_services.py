@@ -45,7 +45,7 @@ class Session:
         self.peer.wait(heard, "samples at the recorder")
 
 
-def count(path: Path, topic=MASTER) -> int:
+def count(path: Path, topic: Any = MASTER) -> int:
     return Bag(path).topics[topic.name].count
 
 

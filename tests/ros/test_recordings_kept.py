@@ -4,7 +4,7 @@ import signal
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -21,7 +21,7 @@ LOST = 0.2
 """What a recorder that is killed may lose of the time for which it and its master worked [s]."""
 
 
-def start(peer: "str | Peer", tmp_path: Path) -> "NodeProcess":
+def start(peer: Any, tmp_path: Path) -> "NodeProcess":
     """A recorder that hears a master at 1 kHz."""
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
     peer.wait_value("recorder", "received.master/measured_cp", lambda n: n >= 0)

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from teleop_core.graph.topics import (
     OPERATOR_SERVO_CP,
     SLAVE_MEASURED_CP,
 )
+from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.children import environment
 
 if TYPE_CHECKING:
@@ -43,7 +44,10 @@ class Person:
         peer.publisher(OPERATOR_SERVO_CP)
 
     def hold(
-        self, place: ArrayLike, until: Callable[[], object] | Callable[[], bool], what: str
+        self,
+        place: Sequence[float] | Array,
+        until: Callable[[], object] | Callable[[], bool],
+        what: str,
     ) -> None:
         """Want the stylus at a place from the inkwell [m] until something is so."""
         pose = rest_pose()

@@ -33,10 +33,10 @@ def abort_outside_python():
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Callable[..., Any]:
+def run(tmp_path: Any) -> Callable[..., Any]:
     """Run a test of this body in a pytest of its own: its output, and how often the test ran."""
 
-    def result(body, *options: object):
+    def result(body: Any, *options: object):
         file = tmp_path / "test_it.py"
         file.write_text(HEAD + body)
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = ros\n")

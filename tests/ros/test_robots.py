@@ -50,7 +50,7 @@ def short_session(
     slave's own steps, of which a busy machine makes fewer.
     """
 
-    def run(setting: str | int | list[str]):
+    def run(setting: Any):
         configuration = configure("free_motion", settings=[*SHORT, setting])
         begin = None
 

@@ -172,7 +172,7 @@ def test_a_foreign_pose_gives_the_same_answer_as_our_own(peer: "Peer") -> None:
     pose = np.array([0.01, -0.06, -0.08, 0.8, 0.0, 0.6, 0.0])
     stamp = 0
 
-    def send(is_foreign: Topic) -> None:
+    def send(is_foreign: Any) -> None:
         nonlocal stamp
         stamp += MS
         peer.send(topics.SLAVE_SETPOINT_CP, 1, where)
@@ -368,7 +368,7 @@ def _end_slave(peer: "Peer", setpoints: "Listener") -> None:
 def _core_answers(poses: Array, stamps: list[int]) -> Array:
     stage = InverseKinematics(InverseKinematicsParameters(feedback_timeout=5.0))
     stage.signals["slave_setpoint_js"] = HOME
-    answers = []
+    answers: list[Any] = []
     for stamp in stamps:
         if answers:  # the slave is known to follow the first
             stage.signals["slave_setpoint_js_ns"] = stamps[0]

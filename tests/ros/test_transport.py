@@ -61,7 +61,7 @@ def plain(**said: object) -> dict[str | Any, str | Any]:
 
 
 @pytest.mark.parametrize("said", [{}, {RANGE: "LOCALHOST"}])
-def test_a_plain_ros_process_hears_and_commands_our_nodes(peer: "Peer", said) -> None:
+def test_a_plain_ros_process_hears_and_commands_our_nodes(peer: "Peer", said: Any) -> None:
     """The stranger has the middleware's own defaults: shared memory and all interfaces."""
     peer.start("slave")
     names = json.dumps(load_robot("rcrt1").joint_names)
@@ -77,7 +77,7 @@ def test_a_plain_ros_process_hears_and_commands_our_nodes(peer: "Peer", said) ->
 
 
 @pytest.mark.parametrize("said", [{}, {RANGE: "LOCALHOST"}, {"ROS_LOCALHOST_ONLY": "1"}])
-def test_a_node_has_sockets_of_this_machine_alone(peer: "Peer", said) -> None:
+def test_a_node_has_sockets_of_this_machine_alone(peer: "Peer", said: Any) -> None:
     """As `ros2 run` starts it, by a user who has set nothing, or said so in either way."""
     before = {
         name: os.environ.pop(name) for name in list(os.environ) if name.startswith(MIDDLEWARE)
@@ -121,7 +121,7 @@ PROFILES = (PROFILE, "FASTDDS_DEFAULT_PROFILES_FILE")
         ({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, (LOOPBACK, "SYSTEM_DEFAULT")),
     ],
 )
-def test_what_the_user_says_of_the_range_holds(said, chosen) -> None:
+def test_what_the_user_says_of_the_range_holds(said: Any, chosen: Any) -> None:
     environment = dict(said)
     choose_transport(environment)
     again = dict(environment)

@@ -76,7 +76,7 @@ def witness(domain: int) -> Iterator[Callable[[], object]]:
 
 
 @contextmanager
-def arm(*others: object):
+def arm(*others: Any):
     """A domain in which the others run, and what the controller among them witnesses at the end."""
     env = environment() | {"ROS_DOMAIN_ID": free_domain()}
     started = [subprocess.Popen(command, env=env) for command in others]
@@ -90,7 +90,7 @@ def arm(*others: object):
     assert set(codes) == {0}
 
 
-def led(tmp_path: Path, bridge: Any, seed: int, *settings: object, operator: tuple[Any, ...] = ()):
+def led(tmp_path: Path, bridge: Any, seed: int, *settings: Any, operator: Any = ()):
     """A recorded session that leads the arm, and what the controller witnessed."""
     out = tmp_path / f"bag_{seed}"
     live = [
@@ -163,7 +163,7 @@ def test_a_person_at_the_console_leads_it_without_a_jump(
             )
             ways = chain(np.linspace(0.0, _PULLED, 100), repeat(_PULLED))  # a grip moves nothing
 
-            def is_pulled() -> bool:
+            def is_pulled() -> Any:
                 link.hold("", stylus + next(ways) * np.eye(7)[0])
                 link.view()
                 return (

@@ -49,7 +49,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-def colcon(workspace: Path, *arguments: object) -> Any:
+def colcon(workspace: Path, *arguments: Any) -> Any:
     path = f"{COLCON.parent}:{os.environ['PATH']}"
     done = subprocess.run(
         [COLCON, *arguments], cwd=workspace, capture_output=True, text=True, timeout=900,

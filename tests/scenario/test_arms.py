@@ -1,6 +1,7 @@
 """Arms: each one as if it were alone, with its own parameters and robot, in one recording."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -106,7 +107,7 @@ def test_wrong_arms_are_refused_in_one_line_before_anything_runs(
     assert "\n" not in str(error.value)
 
 
-def waits(times) -> Array:
+def waits(times: Any) -> Array:
     """Rest until the slave follows, with the delay too; then swing by 20 mm."""
     swing = 0.01 * (1.0 - np.cos(2.0 * np.pi * np.maximum(times - 0.1, 0.0)))
     return np.column_stack((swing, -swing, 0.5 * swing))

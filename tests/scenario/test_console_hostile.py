@@ -1,7 +1,8 @@
 """Hostile pages: nothing that they send moves an arm that they do not drive, or stops the stop."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -21,7 +22,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a")
 
 
 @pytest.fixture(scope="module")
-def served() -> Iterator[tuple[ConsoleServer, Desk, PageClient]]:
+def served() -> Any:
     """A page of a desk, drawn as the command draws it, and whoever drives it."""
     with shown(Desk()) as (server, desk), PageClient(server.port) as driver:
         until(lambda: server.drivers.driver is not None, "it drives")
@@ -31,7 +32,7 @@ def served() -> Iterator[tuple[ConsoleServer, Desk, PageClient]]:
 @pytest.mark.parametrize("attack", hostile.HOSTILE, ids=lambda attack: attack.__name__)
 def test_page_that(
     attack: Callable[[PageClient, PageClient], None],
-    served: tuple[ConsoleServer, Desk, PageClient],
+    served: Any,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     server, desk, driver = served

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,7 +25,7 @@ STILL = 3e-5  # poses that differ less from what is drawn are not sent [m]
 
 
 @pytest.fixture(scope="module")
-def page(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+def page(recording: Path, tmp_path_factory: Any) -> Iterator[Headless]:
     """Page of a recording in a browser."""
     console = ConsoleProcess(tmp_path_factory.mktemp("console"), recording)
     try:
@@ -36,7 +37,7 @@ def page(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         assert console.end() == 0, console.text
 
 
-def go_to(page: Headless, time: float) -> None:
+def go_to(page: Any, time: float) -> None:
     """Write a time [s] beside its slider."""
     page.fill("time", f"{time:.3f}")
     page.key("Enter")
@@ -53,7 +54,7 @@ def measured(recording: Path, time: float) -> Array:
 
 @pytest.mark.parametrize("time", [9.5, 4.25, 11.0])
 def test_tip_is_shown_where_the_recording_says_at_a_time(
-    page: Headless, recording: Path, time: float
+    page: Any, recording: Path, time: float
 ) -> None:
     go_to(page, time)
     wanted = measured(recording, time)
@@ -62,7 +63,7 @@ def test_tip_is_shown_where_the_recording_says_at_a_time(
     assert not page.faults()
 
 
-def test_replay_plays_pauses_and_steps(page: Headless) -> None:
+def test_replay_plays_pauses_and_steps(page: Any) -> None:
     go_to(page, 2.0)
     page.click("Play")
     page.shows("Pause")
@@ -87,7 +88,7 @@ def test_recording_cannot_be_driven_from_the_page(page: Headless) -> None:
     assert not page.value("document.body.innerText.includes('Initialize')")
 
 
-def test_pictures_from_tool_and_microscope_show_the_scene(page: Headless) -> None:
+def test_pictures_from_tool_and_microscope_show_the_scene(page: Any) -> None:
     go_to(page, 6.0)
     page.click("View")
     page.click("show")

@@ -34,7 +34,7 @@ CENTER = (700, 450)
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Any:
     with Tab(tmp_path_factory.mktemp("first")) as opened:
         yield opened
 
@@ -61,7 +61,7 @@ def is_driven(server: ConsoleServer) -> bool:
 
 
 def test_page_opens_without_errors_asks_no_other_host_and_is_used(
-    tab: Headless, capfd: pytest.CaptureFixture[str]
+    tab: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with ConsoleServer(0, token="secret", label="arm") as server:
         clicks = []
@@ -79,7 +79,7 @@ def test_page_opens_without_errors_asks_no_other_host_and_is_used(
     assert capfd.readouterr() == ("", "")
 
 
-def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab: Headless) -> None:
+def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab: Any) -> None:
     with ConsoleServer(0, token="secret") as server:
         address = server.url.split("?", maxsplit=1)[0]
         for wrong in (address, address + "?token=guess"):
@@ -93,7 +93,7 @@ def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab: Headl
         assert tab.value("document.cookie") == ""  # no script can read it
 
 
-def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab: Headless) -> None:
+def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab: Any) -> None:
     with ConsoleServer(0) as server, elsewhere() as foreign:
         tab.call("Page.navigate", url=foreign)
         tab.until("document.body")
@@ -137,7 +137,7 @@ class Elsewhere:
 
 
 def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(
-    tab: Headless, other: Headless
+    tab: Any, other: Any
 ) -> None:
     with ConsoleServer(0) as server:
         take = server.viser.gui.add_button("Take control")
@@ -159,7 +159,7 @@ def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(
         assert not tab.faults()
 
 
-def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab: Headless) -> None:
+def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab: Any) -> None:
     with ConsoleServer(0, patience=2.5) as server:
         held = []
         gizmo = server.viser.scene.add_transform_controls("/stylus", scale=2.0)
@@ -179,14 +179,14 @@ def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab: 
         assert server.drivers.pages == (page,)  # its connection is well: a worker answers
 
 
-def gizmo_tip(tab: Headless) -> tuple[int, int]:
+def gizmo_tip(tab: Headless) -> Any:
     """A point of the upward arrow of a gizmo at the origin [px]: where the cursor grabs it."""
     tab.value("new Promise((done) => setTimeout(done, 500))")
     return (CENTER[0], CENTER[1] - 40)
 
 
 def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_served(
-    tab: Headless, monkeypatch: pytest.MonkeyPatch
+    tab: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(connection, "STUCK", 1.0)
     with ConsoleServer(0) as server:
@@ -202,7 +202,7 @@ def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_se
         until(lambda: server.viser.connections() == 1, "the page that never reads")
         tab.visit(server.url)
         until(lambda: is_driven(server), "the page is there")
-        kept = []
+        kept: list[Any] = []
 
         def went() -> bool:
             for _ in range(20):
@@ -223,7 +223,7 @@ def cloud(seed: int) -> dict[Any, Any]:
     return {"points": points, "colors": np.zeros((20_000, 3), np.uint8)}
 
 
-def test_page_is_led_out_of_the_machine_by_nobody(tab: Headless) -> None:
+def test_page_is_led_out_of_the_machine_by_nobody(tab: Any) -> None:
     with ConsoleServer(0) as server:
         tab.visit(server.url)
         until(lambda: is_driven(server), "the page is there")

@@ -37,7 +37,7 @@ def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
 
 
 @pytest.fixture(autouse=True)
-def _clean(tab: Headless) -> Iterator[None]:
+def _clean(tab: Any) -> Iterator[None]:
     """Each test begins with an empty tab and with no memory of errors."""
     yield
     tab.call("Page.navigate", url="about:blank")
@@ -47,7 +47,7 @@ def _clean(tab: Headless) -> Iterator[None]:
 
 @pytest.mark.parametrize("size", [(390, 780), (780, 390), (1400, 900)])
 def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pressed(
-    tab: Headless, size: tuple[int, int]
+    tab: Any, size: tuple[int, int]
 ) -> None:
     tab.resize(*size)
     with shown(Desk(is_stoppable=True)) as (server, desk):
@@ -75,7 +75,7 @@ def gizmos(server: ConsoleServer) -> list[Any]:
     return list(server.viser.scene._handle_from_transform_controls_name.values())
 
 
-def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab: Headless) -> None:
+def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab: Any) -> None:
     with shown(Desk(is_stoppable=True)) as (server, desk):
         tab.visit(server.url)
         tab.shows("ENABLED")
@@ -90,7 +90,7 @@ def test_space_stops_from_anywhere_but_a_field_in_which_it_is_typed(tab: Headles
 
 
 def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_gone(
-    tab: Headless,
+    tab: Any,
 ) -> None:
     with shown(Desk(is_stoppable=True)) as (server, desk):
         tab.visit(server.url)

@@ -8,6 +8,7 @@ import sys
 import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -173,7 +174,7 @@ def test_generated_pages_are_what_the_code_says() -> None:
 @pytest.mark.parametrize(
     "name", [name for name in NAMES if snippets(text_of(name).split(PACKAGE_HEADING)[0], "python")]
 )
-def test_python_of_a_document_runs_from_top_to_bottom(name, tmp_path: Path) -> None:
+def test_python_of_a_document_runs_from_top_to_bottom(name: Any, tmp_path: Path) -> None:
     code = "\n".join(snippets(text_of(name).split(PACKAGE_HEADING)[0], "python"))
     (tmp_path / "document.py").write_text(code, encoding="utf-8")
     run(["document.py"], tmp_path)

@@ -50,7 +50,7 @@ def next_command(text: Any) -> list[str]:
     return present(re.search(r"next: teleop (.*)", text))[1].split()
 
 
-def test_import_says_what_it_took_and_what_to_do_next(imported) -> None:
+def test_import_says_what_it_took_and_what_to_do_next(imported: Any) -> None:
     out, text = imported
     assert "300 of 300 rows" in text
     assert "button clutch" in text
@@ -59,7 +59,7 @@ def test_import_says_what_it_took_and_what_to_do_next(imported) -> None:
 
 
 def test_a_motion_goes_in_through_the_graph_and_out_unchanged(
-    teleop: "Run", imported, tmp_path: Path
+    teleop: "Run", imported: Any, tmp_path: Path
 ) -> None:
     _, text = imported
     teleop(*next_command(text))
@@ -80,7 +80,7 @@ def test_a_motion_goes_in_through_the_graph_and_out_unchanged(
 
 
 def test_replaying_the_file_itself_gives_the_same_motion(
-    teleop: "Run", hand: Path, imported, tmp_path: Path
+    teleop: "Run", hand: Path, imported: Any, tmp_path: Path
 ) -> None:
     out, text = imported
     if not (out.parent / "hand_replayed").exists():
@@ -94,7 +94,7 @@ def test_replaying_the_file_itself_gives_the_same_motion(
 
 
 def test_import_is_repeated_by_what_its_metadata_say(
-    teleop: "Run", hand: Path, imported, tmp_path: Path
+    teleop: "Run", hand: Path, imported: Any, tmp_path: Path
 ) -> None:
     out, _ = imported
     about = Bag(out).metadata
@@ -126,7 +126,7 @@ def test_axes_with_a_minus_are_values_not_options(
 
 
 def test_a_session_follows_the_recording_for_as_long_as_it_is(
-    teleop: "Run", imported, tmp_path: Path
+    teleop: "Run", imported: Any, tmp_path: Path
 ) -> None:
     out, _ = imported
     center = np.array([0.0, 0.01, 0.03])
@@ -155,7 +155,7 @@ def test_a_session_follows_the_recording_for_as_long_as_it_is(
     ],
 )
 def test_mistakes_are_one_line_and_leave_nothing(
-    teleop: "Run", imported, hand: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
+    teleop: "Run", imported: Any, hand: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
 ) -> None:
     places = {"hand": hand, "out": tmp_path / "out", "bag": imported[0]}
     done = teleop(*(word.format(**places) for word in arguments), code=2)
@@ -165,7 +165,9 @@ def test_mistakes_are_one_line_and_leave_nothing(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_data_set_of_several_recordings_is_made(teleop: "Run", imported, tmp_path: Path) -> None:
+def test_a_data_set_of_several_recordings_is_made(
+    teleop: "Run", imported: Any, tmp_path: Path
+) -> None:
     _, text = imported
     answer = next_command(text)[-1]
     if not Bag(imported[0]).path.with_name("hand_replayed").exists():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import PartError
 from teleop_core.base.parameters import NoParameters, build, parameter
-from teleop_core.chain.fixtures import Fixture, register_fixture
+from teleop_core.chain.fixtures import register_fixture
 from teleop_core.chain.fixtures.box import BOX
 from teleop_core.chain.fixtures.sphere import SPHERE, sphere_depth
 from teleop_core.chain.mapping.parameters import MotionScalingParameters
@@ -105,7 +105,7 @@ def test_delay_on_a_late_link_comes_on_top_of_its_tick(seconds: float, ticks: in
 def mirror(name: str, topic: Topic, **more: Any) -> Stage:
     """Stage that repeats the slave's pose, however old, under the name of its topic."""
 
-    def step(parameters, state, signals, dt) -> None:
+    def step(parameters: Any, state: Any, signals: Any, dt: Any) -> None:
         signals[topic.field] = signals["slave_measured_cp"]
 
     return Stage(name, NoParameters, (SLAVE_MEASURED_CP,), (topic,), step=step, **more)
@@ -156,7 +156,7 @@ class LimitParameters:
     speed: float = parameter(0.02, unit="m/s", lower=1e-3, upper=1.0, doc="along each axis")
 
 
-def limit_step(p, s, row, dt: float) -> None:
+def limit_step(p: Any, s: Any, row: Any, dt: float) -> None:
     for i in range(7):
         row.slave_limited_cp[i] = row.slave_servo_cp[i]
     reach = p.speed * dt
@@ -205,7 +205,7 @@ def test_own_stage_is_recorded_with_its_topic_and_stamp(own_parts: None, tmp_pat
 
 
 def test_what_a_plain_stage_raises_reaches_the_user(own_parts: None) -> None:
-    def step(parameters, state, signals, dt: float) -> None:
+    def step(parameters: Any, state: Any, signals: Any, dt: float) -> None:
         if signals["now_ns"] > 5 * TICK_NS:
             raise RuntimeError("my own mistake")
 
@@ -224,7 +224,7 @@ PUSH = Topic(
 )  # fmt: skip
 
 
-def push_step(p, s, row, dt: float) -> None:
+def push_step(p: Any, s: Any, row: Any, dt: float) -> None:
     row.contact_servo_cf[0] = p.newton
 
 
@@ -255,7 +255,7 @@ def test_second_source_of_force_is_added_and_pushes_the_hand(
 
 @pytest.mark.parametrize("shape", [BOX, SPHERE], ids=["box", "sphere"])
 def test_plain_fixture_gives_the_same_bits_as_the_same_depth_compiled(
-    own_parts: None, shape: Fixture
+    own_parts: None, shape: Any
 ) -> None:
     register_fixture(replace(shape, name="plain", depth=shape.depth.py_func))
     sizes = {"box": "box.size=[0.01, 0.01, 0.01]", "sphere": "sphere.diameter=0.01"}

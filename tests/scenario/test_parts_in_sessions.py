@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def session(step: Callable[[object, object, object, float], None]) -> VirtualTim
 def test_stage_that_writes_no_number_ends_the_session_with_topic_and_time(
     own_parts: None, value: float
 ) -> None:
-    def fails(p, s, row, dt: float) -> None:
+    def fails(p: Any, s: Any, row: Any, dt: float) -> None:
         row.test_answer[2] = value if row.now_ns > 5 * TICK_NS else 0.0
 
     told = "^stage 'own' must be one that writes finite numbers; test/answer at 0.006 s is not"
@@ -48,7 +48,7 @@ def test_stage_that_writes_no_number_ends_the_session_with_topic_and_time(
 def test_misspelt_field_in_a_plain_stage_is_told_with_the_near_one_and_the_line(
     own_parts: None,
 ) -> None:
-    def misspells(p, s, row, dt: float) -> None:
+    def misspells(p: Any, s: Any, row: Any, dt: float) -> None:
         row.test_answer[0] = row.slave_servo_pc[0]
 
     line = misspells.__code__.co_firstlineno + 1
@@ -57,7 +57,7 @@ def test_misspelt_field_in_a_plain_stage_is_told_with_the_near_one_and_the_line(
         session(misspells).run(1)
 
 
-def copies(p, s, row, dt: float) -> None:
+def copies(p: Any, s: Any, row: Any, dt: float) -> None:
     row.test_answer[:] = row.slave_servo_cp
 
 

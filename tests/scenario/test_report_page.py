@@ -106,7 +106,7 @@ def opened(browser: str, page: Path, folder: Path):
     return attributes, said, requested(log)
 
 
-def requested(log) -> set[Any]:
+def requested(log: Any) -> set[Any]:
     """URLs for which a page asked the network, from Chromium's log of it."""
     # One event per line; whether the end is written depends on how the browser ends.
     lines = [line.rstrip(",") for line in log.read_text(errors="replace").splitlines()]

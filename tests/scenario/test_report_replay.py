@@ -94,7 +94,7 @@ def page(tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.fixture(scope="module")
-def tab(page, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+def tab(page: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     with Tab(tmp_path_factory.mktemp("profile"), 1200) as opened:
         opened.open(page[0])
         assert opened.value("document.body.dataset.errors") is None
@@ -102,7 +102,7 @@ def tab(page, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
 
 
 @pytest.fixture(autouse=True)
-def _whole(tab: Headless) -> Iterator[None]:
+def _whole(tab: Any) -> Iterator[None]:
     tab.value("document.querySelectorAll('.times .all').forEach((button) => button.click())")
     tab.settled()
     yield
@@ -140,7 +140,7 @@ def recorded(tips: NDArray[np.int64], time: float | Array) -> Array:
 
 @pytest.mark.parametrize("number", range(len(ROBOTS)), ids=ROBOTS)
 def test_tip_is_drawn_where_the_recording_says_at_any_time(
-    tab: Headless, page, number: int
+    tab: Headless, page: Any, number: int
 ) -> None:
     _, tips = page
     for time in (0.0, 2.3456, 5.0, 7.9):
@@ -149,7 +149,7 @@ def test_tip_is_drawn_where_the_recording_says_at_any_time(
     assert np.ptp(tips[number][1], axis=0).max() > 20 * TOLERANCE_MM  # it did move
 
 
-def test_last_solid_is_where_the_tip_is(tab: Headless, page) -> None:
+def test_last_solid_is_where_the_tip_is(tab: Headless, page: Any) -> None:
     for time in (1.0, 6.5):
         shown = show(tab, 0, time)
         np.testing.assert_allclose(shown["ball"], shown["tip"], atol=TOLERANCE_MM)
@@ -160,7 +160,7 @@ def test_fixture_is_drawn_while_it_is_on(tab: Headless) -> None:
     assert shown == [[False], [True], [False]]
 
 
-def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab: Headless, page) -> None:
+def test_replay_is_of_the_visible_time_and_plays_to_its_end(tab: Headless, page: Any) -> None:
     tab.value("""(() => { const [from, to] = document.querySelectorAll('.times input');
         from.value = 2; to.value = 3; to.dispatchEvent(new Event('change')); })()""")
     tab.settled()

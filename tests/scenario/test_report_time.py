@@ -3,13 +3,12 @@
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 
 from headless import Headless
 from recipes import START_NS, Recipe, state
@@ -23,6 +22,7 @@ from teleop_core.graph.topics import (
     TELEOP_STATE,
     Limit,
 )
+from teleop_core.kernels.geometry import Array
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -122,20 +122,18 @@ def long(tmp_path_factory: pytest.TempPathFactory):
 @pytest.fixture(scope="module")
 def tabs() -> Iterator[dict[Any, Any]]:
     """Tabs by page and width; drawing a page takes seconds."""
-    found = {}
+    found: dict[Any, Any] = {}
     yield found
     for tab in found.values():
         tab.__exit__()
 
 
 @pytest.fixture
-def opened(
-    chromium: str, tabs: int, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Callable[..., Any]]:
+def opened(chromium: str, tabs: int, tmp_path_factory: Any) -> Iterator[Callable[..., Any]]:
     """Opens a page at a width; whatever goes wrong in it fails the test."""
     used = []
 
-    def open_page(page, width: int = 1200) -> Any:
+    def open_page(page: Any, width: int = 1200) -> Any:
         if (page, width) not in tabs:
             tabs[page, width] = Headless(chromium, tmp_path_factory.mktemp("profile"), width)
             tabs[page, width].open(page)
@@ -186,7 +184,7 @@ def show(tab: Any, begin: float, end: float, recording: int = 0) -> None:
     tab.settled()
 
 
-def area(tab: tuple[int, int, float], selector: str) -> Any:
+def area(tab: Any, selector: str) -> Any:
     """Left, top, width and height of an element that is brought into the window, [px]."""
     return tab.value(
         f"""(() => {{ const part = document.querySelector({json.dumps(selector)});
@@ -195,7 +193,7 @@ def area(tab: tuple[int, int, float], selector: str) -> Any:
     )
 
 
-def drag(tab: tuple[int, int, float], selector: ArrayLike, begin: ArrayLike, end: str) -> None:
+def drag(tab: Any, selector: Any, begin: Sequence[float] | Array, end: Any) -> None:
     """Drag over shares of the width and height of an element."""
     left, top, width, height = area(tab, selector)
     tab.drag(*((left + x * width, top + y * height) for x, y in (begin, end)))
@@ -212,7 +210,7 @@ def curve(tab: object, title: str, name: str, recording: str = "one"):
 
 
 def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(
-    opened: Callable[..., Any], short
+    opened: Callable[..., Any], short: Any
 ) -> None:
     tab = opened(short[0])
     whole = ranges(tab, "two")
@@ -225,7 +223,7 @@ def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(
     assert np.allclose([float(field) for field in fields], (begin, end), atol=1e-3)
 
 
-def test_panning_one_plot_moves_all(opened: Callable[..., Any], short) -> None:
+def test_panning_one_plot_moves_all(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     plot = plots(tab)[f"one/{POSITION}"]["id"]
@@ -238,7 +236,7 @@ def test_panning_one_plot_moves_all(opened: Callable[..., Any], short) -> None:
 
 
 def test_double_click_on_any_plot_shows_the_whole_recording(
-    opened: Callable[..., Any], short
+    opened: Callable[..., Any], short: Any
 ) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
@@ -256,7 +254,7 @@ def test_double_click_on_any_plot_shows_the_whole_recording(
 
 
 def test_strip_selects_moves_and_resizes_the_visible_time(
-    opened: Callable[..., Any], short
+    opened: Callable[..., Any], short: Any
 ) -> None:
     tab = opened(short[0])
     strip = "#times-0 .strip"
@@ -271,7 +269,7 @@ def test_strip_selects_moves_and_resizes_the_visible_time(
         assert np.allclose((first, last), expected, atol=0.1)
 
 
-def test_keys_and_buttons_move_the_visible_time(opened: Callable[..., Any], short) -> None:
+def test_keys_and_buttons_move_the_visible_time(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
     for act, expected in (("later", (11.2, 15.2)), ("earlier", (8.0, 12.0)),
@@ -286,7 +284,7 @@ def test_keys_and_buttons_move_the_visible_time(opened: Callable[..., Any], shor
     assert np.allclose(ranges(tab, "one"), [(8.4, 12.4)], atol=1e-6)
 
 
-def test_range_beyond_the_recording_is_cut_to_it(opened: Callable[..., object], short) -> None:
+def test_range_beyond_the_recording_is_cut_to_it(opened: Callable[..., object], short: Any) -> None:
     tab = opened(short[0])
     for begin, end, expected in ((-5.0, 5.0, (0.0, 10.0)), (15.0, 99.0, (0.0, 19.999)),
                                  (7.0, 7.0, (0.0, 19.999)), (19.99, 30.0, (9.989, 19.999)),
@@ -299,7 +297,9 @@ def test_range_beyond_the_recording_is_cut_to_it(opened: Callable[..., object], 
 
 
 @pytest.mark.parametrize("count", [SHORT, LONG])
-def test_zooming_in_shows_every_sample(opened: Callable[..., Any], short, long, count) -> None:
+def test_zooming_in_shows_every_sample(
+    opened: Callable[..., Any], short: Any, long: Any, count: Any
+) -> None:
     (page, recipe), name = (long, "long") if count == LONG else ((short[0], short[1]["one"]), "one")
     tab = opened(page)
     first, last = count - 5000, count - 4900
@@ -333,7 +333,7 @@ def test_zooming_in_shows_every_sample(opened: Callable[..., Any], short, long, 
 
 
 def test_page_of_ten_minutes_is_small_and_shows_a_single_peak(
-    opened: Callable[..., Any], long
+    opened: Callable[..., Any], long: Any
 ) -> None:
     page, _ = long
     assert page.stat().st_size < LARGEST_PAGE
@@ -357,7 +357,7 @@ def bounds(shape: Any) -> list[Any]:
 
 
 def test_every_plot_against_time_has_the_bands_of_the_state(
-    opened: Callable[..., Any], short
+    opened: Callable[..., Any], short: Any
 ) -> None:
     tab = opened(short[0])
     timed = {name: plot for name, plot in plots(tab).items() if plot["times"]}
@@ -376,7 +376,7 @@ def test_every_plot_against_time_has_the_bands_of_the_state(
 
 
 @pytest.mark.parametrize("title", ["Path in space", "Path per plane"])
-def test_paths_show_the_visible_time(opened: Callable[..., object], short, title: str) -> None:
+def test_paths_show_the_visible_time(opened: Callable[..., object], short: Any, title: str) -> None:
     tab = opened(short[0])
     show(tab, 5.0, 7.0)
     traces = [t for t in plots(tab)[f"one/{title}"]["traces"] if t["times"]]
@@ -394,7 +394,7 @@ def test_paths_show_the_visible_time(opened: Callable[..., object], short, title
 
 
 def test_long_path_in_a_plane_becomes_the_time_that_was_spent(
-    opened: Callable[..., object], long
+    opened: Callable[..., object], long: Any
 ) -> None:
     tab = opened(long[0])
     kinds = {trace["type"] for trace in plots(tab)["long/Path per plane"]["traces"]}
@@ -405,7 +405,7 @@ def test_long_path_in_a_plane_becomes_the_time_that_was_spent(
 
 
 @pytest.mark.parametrize("width", [500, 1200])
-def test_page_fits_into_the_window(opened: Callable[..., Any], short, width: int) -> None:
+def test_page_fits_into_the_window(opened: Callable[..., Any], short: Any, width: int) -> None:
     tab = opened(short[0], width)
     assert tab.value("document.documentElement.scrollWidth") <= width
     for name, plot in plots(tab).items():
@@ -414,7 +414,7 @@ def test_page_fits_into_the_window(opened: Callable[..., Any], short, width: int
 
 
 def test_page_follows_a_window_that_becomes_narrow_and_wide_again(
-    opened: Callable[..., Any], short
+    opened: Callable[..., Any], short: Any
 ) -> None:
     tab = opened(short[0])
     for width, columns in ((500, 1), (1200, 3)):
@@ -425,7 +425,7 @@ def test_page_follows_a_window_that_becomes_narrow_and_wide_again(
 
 
 def test_without_scripts_there_are_tables_sketches_and_a_word(
-    chromium: str, short, tmp_path: Path
+    chromium: str, short: Any, tmp_path: Path
 ) -> None:
     with Headless(chromium, tmp_path) as tab:
         tab.call("Emulation.setScriptExecutionDisabled", value=True)
@@ -443,13 +443,15 @@ def test_without_scripts_there_are_tables_sketches_and_a_word(
         assert tab.value("document.querySelector('.times').clientHeight") == 0
 
 
-def test_table_is_folded_where_scripts_run(opened: Callable[..., Any], short) -> None:
+def test_table_is_folded_where_scripts_run(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     assert tab.value("document.querySelectorAll('details.table[open]').length") == 0
     assert "position, RMS" not in tab.value("document.body.innerText")
 
 
-def test_page_in_a_browser_that_cannot_unpack_says_so(chromium: str, short, tmp_path: Path) -> None:
+def test_page_in_a_browser_that_cannot_unpack_says_so(
+    chromium: str, short: Any, tmp_path: Path
+) -> None:
     with Headless(chromium, tmp_path) as tab:
         source = "delete window.DecompressionStream"
         tab.call("Page.addScriptToEvaluateOnNewDocument", source=source)

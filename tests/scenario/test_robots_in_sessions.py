@@ -1,6 +1,7 @@
 """Every robot in the whole graph: as slave, as master's handle, with options, in virtual time."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,9 @@ TABLES = sorted(map(str, Path("config/robots").glob("*.yaml")))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*list_robots(), *TABLES])
-def test_every_robot_follows_a_session_inside_its_limits_and_drives(name, tmp_path: Path) -> None:
+def test_every_robot_follows_a_session_inside_its_limits_and_drives(
+    name: Any, tmp_path: Path
+) -> None:
     configuration = configure("free_motion", settings=[*SHORT, f"robot={name}"])
     simulate(configuration, tmp_path / "bag")
     robot, bag = load_robot(name), Bag(tmp_path / "bag")

@@ -18,6 +18,7 @@ import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,7 +69,7 @@ def arithmetic() -> str:
 def digests(scenario: str, *settings: str) -> dict[str, str]:
     """First 16 hexadecimal digits of the SHA-256 of each column's bytes, over a whole session."""
     configuration = configure(scenario, settings=settings)
-    found = defaultdict(hashlib.sha256)
+    found: Any = defaultdict(hashlib.sha256)
     session = VirtualTime(configuration)
     for block in run_blocks(session, session_ticks(configuration, session)):
         for name, field in FIELDS.items():

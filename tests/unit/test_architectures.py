@@ -128,7 +128,7 @@ def test_another_architecture_sets_in_from_nothing_within_a_tenth_of_a_second() 
 
 def test_an_architecture_of_ones_own_is_one_call_and_remembers_twelve_numbers() -> None:
     @kernel
-    def counting(numbers, memory, felt, away, period, out) -> None:
+    def counting(numbers: Any, memory: Any, felt: Any, away: Any, period: Any, out: Any) -> None:
         memory[11] += period
         out[0], out[1], out[2] = 0.0, 0.0, 0.01 * memory[11]
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,7 @@ def rng() -> np.random.Generator:
 
 
 def block(
-    rng: np.random.Generator, begin: int, count: int, chosen: Sequence[Topic] = topics.STREAMS
+    rng: np.random.Generator, begin: int, count: int, chosen: Any = topics.STREAMS
 ) -> dict[Topic, tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
     """Samples of one block; stamps lie a little before log times."""
     log_ns = np.arange(begin, begin + count) * MS + 10

@@ -1,10 +1,12 @@
 """Bandwidth: a packet waits for the line, takes its size over the bandwidth, or finds no place."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from present import present
 from teleop_core.bags.cdr import template
@@ -34,7 +36,7 @@ def line(service: float, **values: str | float) -> NetworkLink:
     return link(there__bandwidth=1e3 * BITS / service, **values)
 
 
-def arrivals(network: NetworkLink, sent: ArrayLike | range, ticks: int) -> NDArray[np.int64]:
+def arrivals(network: NetworkLink, sent: Any, ticks: int) -> NDArray[np.int64]:
     """Commands that arrive (N, 2): tick at which each was sent, and tick at which it came.
 
     Args:

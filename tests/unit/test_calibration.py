@@ -278,7 +278,7 @@ def test_the_offset_of_d3_is_found_with_a_ruler_and_with_a_tracker(seed: int) ->
 
 def test_a_ruler_reads_in_half_millimetres_along_one_axis_after_the_other() -> None:
     measured = ruled(Model.of(RCRT1), LinkErrors.of(RCRT1, {"d3": 5.5e-3}), 30)
-    halves = measured.distances / 0.5e-3
+    halves = present(measured.distances) / 0.5e-3
     assert np.allclose(halves, np.round(halves), rtol=0, atol=1e-9)
     assert measured.labels == ("x",) * 10 + ("y",) * 10 + ("z",) * 10
     way = RCRT1.fk(measured.joints)[:, :3, 3] - RCRT1.fk(RCRT1.home)[:3, 3]

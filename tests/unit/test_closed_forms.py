@@ -42,7 +42,7 @@ NAMES = [f"{word}, {kind}, {'base' if side > 0 else 'tip'}" for kind, _, word, s
 
 
 @pytest.fixture
-def load(tmp_path: Path) -> Callable[..., Robot]:
+def load(tmp_path: Path) -> Any:
     """Robot of axes with limits [rad], the same for all joints or one pair for each."""
 
     def made(
@@ -197,9 +197,7 @@ def test_paths_are_followed_without_a_flip_and_within_speeds(
 
 
 @pytest.mark.parametrize("kind", ["2 and 3 parallel", "5 and 6 meet"])
-def test_out_of_reach_the_nearest_posture_answers_and_motion_goes_on(
-    kind: str, load: Callable[..., Robot]
-) -> None:
+def test_out_of_reach_the_nearest_posture_answers_and_motion_goes_on(kind: str, load: Any) -> None:
     rng = np.random.default_rng(4)
     arm = load(MAKERS[kind](rng, kind), WIDE)
     wanted = arm.fk(arm.home)
@@ -309,7 +307,14 @@ def psi_of(
 
 @kernel
 def write_at(
-    branch: Any, psi: Any, elbow, seed: Array, limits: Array, geometry: Array, work: Array, q
+    branch: Any,
+    psi: Any,
+    elbow: Any,
+    seed: Array,
+    limits: Array,
+    geometry: Array,
+    work: Array,
+    q: Any,
 ) -> None:
     """Write the joints (8,) of a branch at psi [rad], by whole turns into limits if any are."""
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]

@@ -35,7 +35,7 @@ X, Y, Z = np.eye(3)
 THIRDS = 2.0 * math.pi / 3.0 * np.arange(3)
 
 
-def at(*point: float) -> SE3:
+def at(*point: float) -> Any:
     return SE3(np.eye(3), np.array(point, float))
 
 
@@ -164,7 +164,7 @@ def add_legs(drawn: Mechanism, ground: int, body: int, base: Array, platform: Ar
     return slides
 
 
-def raised(drawn: Mechanism, slides: list[int], height: float) -> Mechanism:
+def raised(drawn: Any, slides: list[int], height: float) -> Mechanism:
     """Start with a level body on all its legs."""
     for slide in slides:
         drawn.start = drawn.put(drawn.start, slide, height)
@@ -174,7 +174,7 @@ def raised(drawn: Mechanism, slides: list[int], height: float) -> Mechanism:
     return drawn
 
 
-def stewart(layout: Layout, height: float) -> Mechanism:
+def stewart(layout: Layout, height: float) -> Any:
     drawn = Mechanism()
     body = drawn.add(0, pinocchio.JointModelFreeFlyer())
     slides = add_legs(drawn, 0, body, layout.base, layout.platform)
@@ -182,7 +182,7 @@ def stewart(layout: Layout, height: float) -> Mechanism:
     return raised(drawn, slides, height)
 
 
-def hybrid(g: Mapping[str, float], heading: str) -> Mechanism:
+def hybrid(g: Mapping[str, float], heading: str) -> Any:
     """SCARA with six legs on its end, which a wrist keeps from turning or not."""
     drawn = Mechanism()
     arm = [drawn.add(0, pinocchio.JointModelRZ(), at(0, 0, g["h1"]))]
@@ -237,7 +237,7 @@ def four_bar(l0: float, l1: float, l2: float, l3: float, a: float, mode: float) 
     return drawn
 
 
-def hand(g: Mapping[str, float]) -> Mechanism:
+def hand(g: Mapping[str, float]) -> Any:
     """Fingers of the hand pinned to the object; theta and psi are the motors."""
     drawn = Mechanism()
     body, drawn.fingers = drawn.add(0, pinocchio.JointModelFreeFlyer()), []
@@ -260,7 +260,7 @@ IN_PAIRS = {"sigma_b": math.radians(15.0), "sigma_m": math.radians(15.0)}
 
 
 @cache
-def case(name: str) -> tuple[Robot, Mechanism]:
+def case(name: str) -> Any:
     """Robot with as many motors as freedoms of its loops (and arm), and its drawing."""
     kind, _, option = name.partition("_")
     if kind == "stewart":
@@ -420,7 +420,7 @@ def tool_poses(count: int) -> Iterator[SE3]:
         yield SE3(turn, place)
 
 
-def held(robot: Robot, drawn: Mechanism, T: SE3) -> Iterator[tuple[Array, SE3, Array]]:
+def held(robot: Robot, drawn: Any, T: SE3) -> Iterator[tuple[Array, SE3, Array]]:
     """Solutions for a tool pose, and configurations with their arm that hold the tool there."""
     tool = at(0, 0, robot.geometry["e_eff"])
     for q in robot.ik_all(T.homogeneous):
@@ -559,7 +559,7 @@ def test_where_all_links_are_in_line_the_parallelogram_takes_one_of_two_motions(
 
 
 @cache
-def grasp() -> tuple[Robot, Mechanism]:
+def grasp() -> Any:
     """Hand with unequal fingers that holds its object at home, and its drawing."""
     robot = load_robot("three_finger_hand", l11=0.028, l22=0.052, l23=0.041, l33=0.043)
     drawn = hand(robot.geometry)

@@ -1,5 +1,7 @@
 """What the page remembers: the last thirty seconds, and figures that numpy finds too."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ ARM = Arm("", load_robot("rcrt1"))
 
 def seen(
     reference: tuple[float, int, int],
-    place: tuple[int, int, int],
+    place: Any,
     force: tuple[float, float, float] = (0.0, 0.0, 0.0),
     *,
     is_following: bool = True,

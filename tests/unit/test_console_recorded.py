@@ -27,9 +27,9 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> tc.Recording:
 
 
 @pytest.fixture(scope="module")
-def messages(session: tc.Recording) -> dict[str, list[tuple[int, Any]]]:
+def messages(session: Any) -> dict[str, list[tuple[int, Any]]]:
     """Times of recording [ns] and messages of some topics, as rosbags reads them."""
-    found = {}
+    found: dict[Any, Any] = {}
     with AnyReader([session.path]) as reader:
         for connection, log_ns, data in reader.messages():
             name = connection.topic.lstrip("/")
@@ -95,7 +95,7 @@ def test_time_stays_within_the_recording_whatever_is_done(
 
 
 @pytest.fixture(scope="module")
-def small() -> MemoryBag:
+def small() -> Any:
     """A short session in memory."""
     return tc.run("coarse_box", duration=0.4).bag
 

@@ -1,8 +1,8 @@
 """Scene of the console: what is drawn is where it is, and only what changed is sent."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ MASTER, TIP, FORCE = "master/measured_cp", "slave/measured_cp", "master/measured
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
+def server() -> Any:
     with ConsoleServer(port=0) as opened:
         yield opened.viser
 
@@ -121,7 +121,7 @@ def test_a_fixture_is_red_where_its_wall_is_felt_and_green_elsewhere(
     assert colors == [WRONG, GOOD]
 
 
-def path_of(server: Server, name: str) -> NDArray[np.float32]:
+def path_of(server: Any, name: str) -> NDArray[np.float32]:
     """Points of a path on the page, along it, without what is too old."""
     line = present(server.scene.get_handle_by_name(f"/arm/{name}"))
     points = np.concatenate((line.points[:, 0], line.points[-1:, 1]))
@@ -201,7 +201,7 @@ def test_every_robot_is_drawn(server: Server, name: str) -> None:
 
 
 def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(
-    server: Server, tmp_path: Path
+    server: Any, tmp_path: Path
 ) -> None:
     server.scene.reset()
     text = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text(encoding="utf-8")

@@ -6,6 +6,7 @@ the same spring. Theory stands beside both where there is some.
 """
 
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -55,7 +56,7 @@ class Other:
     def __init__(
         self,
         begin: tuple[float, float, float],
-        ways: ArrayLike = ((0, 0, 0),),
+        ways: Sequence[float] | Array = ((0, 0, 0),),
         radius: float = 0.01,
         stiffness: float | None = None,
         damping: float = 0.0,

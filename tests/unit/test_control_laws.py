@@ -38,7 +38,7 @@ UNFILTERED = ReferenceFilterParameters(is_on=False)
 def slave(
     law: str,
     plant: str = "hardware",
-    faults: dict[str, tuple[str, ...]] | None = None,
+    faults: Any = None,
     own: Mapping[str, float | tuple[float, ...]] | None = None,
     robot: str = "rcrt1",
     **values: Any,
@@ -136,7 +136,7 @@ def circling(ticks: int, speed: float = 1.0) -> Array:
     return ARM.home + begin * toward * size * 0.5 * (1.0 - np.cos(rate * t))
 
 
-def tracking_error(arm: SimulatedArm, way=None, **_: object) -> Array:
+def tracking_error(arm: SimulatedArm, way: Any = None, **_: object) -> Array:
     """Root mean square of the error of each joint (n,) [counts], after the first second."""
     setpoint, measured, _ = run(arm, circling(5000) if way is None else way)
     return np.sqrt(np.mean(((measured - setpoint)[1000:] / COUNT) ** 2, axis=0))

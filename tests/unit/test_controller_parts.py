@@ -23,7 +23,7 @@ from teleop_core.slave.slave_sim import ControllerParameters
 ARM = load_robot("rcrt1")
 
 
-def own(name: str = "own", **more: int | Callable[..., object] | type[float] | None) -> Controller:
+def own(name: str = "own", **more: int | Callable[..., object] | type[float] | None) -> Any:
     parts: dict[str, Any] = {
         "parameters": PidParameters, "gains": pid_gains, "control": pid_control, "memory": 4
     }  # fmt: skip

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,7 +60,7 @@ class Leader:
             self.q = self.robot.start.copy()
         return ""
 
-    def meant(self, joint: int, words: str) -> float:
+    def meant(self, joint: int, words: str) -> Any:
         ways = sum(np.array(way) for name, way in WAYS.items() if name in words)
         step = np.zeros(self.robot.n)
         step[joint] = 1e-6

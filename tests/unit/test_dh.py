@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ REACHED = 1e-9
 
 
 def table(
-    rows: str | Sequence[int | dict[str, str | float | bool | list[int]]],
+    rows: Any,
     convention: str = "modified",
     **entries: object,
 ) -> DhTable:

@@ -36,7 +36,6 @@ from teleop_drill.drill.drill_table import drill_table, markdown, rows, summary
 from teleop_drill.drill.exercise import Exercise
 from teleop_drill.drill.hand import Sample
 from teleop_drill.drill.judging import Measured, Seen, judge
-from teleop_drill.drill.measure import Trace
 from teleop_drill.drill.numbers import Numbers, Scheduling
 from teleop_drill.drill.recordings import check_recording, missing
 
@@ -44,7 +43,7 @@ MS = 1_000_000
 DT = 1e-3
 
 
-def trace(values: ArrayLike, numbers: list[int] | None = None) -> Trace:
+def trace(values: ArrayLike, numbers: Any = None) -> Any:
     """One message a millisecond, from 1 s on."""
     values = np.asarray(values, dtype=float)
     numbers = np.arange(len(values)) if numbers is None else np.asarray(numbers)
@@ -228,7 +227,7 @@ BEGIN = 1_500 * MS
 def seen(
     joints: Array,
     lies: float = 1.0,
-    told: int | None = None,
+    told: Any = None,
     warned: int | None = None,
     late: float = 0.0,
 ) -> Seen:

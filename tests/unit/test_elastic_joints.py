@@ -25,7 +25,7 @@ GEARS = {"plant.hardware.gear_stiffness": (STIFF, STIFF, 0.0, 0.0, 0.0, 0.0)}
 ALONE = {"plant.hardware.without": ("friction", "wandering", "bias", "drive_steps")}
 
 
-def slave(**settings: str | float | tuple[str | float, ...]) -> SlaveSim:
+def slave(**settings: Any) -> SlaveSim:
     given = {"plant.kind": "hardware", "controller.kind": "source_pid"}
     return SlaveSim(build(SlaveSimParameters, given | settings))
 
@@ -97,36 +97,7 @@ def test_a_gear_that_swings_too_fast_for_the_ticks_is_refused() -> None:
 def drive_on(
     p: SimulationNumbers,
     s: SimulationState,
-    arm: tuple[
-        Any,
-        Any,
-        Any,
-        Any,
-        Any,
-        Any,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Array,
-        Any,
-        Array,
-        Array,
-        Array,
-        Array,
-    ],
+    arm: Any,
     efforts: Array,
 ) -> None:
     """What drives give for rows of efforts (N, 6); written in their place."""

@@ -4,11 +4,11 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from numpy.typing import ArrayLike
 from rich.console import Console
 
 from present import present
@@ -42,7 +42,7 @@ SIZES = {"sphere": (30, 30, 30), "box": (30, 10, 20)}
 def fixture_on(
     described: dict[str, str] | None,
     gain: float = 1.0,
-    size: ArrayLike = (0.03, 0.03, 0.03),
+    size: Any = (0.03, 0.03, 0.03),
     at: int = 0,
 ) -> tuple[Topic, int, bytes]:
     """Report that a fixture is on around the slave at rest."""
@@ -274,7 +274,7 @@ def rows_of(bag: Bag) -> dict[str, Row]:
 
 
 def test_only_a_box_is_held_against_the_published_overshoot(tmp_path: Path) -> None:
-    rows = {}
+    rows: dict[Any, Any] = {}
     for described in (SPHERE, BOX):
         recipe = Recipe(1500)
         recipe.singles = [fixture_on(described)]

@@ -349,7 +349,7 @@ def test_value_that_json_cannot_hold_is_refused(bag: Bag) -> None:
 
 def test_accumulator_that_is_asked_for_too_late_is_refused(bag: Bag) -> None:
     class Late:
-        def __init__(self, context) -> None:
+        def __init__(self, context: Any) -> None:
             pass
 
         def add(self, window: Array | str) -> None:

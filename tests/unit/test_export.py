@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -153,7 +152,7 @@ def test_newest_values_are_held_over_many_chunks(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_exports_are_refused_and_leave_nothing(
-    options: Mapping[str, Any], text: str, session: tc.Recording, tmp_path: Path
+    options: Any, text: str, session: tc.Recording, tmp_path: Path
 ) -> None:
     out = tmp_path / options.pop("out", "a.csv")
     with pytest.raises(tc.TeleopError) as error:

@@ -1,5 +1,7 @@
 """Feedback: the arm's server leads an arm that tells it where it is, and no other."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -35,7 +37,7 @@ class Led:
         *,
         speaks: bool = True,
         follows: bool = False,
-        effort: float = 0.0,
+        effort: Any = 0.0,
         ahead_ns: int = 0,
     ) -> Array:
         """One tick; the arm says before it where it is, and a command comes if it is to follow."""
@@ -63,7 +65,7 @@ class Led:
         return CommandStatus(int(self.row["command_status"]))
 
 
-def following(**values: float | tuple[str, str, str]) -> Led:
+def following(**values: float | tuple[str, str, str]) -> Any:
     led = Led(**values)
     for _ in range(300):
         led.tick(follows=True)
@@ -222,7 +224,7 @@ def faulty(led: Led) -> Fault:
     return Fault(int(led.slave.operation["fault"]))
 
 
-def others(*names: str) -> tuple[str, str, str]:
+def others(*names: str) -> Any:
     """Faults that are told only, so that one alone can stop the arm."""
     watched = ("tracking", "tip", "overspeed", "effort")
     return tuple(name for name in watched if name not in names)

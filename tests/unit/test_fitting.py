@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 import yaml
 
-from mutants import Mutant
 from present import present
 from teleop_core.base.errors import ParameterError, TeleopError, UnknownNameError
 from teleop_core.base.parameters import build
@@ -33,7 +32,7 @@ def slave(**settings: object) -> ArmParameters:
 
 
 @pytest.fixture(scope="module")
-def published() -> RestTable:
+def published() -> Any:
     return read_rests(PUBLISHED, ARM)
 
 
@@ -136,7 +135,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(
 
 
 @pytest.mark.parametrize("free", [[], ["coulomb.theta1"] * 2])
-def test_nothing_to_fit_is_refused(published: RestTable, free) -> None:
+def test_nothing_to_fit_is_refused(published: RestTable, free: Any) -> None:
     with pytest.raises(ParameterError, match="free"):
         fit(published, slave(), free)
 
@@ -148,7 +147,7 @@ def test_an_unknown_parameter_and_another_plant_are_refused(published: RestTable
         fit(published, slave(**{"plant.kind": "ideal"}))
 
 
-def changed(tmp_path: Mutant | Path, change: Any) -> Path:
+def changed(tmp_path: Any, change: Any) -> Path:
     table = pd.read_csv(PUBLISHED)
     file = tmp_path / "rests.csv"
     change(table).to_csv(file, index=False)
@@ -167,7 +166,7 @@ def changed(tmp_path: Mutant | Path, change: Any) -> Path:
     ],
 )
 def test_a_table_of_another_shape_is_refused_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], change, needed: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], change: Any, needed: str
 ) -> None:
     file = changed(tmp_path, change)
     with pytest.raises(TeleopError, match=needed):

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -127,7 +128,7 @@ def test_a_hand_in_a_mesh_of_a_box_is_held_and_scored_as_in_the_box_though_the_f
 )  # fmt: skip
 def test_what_cannot_hold_a_hand_is_refused_by_its_name(
     kind: str,
-    values: Mapping[str, str | tuple[float, float, float]],
+    values: Any,
     name: str,
     text: str,
     folder: Path,

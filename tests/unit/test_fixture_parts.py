@@ -25,7 +25,7 @@ ROUNDING = 1e-15
 places = st.tuples(*[st.floats(-0.1, 0.1)] * 3).map(np.array)
 
 
-def own(name: str = "own", **more: Callable[..., object] | type[object] | None) -> Fixture:
+def own(name: str = "own", **more: Callable[..., object] | type[object] | None) -> Any:
     parts: dict[str, Any] = {
         "parameters": SphereParameters,
         "depth": sphere_depth,
@@ -80,13 +80,13 @@ def test_own_fixture_is_chosen_by_its_name_and_has_its_parameters(own_parts: Non
     assert np.array_equal(numbers_of(chosen.parameters), (0.05, 0.02, 0.03))
 
 
-def writes_four(offset, shape, out) -> float:
+def writes_four(offset: Any, shape: Any, out: Any) -> float:
     for i in range(4):
         out[i] = 0.0
     return 0.0
 
 
-def reads_beyond(offset, shape, out) -> Any:
+def reads_beyond(offset: Any, shape: Any, out: Any) -> Any:
     return offset[0] - shape[3]
 
 

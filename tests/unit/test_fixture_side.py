@@ -1,7 +1,7 @@
 """Side of a fixture: the slave's command stays inside, and never steps farther than the hand."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -33,7 +33,7 @@ EVENTS = st.sampled_from(["", "", "", "", "mode", "clutch"])
 HELD = pytest.mark.parametrize("side", ["slave", "both"])
 
 
-def fixture(side: str, **values: str | tuple[float, float, float]) -> FixtureParameters:
+def fixture(side: str, **values: Any) -> FixtureParameters:
     """Parameters of a fixture; a name says ``__`` for a dot."""
     named = {name.replace("__", "."): value for name, value in values.items()}
     return build(FixtureParameters, {"side": side} | named)
@@ -61,7 +61,7 @@ class HeldDesk(Desk):
     def gain(self) -> float:
         return float(self.scaling.parameters["gain"][int(self.state("is_fine"))])
 
-    def go(self, move: tuple[float, float, float] = (0, 0, 0), **how: Any) -> float:
+    def go(self, move: Sequence[float] | Array = (0, 0, 0), **how: Any) -> Any:
         """One step of the hand; returns how far the slave's command goes beyond that of it [m]."""
         before, gain = self.sent, self.gain()
         self.sent = self.step(move, **how)
@@ -209,7 +209,7 @@ def test_put_on_while_the_hand_moves_a_fixture_holds_the_slave_from_there(side: 
 )
 @HELD
 def test_what_is_changed_while_the_hand_is_outside_leads_the_slave_by_the_hands_steps(
-    side: str, after: Mapping[str, str | tuple[float, float, float]]
+    side: str, after: Any
 ) -> None:
     rng, desk = np.random.default_rng(6), HeldDesk(fixture(side))
     desk.go((18 * MM, 4 * MM, 0))
@@ -296,7 +296,7 @@ class WedgeParameters:
 
 
 @kernel
-def wedge_depth(offset, shape, out) -> Any:
+def wedge_depth(offset: Any, shape: Any, out: Any) -> Any:
     """Depth beyond the deeper of two planes: one round leads in only where one is crossed."""
     first, second = offset[0] - 0.01, shape[0] * offset[0] + shape[1] * offset[1] - 0.01
     depth = max(first, second, 0.0)

@@ -1,6 +1,7 @@
 """Unions and intersections: the nearest place that one part, or that all of them, allow."""
 
 import math
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -48,7 +49,7 @@ def combined(
         assume(False)
 
 
-def found(name: str, numbers: Array, offset: Array) -> tuple[float, Array]:
+def found(name: str, numbers: Array, offset: Sequence[float] | Array) -> tuple[float, Array]:
     out = np.full(3, math.nan)
     return FIXTURES.find(name).depth(np.array(offset, dtype=float), numbers, out), out
 

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -21,7 +22,7 @@ REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 SEEDS = range(24)
 
 
-def followed(seed: int, *, is_upstream: bool = False) -> tuple[str, str, dict[str, tuple]]:
+def followed(seed: int, *, is_upstream: bool = False) -> Any:
     """Random chain in which some joints follow others: text, tip, leader, factor, offset by name.
 
     A leader may lie behind its followers, and a follower may lead; upstream, leaders come first

@@ -1,10 +1,10 @@
 """Force range: a broken sensor's force is not given to the hand."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 
 from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.kernels.geometry import Array
@@ -12,7 +12,7 @@ from teleop_core.kernels.geometry import Array
 MS = 1_000_000
 
 
-def forces(asked: ArrayLike, **parameters: Any) -> tuple[Array, HapticMaster]:
+def forces(asked: Sequence[float] | Array, **parameters: Any) -> tuple[Array, HapticMaster]:
     """Forces (N, 3) that the device gives, for those asked in each tick (N, 3) [N]."""
     stage = HapticMaster(HapticMasterParameters(**parameters))
     given = []

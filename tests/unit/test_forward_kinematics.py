@@ -1,6 +1,7 @@
 """Forward kinematics says what it found: closed loops, another assembly, or none."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ WITH_LOOPS = ("four_bar", "rps3", "scara_stewart", "stewart", "three_finger_hand
 TILTED = (1.715, 1.165, 1.687)
 
 
-def torn_rps3(T: Array, legs: Array, b: float = 1.0, a: float = 0.5) -> float:
+def torn_rps3(T: Array, legs: Sequence[float] | Array, b: float = 1.0, a: float = 0.5) -> float:
     """Largest error [m]: each ball joint in its leg's plane, as far from its hinge as the leg."""
     worst = 0.0
     for i, leg in enumerate(legs):

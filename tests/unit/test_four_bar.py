@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def gap_2r_2r(
     return np.stack((x, y, np.angle(-np.exp(1j * (left - phi1 - right)))))
 
 
-def gap_freudenstein(loop: FourBar, theta1: float, phi1: Array) -> Array:
+def gap_freudenstein(loop: FourBar, theta1: Any, phi1: Array) -> Array:
     """Form D, coupler as a distance: squared distance of its ends less l2² [m²]."""
     x = loop.l1 * np.cos(theta1) - loop.l0 - loop.l3 * np.cos(phi1)
     y = loop.l1 * np.sin(theta1) - loop.l3 * np.sin(phi1)

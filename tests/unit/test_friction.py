@@ -1,6 +1,7 @@
 """Friction that sticks: it holds for ever, slips as Coulomb says, takes energy, wanders."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ JOINT = 3  # theta4 of the rcrt1: an axis that acts on no other
 class Joint:
     """One joint of the rcrt1 on the hardware plant, under any effort; friction does not wander."""
 
-    def __init__(self, steps: int = 2, **settings: tuple[str | float, ...]) -> None:
+    def __init__(self, steps: int = 2, **settings: Any) -> None:
         given = {"plant.kind": "hardware", "plant.hardware.without": ("wandering",)}
         self.slave = SlaveSim(build(SlaveSimParameters, given | settings))
         self.steps, self.p, self.s = steps, self.slave.parameters, self.slave.state

@@ -26,7 +26,7 @@ LIMITED = Topic("test/limited_cp", Kind.POSE, passed_on("slave/servo_cp"))
 PUSH = Topic("test/push", Kind.WRENCH, passed_on("slave/measured_cp"), adds_to="master/servo_cf")
 
 
-def rest(parameters, state, signals, dt) -> None:
+def rest(parameters: Any, state: Any, signals: Any, dt: Any) -> None:
     """Step of a stage that does nothing."""
 
 
@@ -35,7 +35,7 @@ def stage(
     reads: tuple[Topic, ...] = (SLAVE_MEASURED_CP,),
     writes: tuple[Topic, ...] = (ECHO,),
     **more: Any,
-) -> Stage:
+) -> Any:
     return Stage(name, NoParameters, reads, writes, **{"step": rest, **more})
 
 

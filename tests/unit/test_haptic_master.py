@@ -41,7 +41,7 @@ def operator(**values: str | float | tuple[float, ...]) -> OperatorParameters:
 STILL = operator(kind="hold", rotation=0.0)
 
 
-def held(given: tuple[OperatorParameters, HapticMasterParameters]) -> HeldMaster:
+def held(given: tuple[OperatorParameters, HapticMasterParameters]) -> Any:
     """Device and operator of given parameters."""
     return HeldMaster(*given)
 
@@ -53,7 +53,7 @@ def parameters(
     hand: dict[str, float] | None = None,
     operator: OperatorParameters = STILL,
     buttons: dict[str, tuple[float, ...]] | None = None,
-) -> tuple[OperatorParameters, HapticMasterParameters]:
+) -> Any:
     """Those of the operator and of the device; ``tremor_…`` of the hand are the operator's."""
     own: dict[str, Any] = {k: v for k, v in (hand or {}).items() if k.startswith("tremor")}
     rest = {k: v for k, v in (hand or {}).items() if k not in own}
@@ -73,9 +73,7 @@ def wanted_places(wanted: OperatorParameters, ticks: int, seed: int = 1) -> Arra
     return motion(1e-3 * np.arange(1, ticks + 1))[:, :3] + REST_POSITION
 
 
-def run(
-    master: HeldMaster, ticks: int, force: tuple[float, float, float] = (0.0, 0.0, 0.0)
-) -> NDArray[np.void]:
+def run(master: HeldMaster, ticks: int, force: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:
     """Signals of the next ticks (ticks,) under a constant commanded force [N]."""
     out = records(master.signals.dtype, ticks)
     for i in range(ticks):

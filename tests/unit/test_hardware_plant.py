@@ -1,7 +1,6 @@
 """Plants by name: what the hardware does beside its model, each fault alone, and mistakes."""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from teleop_core.base.errors import (
 )
 from teleop_core.base.parameters import MARKS, NoParameters, build, parameter, specs
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.hardware import ENTRIES, Hardware
 from teleop_core.robots.link_errors import LinkErrors
@@ -36,13 +34,13 @@ TARGET = ARM.home + np.array([0.5, -0.4, -0.04, 0.6, 0.5, 0.4])
 def slave(
     plant: str = "hardware",
     controller: str = "source_pid",
-    **settings: int | bool | tuple[str | float, ...],
+    **settings: Any,
 ) -> ArmParameters:
     given = {"plant.kind": plant, "controller.kind": controller}
     return build(ArmParameters, given | settings)
 
 
-def rest(*without: str, **settings: Any) -> tuple[Mover, Array]:
+def rest(*without: str, **settings: Any) -> Any:
     """Mover after a move to the target, and the encoders' rest less the target (6,)."""
     mover = Mover(slave(**{"plant.hardware.without": without}, **settings))
     return mover, mover.move(TARGET) - TARGET
@@ -219,7 +217,7 @@ def test_wrong_numbers_of_a_plant_name_what_is_possible(setting: str, needed: st
     ],
 )
 def test_impossible_hardware_is_refused(
-    changed: Mapping[str, Array | list[float] | dict[str, str] | LinkErrors],
+    changed: Any,
     kind: type[TeleopError],
 ) -> None:
     zero = np.zeros(2)

@@ -1,6 +1,7 @@
 """Hole: its distance against a library of others, a peg in it, and the scenario ``peg``."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import coal
@@ -40,7 +41,7 @@ def turned_section(p: HoleParameters) -> Trimesh:
     return trimesh.creation.revolve(np.array(section), sections=SIDES)
 
 
-def to_axis(axis: tuple[float, float, float]) -> Array:
+def to_axis(axis: Sequence[float] | Array) -> Array:
     """Rotation (3, 3) from z to an axis in the plane x, z."""
     x, _, z = np.array(axis) / np.linalg.norm(axis)
     return np.array([[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]])

@@ -14,11 +14,6 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
-from rosbags.typesys.stores.ros2_dashing import (
-    geometry_msgs__msg__PoseStamped,
-    sensor_msgs__msg__Joy,
-    std_msgs__msg__Header,
-)
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
@@ -55,15 +50,13 @@ class Maker:
     def make(self, name: str, **values: Any) -> object:
         return self.types.types[name](**values)
 
-    def header(self, stamp_ns: int, frame: str = "base", seq: int = 0) -> std_msgs__msg__Header:
+    def header(self, stamp_ns: int, frame: str = "base", seq: int = 0) -> Any:
         sec, nanosec = divmod(int(stamp_ns), 1_000_000_000)
         stamp = self.make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
         more = {} if self.is_ros2 else {"seq": seq}
         return self.make("std_msgs/msg/Header", stamp=stamp, frame_id=frame, **more)
 
-    def pose(
-        self, i: int, kind: str, stamp_ns: int, child: str = "tool"
-    ) -> geometry_msgs__msg__PoseStamped:
+    def pose(self, i: int, kind: str, stamp_ns: Any, child: str = "tool") -> Any:
         """Message of a kind, and the name of its type."""
         g = "geometry_msgs/msg"
         x, y, z = PLACES[i]
@@ -94,7 +87,7 @@ class Maker:
             "TFMessage": lambda: self.make("tf2_msgs/msg/TFMessage", transforms=[moved]),
         }[kind]()
 
-    def joy(self, stamp_ns: int, buttons: list[int]) -> sensor_msgs__msg__Joy:
+    def joy(self, stamp_ns: Any, buttons: list[int]) -> Any:
         return self.make(
             "sensor_msgs/msg/Joy", header=self.header(stamp_ns), axes=np.zeros(2, np.float32),
             buttons=np.array(buttons, np.int32),
@@ -157,7 +150,7 @@ def presses(
     topic: str = "/joy",
     stamps: NDArray[np.int64] = STAMPS,
     is_ros2: bool = True,
-) -> list[tuple[str, int, sensor_msgs__msg__Joy]]:
+) -> Any:
     maker = Maker(is_ros2)
     return [(topic, LOGS[i], maker.joy(stamps[i], buttons(i))) for i in range(COUNT)]
 

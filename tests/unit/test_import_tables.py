@@ -31,11 +31,11 @@ RADIANS = 1e-7
 """Rounding of an angle between two rotations: the square root of that of a cosine."""
 
 
-def frame(columns: list[str] = HEAD, rows: Array = TABLE) -> pd.DataFrame:
+def frame(columns: list[str] = HEAD, rows: Array = TABLE) -> Any:
     return pd.DataFrame(rows, columns=columns)
 
 
-def imported(path: Path, tmp_path: Path, **options: Any) -> tuple[tc.ImportReport, tc.Stream]:
+def imported(path: Path, tmp_path: Path, **options: Any) -> Any:
     """Report and stream of an import."""
     report = tc.import_recording(path, tmp_path / "out", **options)
     return report, report.recording["master/measured_cp"]

@@ -1,5 +1,7 @@
 """Interpolation: slow commands become a way that reaches each of them one period later."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -199,7 +201,7 @@ SLIDING = load_robot("rcrt1")
 D3, TOP = 2, SLIDING.upper[2]
 
 
-def slide(interpolation: str, places: Array, ticks: int) -> Array:
+def slide(interpolation: str, places: Sequence[float] | Array, ticks: int) -> Array:
     """Commands in force (N,) of d3 [m], under commands to some places below its upper end [m]."""
     slave = SimulatedArm(ArmParameters(start=tuple(SLIDING.home), interpolation=interpolation))
     row, now_ns, found = slave.signals, 0, []

@@ -1,6 +1,7 @@
 """Joy messages of any number of buttons: which of them are clutch, fixture and mode."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from teleop_core.graph.topics import Kind
 from teleop_core.nodes.tuned import NodeParameters
 
 
-def joy(*pressed: int) -> SimpleNamespace:
+def joy(*pressed: int) -> Any:
     header = SimpleNamespace(stamp=SimpleNamespace(sec=1, nanosec=2), frame_id="")
     return SimpleNamespace(header=header, buttons=list(pressed))
 

@@ -27,7 +27,7 @@ def call_with_row(function: Callable[..., Any], row: Array, count: int) -> float
 
 def test_plain_function_serves_in_place_of_a_kernel() -> None:
     @kernel
-    def compiled(row, x) -> Any:
+    def compiled(row: Any, x: Any) -> Any:
         row[0] += x
         return row[0]
 
@@ -46,10 +46,10 @@ def test_plain_function_serves_in_place_of_a_kernel() -> None:
 
 def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_each_time() -> None:
     @kernel
-    def compiled(row) -> Any:
+    def compiled(row: Any) -> Any:
         return row[0]
 
-    def plain(row) -> Any:
+    def plain(row: Any) -> Any:
         return row[0]
 
     whole, real = types.int64(ROW), types.float64(ROW)
@@ -184,8 +184,10 @@ def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions(
         ),
     ],
 )
-def test_signature_that_a_plain_function_cannot_have_is_refused(signature, message: str) -> None:
-    def takes_two(row, x) -> float:
+def test_signature_that_a_plain_function_cannot_have_is_refused(
+    signature: Any, message: str
+) -> None:
+    def takes_two(row: Any, x: Any) -> float:
         return 0.0
 
     with pytest.raises(KernelError, match=message):

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="it is the compiler that
 ROW = types.float64[::1]
 
 
-def uncached(text: str, name: str) -> Callable[..., Any]:
+def uncached(text: str, name: str) -> Any:
     """Kernel of a text; it has no file, so every process compiles it."""
     space = {"kernel": kernel, "inner": inner}
     exec(text, space)

@@ -24,7 +24,7 @@ from teleop_core.kernels.geometry import Array, multiply_quaternions
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
 
 
-def uncached(text: str, name: str) -> Callable[..., Any]:
+def uncached(text: str, name: str) -> Any:
     """Kernel of a text; it has no file, so every process compiles it."""
     space = {"kernel": kernel, "inner": inner}
     exec(text, space)
@@ -160,7 +160,7 @@ def turned(product: Callable[..., object], q: Array, out: Array) -> None:
 
 
 @kernel
-def take_all(source, target) -> None:
+def take_all(source: Any, target: Any) -> None:
     target[:] = source
 
 

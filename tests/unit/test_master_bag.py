@@ -2,6 +2,7 @@
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -53,7 +54,7 @@ def converted(path: Path) -> tuple[MemoryBag, str]:
     return found, " ".join(str(note.message) for note in notes)
 
 
-def poses_of(found: MemoryBag) -> Series:
+def poses_of(found: Any) -> Series:
     return found.read(MASTER_MEASURED_CP)
 
 

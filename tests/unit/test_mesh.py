@@ -28,7 +28,7 @@ from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.world import WORLD_OBJECTS, distance_grid
 from teleop_core.slave.world.distance_grid import DistanceGrid, GridRequest
 from teleop_core.slave.world.mesh import MeshParameters
-from teleop_core.slave.world.triangles import Tree, read_triangles, tree_of, write_distances
+from teleop_core.slave.world.triangles import read_triangles, tree_of, write_distances
 
 BOX = (60.0, 60.0, 30.0)  # as the box of the world, in mm as files are
 
@@ -337,7 +337,7 @@ def test_who_waits_is_told_that_a_grid_is_made_and_how_far_it_is(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     seen = []
 
-    def watched(*arguments: float | Array | Tree) -> None:
+    def watched(*arguments: Any) -> None:
         seen.append(in_work())
         write_distances(*arguments)
 

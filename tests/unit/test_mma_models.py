@@ -1,6 +1,7 @@
 """MMA tables and loop against the published numbers and other libraries (H1-H9, H20, H21)."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,7 +48,7 @@ def mma() -> Robot:
     return load_robot("mma")
 
 
-def serial_frames(mma: Robot, serial: Array) -> dict[str, Array]:
+def serial_frames(mma: Robot, serial: Sequence[float] | Array) -> dict[str, Array]:
     return frames(model_table("B", mma.geometry), serial)
 
 

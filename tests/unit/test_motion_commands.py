@@ -2,6 +2,7 @@
 
 import math
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ class Bench:
             found[i] = self.slave.signals["slave_setpoint_js"]
         return found
 
-    def follow(self, command: Array, stamp_ns=None) -> Array:
+    def follow(self, command: Array, stamp_ns: Any = None) -> Array:
         """One tick with a message of servo_jp."""
         row = self.slave.signals
         row["slave_servo_jp"] = command
@@ -73,11 +74,11 @@ class Bench:
 
 
 @pytest.fixture
-def bench() -> Bench:
+def bench() -> Any:
     return Bench()
 
 
-def move_to_pose(motion: MotionCommands, T: Array) -> tuple[Answer, str]:
+def move_to_pose(motion: MotionCommands, T: Array) -> Any:
     """Move to where the tip has a pose, as a session does with move_cp."""
     found = motion.solve(T)
     return found if isinstance(found, tuple) else motion.move(found)

@@ -36,7 +36,7 @@ def link(**values: str | float | bool) -> NetworkLink:
 
 
 def through(
-    network: NetworkLink, places: Array, setpoints=None, begin: int = 0
+    network: NetworkLink, places: Array, setpoints: Any = None, begin: int = 0
 ) -> tuple[Array, NDArray[np.int64]]:
     """What arrives, tick by tick, of places (N, 3) sent to the slave: places, stamps, losses.
 
@@ -496,7 +496,7 @@ def test_a_force_from_behind_a_network_is_felt_and_fades_where_nothing_comes() -
 
 def test_a_kind_of_ones_own_is_one_call_and_a_wrong_one_is_refused() -> None:
     @kernel
-    def every_other(numbers, memory, chances, now) -> float:
+    def every_other(numbers: Any, memory: Any, chances: Any, now: Any) -> float:
         memory[0] = 1.0 - memory[0]
         return LOST if memory[0] > 0.0 else 0.0
 

@@ -188,7 +188,7 @@ def test_recorded_path_without_a_recording_is_refused() -> None:
 # Own operators.
 
 
-def samples(count: int = 5, columns: int = 9) -> tuple[Array, Array]:
+def samples(count: int = 5, columns: int = 9) -> Any:
     rng = np.random.default_rng(3)
     rows = rng.uniform(-0.02, 0.02, (count, columns))
     rows[:, 6:] = rng.integers(0, 2, rows[:, 6:].shape)

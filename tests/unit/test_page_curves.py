@@ -1,7 +1,7 @@
 """Curves of a page: what its figures say to it, the sketches, and the time that was spent."""
 
 import re
-from collections.abc import Mapping
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -22,9 +22,7 @@ from teleop_core.evaluation.preview import preview
 from teleop_core.kernels.geometry import Array
 
 
-def against_time(
-    values: Array, layout: Mapping[str, dict[str, str | list[float] | dict[str, str]]] | None = None
-) -> Figure:
+def against_time(values: Array, layout: Any = None) -> Figure:
     x = np.arange(len(values)) * 1e-3
     axes = {"xaxis": time_axis(), "yaxis": {"title": {"text": "force [N]"}}}
     return Figure("Force", "It pushes.", [line(x, values, "force", "#000", 1, "N")], layout or axes)

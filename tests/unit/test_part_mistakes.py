@@ -29,13 +29,13 @@ from teleop_core.slave.controllers.pid import PID
 ECHO = Topic("test/echo", Kind.POSE, passed_on("slave/measured_cp"))
 
 
-def rest(parameters, state, signals, dt) -> None:
+def rest(parameters: Any, state: Any, signals: Any, dt: Any) -> None:
     """Step of a stage that does nothing."""
 
 
 def stage(
     name: str = "echo",
-    parameters: "NoParameters | TooFast | type[object]" = NoParameters,
+    parameters: Any = NoParameters,
     step: Callable[..., Any] = rest,
     reads: tuple[Topic] = (SLAVE_MEASURED_CP,),
     **more: Any,
@@ -144,7 +144,7 @@ def test_topics_of_a_stage_that_are_no_tuple_of_topics_are_refused_with_an_examp
 # Fields of a record.
 
 
-def misspells(p, s, row, dt) -> None:
+def misspells(p: Any, s: Any, row: Any, dt: Any) -> None:
     row.test_ehco[0] = 1.0
 
 
@@ -165,7 +165,7 @@ def test_misspelt_field_of_a_plain_record_suggests_the_near_one() -> None:
 
 
 @kernel
-def beyond_the_end(p, s, row, dt) -> None:
+def beyond_the_end(p: Any, s: Any, row: Any, dt: Any) -> None:
     for i in range(8):
         row.test_echo[i] = row.slave_measured_cp[i]
 
@@ -178,7 +178,7 @@ def test_index_beyond_the_end_is_told_with_file_and_line_before_the_first_tick()
 
 
 @kernel
-def counts(p, s, row, dt) -> None:
+def counts(p: Any, s: Any, row: Any, dt: Any) -> None:
     s.count += 1
     row.test_echo[0] = 1.0 / row.test_echo[1] + s.count
 
@@ -246,7 +246,7 @@ def test_parameter_of_a_stage_that_the_session_has_not_is_refused_with_the_way_o
 
 
 class Nameless(Metric):
-    def add(self, window) -> None:
+    def add(self, window: Any) -> None:
         """Take nothing."""
 
     def values(self) -> dict[Any, Any]:

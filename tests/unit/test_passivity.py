@@ -323,7 +323,7 @@ def drawn(
     )  # fmt: skip
 
 
-def gained(rows: NDArray[np.void]) -> float:
+def gained(rows: Any) -> float:
     """Most that a touch gave the hand beyond what it took, but for 5 mN on its way [J]."""
     force, place = rows["master_servo_cf"][:-1, :3], rows["master_measured_cp"][:, :3]
     steps = np.diff(place, axis=0)
@@ -353,7 +353,7 @@ def check_ports(rows: NDArray[np.void]) -> None:
             assert mine[:, HEARD].max() <= most
 
 
-def left_at_the_hand(rows: NDArray[np.void], scale: float) -> float:
+def left_at_the_hand(rows: Any, scale: float) -> float:
     """Least that the hand's port had left to give in a touch, by forces and places alone [J]."""
     hand, force = rows["master_energy"], rows["master_servo_cf"][:-1, :3]
     steps = np.diff(rows["master_measured_cp"][:, :3], axis=0)

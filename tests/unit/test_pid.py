@@ -1,12 +1,12 @@
 """PID: poles where they are claimed, no windup, no derivative kick."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
 from teleop_core.kernels.geometry import Array
@@ -19,8 +19,8 @@ AXES = range(6)
 
 
 def run(
-    errors: ArrayLike,
-    gains: ArrayLike = (2.0, 0.0, 0.0),
+    errors: Sequence[float] | Array,
+    gains: Sequence[float] | Array = (2.0, 0.0, 0.0),
     limit: float = math.inf,
     memory: Array | None = None,
     feedforward: float = 0.0,

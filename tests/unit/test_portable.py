@@ -3,6 +3,7 @@
 import ast
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ def mistakes(text: str, file: str = "text") -> list[str]:
     return found
 
 
-def _look(node: ast.AST, file: str, *, is_compiled: bool, found: list[str]) -> None:
+def _look(node: Any, file: str, *, is_compiled: bool, found: list[str]) -> None:
     if isinstance(node, ast.FunctionDef):
         decorators = {ast.unparse(each) for each in node.decorator_list}
         is_compiled = is_compiled or bool(decorators & {"kernel", "inner"})

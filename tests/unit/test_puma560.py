@@ -1,11 +1,11 @@
 """PUMA 560: the lecture's matrices, eight branches, an independent oracle, three singularities."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 import roboticstoolbox as rtb
-from numpy.typing import ArrayLike
 
 from present import present
 from teleop_core.kernels.geometry import Array, rotation, transform
@@ -222,7 +222,9 @@ def test_a_slow_path_through_the_straight_wrist_has_no_error_at_all() -> None:
     assert np.abs(np.diff(result.q, axis=0)).max() < 1e-3
 
 
-def line(pose: Array, start: ArrayLike, end: ArrayLike, count: int) -> Array:
+def line(
+    pose: Array, start: Sequence[float] | Array, end: Sequence[float] | Array, count: int
+) -> Array:
     out = np.repeat(pose[None], count, axis=0)
     out[:, :3, 3] = np.linspace(start, end, count)
     return out

@@ -1,6 +1,7 @@
 """RCRT-1 dynamics: closed form against a Lagrangian, pinocchio and energy; the drive table."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import pinocchio
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pinocchio import Inertia, Model
 
 from teleop_core.kernels.geometry import Array
@@ -69,7 +70,7 @@ PSEUDO = (
 )  # fmt: skip
 
 
-def links(q: Array) -> tuple[Array, Array, Array]:
+def links(q: Sequence[float] | Array) -> tuple[Array, Array, Array]:
     """Link matrices A1, A2, A3; also of complex joints."""
     c1, s1, c2, s2 = np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])
     zero, one = 0.0 * q[0], 1.0 + 0.0 * q[0]
@@ -79,7 +80,7 @@ def links(q: Array) -> tuple[Array, Array, Array]:
     return a1, a2, a3
 
 
-def derivative(q: Array, link: int, joint: int) -> Array:
+def derivative(q: Sequence[float] | Array, link: int, joint: int) -> Array:
     """U: derivative of the pose of frame ``link`` by ``joint``, both from 0."""
     out = np.eye(4)
     for i, a in enumerate(links(q)[: link + 1]):
@@ -87,7 +88,7 @@ def derivative(q: Array, link: int, joint: int) -> Array:
     return out if joint <= link else 0.0 * out
 
 
-def lagrangian_inertia(q: NDArray[np.complex128] | Array) -> NDArray[np.complex128] | Array:
+def lagrangian_inertia(q: Any) -> Any:
     """D of the recipe A.3.1, motors left out; also of complex joints."""
     out = np.zeros((3, 3), dtype=np.asarray(q).dtype)
     for i in range(3):
@@ -109,7 +110,7 @@ def lagrangian_velocity_effort(q: Array, dq: Array) -> Array:
     return rate @ dq - 0.5 * np.array([dq @ slopes[m] @ dq for m in range(3)])
 
 
-def potential(q: NDArray[np.complex128]) -> Any:
+def potential(q: Any) -> Any:
     """Potential energy of links 2 and 3; also of complex joints."""
     a1, a2, a3 = links(q)
     height = (a1 @ a2 @ PSEUDO[1])[2, 3] + (a1 @ a2 @ a3 @ PSEUDO[2])[2, 3]
@@ -125,7 +126,7 @@ def lagrangian_gravity(q: Array) -> Array:
     return out
 
 
-def inertia(q: Array, row: Array = ROW) -> Array:
+def inertia(q: Sequence[float] | Array, row: Array = ROW) -> Array:
     out = np.empty((3, 3))
     rcrt1_dynamics.inertia_matrix(np.asarray(q, dtype=float), row, out)
     return out
@@ -216,7 +217,7 @@ def test_static_moment_of_the_four_bar_adds_to_axis_2() -> None:
 
 def spatial_inertia(
     mass: float,
-    center: tuple[float, int, float],
+    center: Any,
     ixx: float,
     iyy: float,
     izz: float,
@@ -324,7 +325,7 @@ def test_axis_1_keeps_its_momentum_without_friction() -> None:
 
 
 @given(states)
-def test_inertia_is_positive_definite_over_the_whole_workspace(state: tuple[float, ...]) -> None:
+def test_inertia_is_positive_definite_over_the_whole_workspace(state: Any) -> None:
     assert np.linalg.eigvalsh(inertia(state[:3]))[0] > 0.05
 
 

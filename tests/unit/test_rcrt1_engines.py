@@ -1,7 +1,8 @@
 """The RCRT-1 of table A.1, mended, in engines by others: sympy's Lagrangian, MuJoCo, pinocchio."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -10,7 +11,6 @@ import pytest
 import sympy
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike
 from pinocchio import Model
 from scipy.integrate import solve_ivp
 
@@ -50,7 +50,7 @@ def central(
     return tensor - mass * (c @ c * np.eye(3) - np.outer(c, c))
 
 
-def ours(state: tuple[float, ...]) -> Array:
+def ours(state: Sequence[float] | Array) -> Array:
     q, dq, effort, out = np.zeros(6), np.zeros(6), np.zeros(6), np.empty(6)
     q[:3], dq[:3], effort[:3] = state[:3], state[3:6], state[6:]
     rcrt1_dynamics.acceleration(q, dq, effort, ROW, out)
@@ -67,31 +67,12 @@ BODY = """
 </body>"""
 
 
-def numbers(values: ArrayLike) -> str:
+def numbers(values: Sequence[float] | Array) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
 def mujoco_xml(
-    table: tuple[
-        tuple[
-            float,
-            tuple[float, float, float],
-            tuple[float, float, float],
-            tuple[float, float, float],
-        ],
-        tuple[
-            float,
-            tuple[float, float, float],
-            tuple[float, float, float],
-            tuple[float, float, float],
-        ],
-        tuple[
-            float,
-            tuple[float, float, float],
-            tuple[float, float, float],
-            tuple[float, float, float],
-        ],
-    ],
+    table: Any,
 ) -> str:
     """The arm as nested bodies; body 1 keeps axes along the base's, so its row is turned."""
     # Frame 1 to base axes at rest: x1 = x0, y1 = -z0, z1 = y0.
@@ -202,7 +183,7 @@ LAGRANGIAN = symbolic_lagrangian()
 
 
 @given(states)
-def test_closed_form_is_the_lagrangian_of_three_rigid_bodies(state: tuple[float, ...]) -> None:
+def test_closed_form_is_the_lagrangian_of_three_rigid_bodies(state: Any) -> None:
     D, h, c = LAGRANGIAN(state[:3], state[3:6])
     joints, speed = np.array([*state[:3], 0.0, 0.0, 0.0]), np.array([*state[3:6], 0.0, 0.0, 0.0])
     inertia, velocity, gravity = np.empty((3, 3)), np.empty(3), np.empty(6)
@@ -254,7 +235,7 @@ def test_free_motion_keeps_energy_and_the_momentum_of_axis_1() -> None:
     assert abs(end[4] - start[4]) > 0.1
 
 
-def potential_height(angle: float, point: ArrayLike) -> float:
+def potential_height(angle: float, point: Sequence[float] | Array) -> Any:
     return -math.sin(angle) * point[0] + math.cos(angle) * point[2]
 
 

@@ -1,7 +1,6 @@
 """Reach in scores: shares of time and asked errors are those of plain counts, in any windows."""
 
 import io
-from collections.abc import Mapping
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -72,7 +71,7 @@ class Session(Recipe):
         stamp_ns = START_NS + round(seconds * 1e9)
         self.singles.append((TELEOP_STATE, stamp_ns, state(stamp_ns, **values)))
 
-    def write(self, path: Path) -> Bag:
+    def write(self, path: Path) -> Any:
         whole, blocks = self.rows, []
         for begin_ns in range(START_NS, int(self.stamps[-1]) + 1, SECOND_NS):
             block = {}
@@ -90,7 +89,7 @@ class Session(Recipe):
         return Bag(path)
 
 
-def shares(score: Score) -> list[float | None]:
+def shares(score: Score) -> Any:
     return [getattr(score.reach, f"{name}_share") for name in SHARES]
 
 
@@ -110,7 +109,7 @@ def path(tmp_path: Path) -> Path:
 # -- shares of time --------------------------------------------------------------------------------
 
 
-def irregular(rng: np.random.Generator) -> NDArray[np.int64]:
+def irregular(rng: np.random.Generator) -> Any:
     """Stamps of commands (N,) [ns] after steps of some milliseconds, with pauses in between."""
     steps = rng.integers(1, 40, 2000)
     steps[rng.integers(0, 500, 4)] = rng.integers(400, 1500, 4)
@@ -309,7 +308,7 @@ def test_an_error_against_the_setpoint_hides_what_the_asked_error_tells(path: Pa
     assert score.value("asked_error_mm.max") == pytest.approx(20.0, abs=EXACT_MM)
 
 
-def turned_session(cut_from: int = COUNT, **parameters: Any) -> tuple[Session, Rotation]:
+def turned_session(cut_from: int = COUNT, **parameters: Any) -> Any:
     """A session whose hand turns; from some tick on the tool no longer turns with it."""
     rng = np.random.default_rng(9)
     session, scaling = Session(), MotionScaling(MotionScalingParameters(**parameters))
@@ -339,7 +338,7 @@ def turned_session(cut_from: int = COUNT, **parameters: Any) -> tuple[Session, R
     [{}, {"tool_roll": 0.4}, {"axes": ("+x", "+y", "+z"), "tool_axes": ("-x", "+y", "-z")}],
 )  # fmt: skip
 def test_a_tool_that_turns_as_the_hand_is_where_it_was_asked_to_be(
-    path: Path, parameters: Mapping[str, Any]
+    path: Path, parameters: Any
 ) -> None:
     session, _ = turned_session(**parameters)
     assert evaluate(session.write(path)).asked_error_deg.max < 1e-5

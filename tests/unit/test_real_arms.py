@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio
@@ -99,14 +100,14 @@ def test_there_are_72_arms_of_ssik_and_twelve_that_the_issue_names() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
-def test_every_pose_is_solved_from_home_and_from_beside(name, tmp_path: Path) -> None:
+def test_every_pose_is_solved_from_home_and_from_beside(name: Any, tmp_path: Path) -> None:
     assert solved(load(name, tmp_path), 100) == (100.0, 100.0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
 def test_no_path_flips_or_outruns_a_drive_and_none_stops_without_a_reason(
-    name, tmp_path: Path
+    name: Any, tmp_path: Path
 ) -> None:
     path = lines(load(name, tmp_path), 10)
     assert (path.too_fast, path.unexplained) == (0, 0)

@@ -1,7 +1,7 @@
 """Operators who follow a recording or a table: as it is, in its own time."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from teleop_core.chain.operators.rest import REST_TILT
 from teleop_core.chain.operators.shapes import PHASES
 from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP
 from teleop_core.kernels.geometry import Array
-from teleop_core.session.exchange.recorded_hand import FileParameters
 
 START_NS = 1_700_000_000_000_000_000
 COUNT = 201
@@ -32,7 +31,7 @@ CENTER = (0.01, 0.0, 0.03)
 
 def bag(
     path: Path,
-    times: Array = T,
+    times: Sequence[float] | Array = T,
     pressed: dict[float, tuple[int, int, int]] | None = None,
     closed: dict[float, float] | None = None,
 ) -> Path:
@@ -60,7 +59,7 @@ def operator(
     kind: str = "bag",
     device: dict[str, tuple[float, float, float]] | None = None,
     **values: float | tuple[float, float, float],
-) -> tuple[tc.Operator, tc.NoParameters | FileParameters, Setting]:
+) -> Any:
     """Operator, parameters and setting."""
     key = "bag" if kind == "bag" else "file.path"
     room = {f"device.{name}": value for name, value in (device or {}).items()}
@@ -162,7 +161,7 @@ def test_a_recording_lasts_as_long_as_it_and_its_approach(tmp_path: Path) -> Non
     [({}, 5.0), ({"duration": 1.5}, 1.5), ({"scenario": "coarse_box"}, 5.0)],
 )
 def test_a_session_lasts_as_long_as_what_it_follows_unless_told(
-    given: Mapping[str, Any], seconds: float, tmp_path: Path
+    given: Any, seconds: float, tmp_path: Path
 ) -> None:
     path = bag(tmp_path / "bag")
     settings = {"operator.center": CENTER, "operator.approach_time": 3.0}

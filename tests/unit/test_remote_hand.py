@@ -27,9 +27,7 @@ coordinate = st.floats(-0.3, 0.3)
 place = st.tuples(coordinate, coordinate, coordinate)
 
 
-def pose(
-    way: Sequence[float] = (0.0, 0.0, 0.0), turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
-) -> Array:
+def pose(way: Any = (0.0, 0.0, 0.0), turn: Sequence[float] | Array = (0.0, 0.0, 0.0)) -> Array:
     """Pose that is a way [m] and a turn in the base [rad] from the rest."""
     x, y, z, w = (Rotation.from_rotvec(turn) * Rotation.from_quat(REST[[4, 5, 6, 3]])).as_quat()
     return np.array([*(REST[:3] + way), w, x, y, z])

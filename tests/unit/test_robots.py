@@ -16,7 +16,6 @@ from teleop_core.base.errors import (
     PartError,
     RecordingError,
     ShapeError,
-    TeleopError,
     UnknownNameError,
 )
 from teleop_core.kernels.geometry import Array
@@ -67,7 +66,7 @@ def test_two_loads_share_no_array_that_can_be_written(name: str) -> None:
 
 @pytest.mark.slow
 @robots
-def test_writing_what_can_be_written_changes_no_answer(name) -> None:
+def test_writing_what_can_be_written_changes_no_answer(name: Any) -> None:
     robot = load_robot(name)
     pose = robot.fk(robot.home)
     before = robot.fk(robot.home), robot.ik(pose).q, robot.limits(1e-3), robot.jacobian(robot.home)
@@ -168,7 +167,7 @@ def test_a_name_is_used_once_unless_a_cell_is_run_again(registered: Callable[...
     assert load_robot("my_arm") is second
 
 
-def needs_a_length(length) -> Robot:
+def needs_a_length(length: Any) -> Robot:
     return robot_from_table(TABLE)
 
 
@@ -241,7 +240,7 @@ def test_an_error_in_a_plain_function_reaches_the_caller_of_a_batch() -> None:
 def test_a_robot_with_a_wrong_kernel_is_refused_before_anything_runs(
     registered: Callable[..., object],
 ) -> None:
-    def ik(T: Array, seed: Array, q) -> int:
+    def ik(T: Array, seed: Array, q: Any) -> int:
         return 0
 
     with pytest.raises(PartError, match="crank"):
@@ -306,9 +305,7 @@ def test_a_robot_says_which_of_its_drives_are_assumed(name: str) -> None:
         ({"drives": electric_cylinders(2)}, ShapeError),
     ],
 )
-def test_a_robot_whose_vectors_do_not_fit_is_refused(
-    change: Mapping[str, Any], error: type[ParameterError] | type[ShapeError]
-) -> None:
+def test_a_robot_whose_vectors_do_not_fit_is_refused(change: Mapping[str, Any], error: Any) -> None:
     with pytest.raises(error) as caught:
         dataclasses.replace(robot_from_table({**TABLE, "rows": TABLE["rows"][:1]}), **change)
     assert caught.value.name == next(iter(change))
@@ -324,9 +321,7 @@ def test_a_robot_whose_vectors_do_not_fit_is_refused(
         ({"assumed": ("mass",)}, UnknownNameError),
     ],
 )
-def test_impossible_drives_are_refused_by_entry(
-    change: Mapping[str, list[float] | tuple[str]], error: type[TeleopError]
-) -> None:
+def test_impossible_drives_are_refused_by_entry(change: Any, error: Any) -> None:
     with pytest.raises(error) as caught:
         Drives(**({name: [1.0] for name in ENTRIES} | change))
     assert caught.value.name == next(iter(change))

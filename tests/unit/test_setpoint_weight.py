@@ -55,9 +55,7 @@ class Axis:
 
 
 @kernel
-def answer(
-    gains: float | Array, step: int, limit: Array, count: float, goal: float, trace: Array
-) -> None:
+def answer(gains: Any, step: int, limit: Array, count: float, goal: float, trace: Array) -> None:
     """Write positions of one axis under the law, tick by tick; a count of 0 rounds nothing."""
     memory, effort, setpoint = np.zeros((1, 4)), np.zeros(1), np.full(1, goal)
     seen, zero, q, dq = np.zeros(1), np.zeros(1), 0.0, 0.0
@@ -161,7 +159,7 @@ def test_without_integral_action_the_weight_leaves_the_law_as_it_is() -> None:
     assert efforts[0] == efforts[1]
 
 
-def slave_step_trace(name: Any, axis: Any, size) -> Array:
+def slave_step_trace(name: Any, axis: Any, size: Any) -> Array:
     """Ways (ticks,) of an axis of the ideal plant after a step, with the reference filter off."""
     robot = ROBOTS[name]
     start = robot.home.copy()
@@ -196,7 +194,9 @@ def slave_step_trace(name: Any, axis: Any, size) -> Array:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "axis"), [(n, a) for n, a in AXES if n != "rps3" and a < 3])
-def test_slave_passes_its_goal_by_no_more_than_what_dry_friction_leaves(name, axis) -> None:
+def test_slave_passes_its_goal_by_no_more_than_what_dry_friction_leaves(
+    name: Any, axis: Any
+) -> None:
     robot = ROBOTS[name]
     drives = present(robot.drives)
     count, whole = drives.encoder_step[axis], 0.9 * (robot.upper[axis] - robot.lower[axis])

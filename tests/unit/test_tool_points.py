@@ -23,7 +23,7 @@ STILL = np.zeros((1, 6))
 
 
 def pushed(
-    begin: ArrayLike, axis: ArrayLike, name: str = "plane", parameters=None, **numbers: Any
+    begin: ArrayLike, axis: ArrayLike, name: str = "plane", parameters: Any = None, **numbers: Any
 ) -> Array:
     """Wrench (6,) [N, N·m] on a tool that stands still, of points without friction."""
     return drag(begin, axis, STILL, name, parameters, **numbers)[0][0]

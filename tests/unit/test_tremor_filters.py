@@ -5,7 +5,7 @@ import math
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 from scipy.signal import butter, freqz, iirnotch, sosfreqz
 
@@ -52,7 +52,9 @@ def numbers_of(kind: str, **given: float) -> Array:
     return part.numbers_of(build(part.parameters, given))
 
 
-def filtered(kind: str, values: Array, period: float = 1e-3, **given: float) -> tuple[Array, Array]:
+def filtered(
+    kind: str, values: Sequence[float] | Array, period: float = 1e-3, **given: float
+) -> tuple[Array, Array]:
     """A coordinate behind a filter that begins at its first value, and what it remembers then."""
     part, memory = TREMOR_FILTERS.find(kind), np.zeros(MEMORY)
     numbers = numbers_of(kind, **given)
@@ -67,7 +69,9 @@ def response(kind: str, count: int, period: float, **given: float) -> Array:
     return filtered(kind, values, period, **given)[0][1:]
 
 
-def amplitude_and_delay(values: Array, times: Array, frequency: float) -> tuple[float, float]:
+def amplitude_and_delay(
+    values: Array, times: Sequence[float] | Array, frequency: float
+) -> tuple[float, float]:
     """Of the line of a frequency [Hz] in a signal: its length, and its delay to a sine [s]."""
     wave = 2.0 * np.exp(-2j * np.pi * frequency * times)
     line = (values * wave).mean()
@@ -105,9 +109,7 @@ def exact(
     return sosfreqz(butter(2, edges, "bandstop", output="sos", fs=rate), frequencies, fs=rate)[1]
 
 
-def measured(
-    kind: str, given: dict[str, float], frequencies: Array, period: float
-) -> NDArray[np.complex128]:
+def measured(kind: str, given: dict[str, float], frequencies: Array, period: float) -> Any:
     """The same of ours, from its answer to a single sample."""
     answer = response(kind, round(6.0 / period), period, **given)
     times = period * np.arange(len(answer))
@@ -250,7 +252,10 @@ def stage(kind: str = "band_stop", **given: object) -> RunningTremorFilter:
 
 
 def through(
-    runner: RunningTremorFilter, places: ArrayLike, period_ns: int = MS, first_ns: int = MS
+    runner: RunningTremorFilter,
+    places: Sequence[float] | Array,
+    period_ns: int = MS,
+    first_ns: int = MS,
 ) -> Array:
     """Filtered places (N, 3) of a master that is at places (N, 3), sample by sample."""
     row, found = runner.signals, []
@@ -515,7 +520,7 @@ def test_the_slave_trembles_less_and_a_second_run_has_the_same_bits(kind: str) -
     assert calm < 0.4 * trembling
 
 
-def touches(scenario: str, seconds: float, *given: object) -> Any:
+def touches(scenario: str, seconds: float, *given: Any) -> Any:
     """Energies of the contacts of a session: shares given back."""
     rows = session(*given, scenario=scenario).run(round(1000 * seconds))
     contact = rows["master_contact"]
@@ -543,7 +548,7 @@ def test_a_tank_pays_by_the_way_of_the_stylus_itself() -> None:
 
 def test_a_filter_of_ones_own_is_one_call_and_a_wrong_one_is_refused(own_parts: None) -> None:  # noqa: F811
     @kernel
-    def half(numbers, memory, value, period) -> Any:
+    def half(numbers: Any, memory: Any, value: Any, period: Any) -> Any:
         memory[0] += 0.5 * (value - memory[0])
         return memory[0]
 
@@ -595,8 +600,8 @@ def test_without_motion_there_is_no_delay() -> None:
 
 def test_the_score_says_what_the_stage_did_and_nothing_without_it() -> None:
     score = tc.run("human", duration=20.0, stages="tremor_filter").score()
-    assert 40.0 < score.value("tremor_filter.before_um") < 80.0
-    assert 0.2 < score.value("tremor_filter.left_share") < 0.5
+    assert 40.0 < present(score.value("tremor_filter.before_um")) < 80.0
+    assert 0.2 < present(score.value("tremor_filter.left_share")) < 0.5
     after = present(score.value("tremor_filter.before_um")) * present(
         score.value("tremor_filter.left_share")
     )

@@ -19,7 +19,7 @@ STAMPED_THERE = ("network_measured_cp_ns", "network_measured_cf_ns", "network_sl
 """What the slave samples: the rest of what comes back has the stamp of a command."""
 
 
-def session(*given: str, scenario: str = "palpation", stages: str = "[network]") -> VirtualTime:
+def session(*given: str, scenario: str = "palpation", stages: str = "[network]") -> Any:
     """Session whose sides are 50 ms apart, there and back."""
     settings = [f"teleop.stages={stages}", "network.there.least_delay=0.05",
                 "network.back.least_delay=0.05", *given]  # fmt: skip

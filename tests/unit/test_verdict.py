@@ -3,6 +3,7 @@
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -61,7 +62,7 @@ def drifting(tmp_path_factory: pytest.TempPathFactory) -> tc.Recording:
     return tc.run(operator=hand, duration=9.0, out=path)
 
 
-def test_one_line_opens_table_json_page_and_python(drifting: tc.Recording, tmp_path: Path) -> None:
+def test_one_line_opens_table_json_page_and_python(drifting: Any, tmp_path: Path) -> None:
     text = drifting.score().verdict.text
     assert text.startswith("followed ")
     shown = io.StringIO()
@@ -79,7 +80,7 @@ def test_one_line_opens_table_json_page_and_python(drifting: tc.Recording, tmp_p
 
 
 def test_rows_that_say_nothing_and_figures_nobody_compares_stay_out(
-    drifting: tc.Recording, tmp_path: Path
+    drifting: Any, tmp_path: Path
 ) -> None:
     shown = io.StringIO()
     evaluate_bags([drifting.path], None, tmp_path / "page.html", Console(file=shown, width=100))

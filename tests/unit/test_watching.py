@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import psutil
 import pytest
@@ -122,7 +123,7 @@ def processor() -> Iterator[Callable[..., subprocess.Popen[str]]]:
     """One processor that processes of the test share; starts them, and ends them afterwards."""
     running, first = [], min(os.sched_getaffinity(0))
 
-    def start(program: str, policy: int = os.SCHED_OTHER) -> subprocess.Popen[str]:
+    def start(program: str, policy: int = os.SCHED_OTHER) -> Any:
         def settle() -> None:
             os.sched_setaffinity(0, {first})
             os.sched_setscheduler(0, policy, os.sched_param(0))

@@ -1,5 +1,7 @@
 """Waves: energy on its way, networks that only lose it, and what a hand feels of the world."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -237,7 +239,7 @@ def pressing(*texts: str, ticks: int = 12_000, scenario: str = "palpation") -> N
     return VirtualTime(configure(scenario, settings=[*settings, *texts])).run(ticks)
 
 
-def late(delay: float) -> tuple[str, str]:
+def late(delay: float) -> Any:
     """Settings of a network that takes so long there and back each [s]."""
     return tuple(f"network.{way}.least_delay={delay}" for way in ("there", "back"))
 
