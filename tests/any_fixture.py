@@ -67,7 +67,7 @@ KINDS = {
 }  # fmt: skip
 
 
-def found(name: str, parameters: Any, offset: Sequence[float] | Array) -> tuple[float, Array]:
+def found(name: str, parameters: Any, offset: Sequence[float] | Array) -> Any:
     """Depth and way of a fixture at a place (3,)."""
     out = np.full(3, math.nan)
     depth = FIXTURES.find(name).depth(np.array(offset, dtype=float), numbers_of(parameters), out)

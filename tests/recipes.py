@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from teleop_core.bags.reader import Bag
@@ -64,7 +63,7 @@ class Recipe:
     def values(self, topic: Topic) -> Array:
         return self.rows[topic][1]
 
-    def drop(self, topic: Any, lost: ArrayLike | range) -> None:
+    def drop(self, topic: Any, lost: Any) -> None:
         kept = np.setdiff1d(np.arange(len(self.rows[topic][0])), lost)
         self.rows[topic] = tuple(column[kept] for column in self.rows[topic])
 

@@ -14,14 +14,12 @@ from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.motion_scaling import MotionScaling
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
 from teleop_core.chain.mapping.walls import passive_stiffness
-from teleop_core.chain.master.haptic_master import (
-    REST_POSITION,
-    DeviceParameters,
-    HandParameters,
-    HapticMasterParameters,
-)
+from teleop_core.chain.master.device import DeviceParameters
+from teleop_core.chain.master.hand_mechanics import HandParameters
+from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.chain.operators import register_operator
 from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
+from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.evaluation.metrics.contact import TOUCH_J
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array

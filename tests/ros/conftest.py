@@ -389,7 +389,7 @@ def _made_peer() -> Any:
 
 
 @pytest.fixture
-def peer() -> Iterator[Peer]:
+def peer() -> Any:
     """A peer on a ROS domain that nobody else uses; the nodes it started end with the test."""
     with _made_peer() as made:
         yield made
@@ -405,7 +405,7 @@ def common_peer() -> Iterator[Peer]:
 @contextmanager
 def _composed(
     peer: Peer, folder: Path, namespace: str, parameters: dict[str, dict[str, Any]]
-) -> Iterator["subprocess.Popen[bytes] | Started"]:
+) -> Any:
     common = {
         "recorder": {"out": str(folder / "bag")},
         "slave": {"start": load_robot("rcrt1").home.tolist()},  # follows at once
@@ -449,7 +449,7 @@ def composed_session(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., 
 
     @contextmanager
     def run(
-        **parameters: dict[str, Any],
+        **parameters: Any,
     ) -> Iterator[tuple[Peer, "subprocess.Popen[bytes]", Path]]:
         folder = tmp_path_factory.mktemp("session")
         with _made_peer() as peer, _composed(peer, folder, "", parameters) as process:

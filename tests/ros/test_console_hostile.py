@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.alone]
 SETTLES = 1e-6  # filters come to rest within nanometres; a drag moves millimetres [m]
 
 
-def saved(driver: PageClient, console: ConsoleProcess | float, name: Any) -> tc.Recording:
+def saved(driver: PageClient, console: Any, name: Any) -> tc.Recording:
     """What has been recorded until now, closed under a name."""
     driver.set(driver.elements["name"], value=name)
     driver.click("Save as")

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from present import present
 from teleop_core.bags.reader import Bag
-from teleop_core.chain.master.haptic_master import REST_POSITION
+from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
 
 if TYPE_CHECKING:

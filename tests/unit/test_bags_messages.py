@@ -23,7 +23,7 @@ from teleop_core.graph.topics import Kind
 POSE = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
 
 
-def empty_message(kind: Kind) -> Record:
+def empty_message(kind: Kind) -> Any:
     def vector() -> Record:
         return Record(x=0.0, y=0.0, z=0.0)
 

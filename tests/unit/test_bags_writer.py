@@ -45,7 +45,7 @@ def rng() -> np.random.Generator:
 
 
 def block(
-    rng: np.random.Generator, begin: int, count: int, chosen: Any = topics.STREAMS
+    rng: Any, begin: int, count: int, chosen: Any = topics.STREAMS
 ) -> dict[Topic, tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
     """Samples of one block; stamps lie a little before log times."""
     log_ns = np.arange(begin, begin + count) * MS + 10

@@ -50,7 +50,7 @@ class Mechanism:
         name = str(self.model.njoints)
         return self.model.addJoint(parent, joint, place or SE3.Identity(), name)
 
-    def pin(self, first: int, there: tuple[float, int, int], second: int, here: ArrayLike) -> None:
+    def pin(self, first: int, there: tuple[float, int, int], second: int, here: Any) -> None:
         """Keep a point of one body at a point of another."""
         kind, ends = pinocchio.ContactType.CONTACT_3D, (at(*there), at(*here))
         self.pins.append((kind, first, ends[0], second, ends[1]))

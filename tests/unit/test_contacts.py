@@ -13,13 +13,11 @@ from recipes import Recipe
 from teleop_core.base.parameters import build
 from teleop_core.chain.mapping.parameters import FixtureParameters
 from teleop_core.chain.mapping.walls import passive_stiffness
-from teleop_core.chain.master.haptic_master import (
-    REST_POSITION,
-    DeviceParameters,
-    HandParameters,
-    HapticMasterParameters,
-)
+from teleop_core.chain.master.device import DeviceParameters
+from teleop_core.chain.master.hand_mechanics import HandParameters
+from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.scoring import evaluate
 from teleop_core.graph.topics import MASTER_CONTACT

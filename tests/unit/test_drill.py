@@ -228,7 +228,7 @@ def seen(
     joints: Array,
     lies: float = 1.0,
     told: Any = None,
-    warned: int | None = None,
+    warned: Any = None,
     late: float = 0.0,
 ) -> Seen:
     """What a tap hears of an arm whose setpoint and measured joints are these, each millisecond."""

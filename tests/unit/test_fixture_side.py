@@ -1,7 +1,6 @@
 """Side of a fixture: the slave's command stays inside, and never steps farther than the hand."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -61,7 +60,7 @@ class HeldDesk(Desk):
     def gain(self) -> float:
         return float(self.scaling.parameters["gain"][int(self.state("is_fine"))])
 
-    def go(self, move: Sequence[float] | Array = (0, 0, 0), **how: Any) -> Any:
+    def go(self, move: Any = (0, 0, 0), **how: Any) -> Any:
         """One step of the hand; returns how far the slave's command goes beyond that of it [m]."""
         before, gain = self.sent, self.gain()
         self.sent = self.step(move, **how)

@@ -562,9 +562,7 @@ def test_of_several_blocks_each_moves_only_where_the_jaw_is_and_is_counted_for_i
 # -- the master's side -----------------------------------------------------------------------------
 
 
-def commanded(
-    parameters: JawCommandParameters, hand: Any = None, buttons: Array | None = None
-) -> Array:
+def commanded(parameters: JawCommandParameters, hand: Any = None, buttons: Any = None) -> Array:
     """Angles (N,) that the master's side asks for."""
     stage = JAW_COMMAND.run(parameters)
     angles = []

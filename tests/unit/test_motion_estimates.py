@@ -1,7 +1,7 @@
 """Estimates of motion for control laws: no lag, the poles they claim, noise as the rule says."""
 
 import math
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ ARM = load_robot("rcrt1")
 fadings = st.floats(0.5, 0.98)
 
 
-def followed(values: Sequence[float] | Array, expected: float, fading: float) -> Array:
+def followed(values: Any, expected: float, fading: float) -> Array:
     """Estimates (N, 3) of a position, from rest at 0."""
     memory, rows = np.zeros(MEMORY), np.empty((len(values), 3))
     for k, value in enumerate(values):

@@ -15,7 +15,7 @@ from teleop_core.chain.mapping.motion_scaling import (
     to_slave_axes,
 )
 from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.chain.master.haptic_master import REST_POSITION, REST_TILT
+from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import (
     Array,

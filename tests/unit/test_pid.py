@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ AXES = range(6)
 
 
 def run(
-    errors: Sequence[float] | Array,
+    errors: Any,
     gains: Sequence[float] | Array = (2.0, 0.0, 0.0),
     limit: float = math.inf,
     memory: Array | None = None,

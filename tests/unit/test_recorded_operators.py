@@ -1,7 +1,7 @@
 """Operators who follow a recording or a table: as it is, in its own time."""
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ CENTER = (0.01, 0.0, 0.03)
 
 def bag(
     path: Path,
-    times: Sequence[float] | Array = T,
+    times: Any = T,
     pressed: dict[float, tuple[int, int, int]] | None = None,
     closed: dict[float, float] | None = None,
 ) -> Path:

@@ -5,7 +5,7 @@ import math
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -52,9 +52,7 @@ def numbers_of(kind: str, **given: float) -> Array:
     return part.numbers_of(build(part.parameters, given))
 
 
-def filtered(
-    kind: str, values: Sequence[float] | Array, period: float = 1e-3, **given: float
-) -> tuple[Array, Array]:
+def filtered(kind: str, values: Any, period: float = 1e-3, **given: float) -> tuple[Array, Array]:
     """A coordinate behind a filter that begins at its first value, and what it remembers then."""
     part, memory = TREMOR_FILTERS.find(kind), np.zeros(MEMORY)
     numbers = numbers_of(kind, **given)
@@ -69,9 +67,7 @@ def response(kind: str, count: int, period: float, **given: float) -> Array:
     return filtered(kind, values, period, **given)[0][1:]
 
 
-def amplitude_and_delay(
-    values: Array, times: Sequence[float] | Array, frequency: float
-) -> tuple[float, float]:
+def amplitude_and_delay(values: Array, times: Any, frequency: float) -> tuple[float, float]:
     """Of the line of a frequency [Hz] in a signal: its length, and its delay to a sine [s]."""
     wave = 2.0 * np.exp(-2j * np.pi * frequency * times)
     line = (values * wave).mean()
@@ -253,7 +249,7 @@ def stage(kind: str = "band_stop", **given: object) -> RunningTremorFilter:
 
 def through(
     runner: RunningTremorFilter,
-    places: Sequence[float] | Array,
+    places: Any,
     period_ns: int = MS,
     first_ns: int = MS,
 ) -> Array:
