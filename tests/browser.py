@@ -56,6 +56,9 @@ class Tab(Headless):
     """
 
     def __init__(self, folder: Path, width: int = 1400, height: int = 900) -> None:
+        self.answers: dict[Any, Any]
+        self.asked: list[Any]
+        self.errors: list[Any]
         self.errors, self.asked, self.answers = [], [], {}
         super().__init__(chromium(), folder, width, height, FLAGS)
         for domain in ("Network", "Log"):
@@ -204,7 +207,7 @@ def until(condition: Callable[..., object], what: str, seconds: float = 60.0) ->
     return wait_until(condition, what, seconds)
 
 
-def handshake(port: int, path: str = "/", **headers: Any):
+def handshake(port: int, path: str = "/", **headers: Any) -> Any:
     """First line of the answer to the opening of a WebSocket, and the socket it came on."""
     opened = socket.create_connection(("127.0.0.1", port), timeout=20)
     told = {

@@ -30,6 +30,8 @@ class Desk:
     def __init__(self, *, is_stoppable: bool = False) -> None:
         self.is_stoppable = is_stoppable
         self.arms = (Arm("", load_robot_set("rcrt1", ())),)
+        self.asked: list[Any]
+        self.known: dict[Any, Any]
         self.asked, self.stops, self.known = [], 0, {}
         self.obeys = threading.Event()
         self.obeys.set()

@@ -42,6 +42,7 @@ class Headless:
         os.close(read_there)
         os.close(write_there)
         self._in, self._out, self._heard = read_here, os.fdopen(write_here, "wb"), b""
+        self.said: list[Any]
         self._numbers, self._session, self.said = count(1), None, []
         targets = self.call("Target.getTargets")["targetInfos"]
         page = next(target["targetId"] for target in targets if target["type"] == "page")

@@ -81,6 +81,7 @@ def looks_from_nowhere(watcher: PageClient, driver: PageClient) -> None:
 
 
 def gives_values_of_every_wrong_type(watcher: PageClient, driver: PageClient) -> None:
+    wrong: Any
     wrong = ([], {}, [[1]], None, NAN, INF, 2**63, -(2**63), "x" * 5000, b"bytes", {"a": [1] * 100})
     for page in (watcher, driver):
         for label in ("dark", "name", "joint", "Take control"):

@@ -32,6 +32,10 @@ class PageClient:
     def __init__(self, port: int, *, comes_up: bool = True) -> None:
         self.port, self.name, self.status = port, "", ""
         self.has_all = False  # that was there when it came
+        self.commands: dict[Any, Any]
+        self.elements: dict[Any, Any]
+        self.gizmos: list[Any]
+        self.values: dict[Any, Any]
         self.elements, self.gizmos, self.commands, self.values = {}, [], {}, {}
         self.socket = connect(
             f"ws://127.0.0.1:{port}/", origin=f"http://127.0.0.1:{port}", compression=None,

@@ -8,7 +8,7 @@ of them do more than open their file, for minutes or for as long as somebody loo
 import io
 import shutil
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -103,7 +103,7 @@ def hand() -> pd.DataFrame:
     return table
 
 
-def messages(store: Typestore):
+def messages(store: Typestore) -> Iterator[Any]:
     """Poses and buttons, as the types of a version of ROS."""
     types = store.types
     more = {} if "rcl_interfaces/msg/Log" in types else {"seq": 0}

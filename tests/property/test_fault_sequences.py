@@ -37,6 +37,7 @@ class Chaos:
         self.goal = self.slave.robot.home.copy()
         self.last = np.array(self.row["slave_setpoint_js"])
         self.worst = 0.0
+        self.states: set[Any]
         self.states = set()
 
     def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> None:

@@ -49,6 +49,7 @@ class Chain:
         self.ik = InverseKinematics(InverseKinematicsParameters(robot=robot))
         self.joints, self.stamp_ns = self.robot.start.copy(), 1_000_000_000
         self.hand, self.attitude, self.clutch = np.zeros(3), Rotation.identity(), 0.0
+        self.told: list[Any]
         self.told = []
         self.follow(2)
 

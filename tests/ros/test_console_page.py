@@ -67,7 +67,7 @@ def ready(tab: Any) -> None:
     tab.shows("ENABLED, homed", 120)
 
 
-def arrow(tab: Any, axis: int, way: float = PULLED):
+def arrow(tab: Any, axis: int, way: float = PULLED) -> Any:
     """Where an arrow of the stylus is seen, and where it would be a way farther [px]."""
     begin, end = np.zeros(3), np.zeros(3)
     begin[axis], end[axis] = ARROW, ARROW + way

@@ -52,12 +52,14 @@ class StockClient:
     """What crtk_python_client does: reliable, ten deep, stamped now, joints without names."""
 
     def __init__(self, peer: "Peer", arm: str = "slave") -> None:
+        self.newest: dict[Any, Any]
         self.peer, self.arm, self.newest, self.was_busy = peer, arm, {}, False
         for name, kind in (
             ("operating_state", crtk.OperatingState), ("setpoint_cp", PoseStamped),
             ("setpoint_js", JointState), ("goal_js", JointState), ("measured_cv", TwistStamped),
         ):  # fmt: skip
             peer.node.create_subscription(kind, f"{arm}/{name}", self.taker(name), 10)
+        self.commands: dict[Any, Any]
         self.commands = {}
 
     def taker(self, name: str) -> Callable[..., Any]:
@@ -243,6 +245,7 @@ class ForeignArm(Node):
             self.states = self.create_publisher(crtk.OperatingState, "PSM/operating_state", 10)
         self.measured = self.create_publisher(JointState, "PSM/measured_js", quality)
         self.setpoint = self.create_publisher(JointState, "PSM/setpoint_js", 10)
+        self.past: Any
         self.past, self.home = deque(maxlen=50), list(self.q)
         self.last_ns = self.get_clock().now().nanoseconds
         kind = JointState if "type" in faults else PoseStamped
@@ -267,7 +270,7 @@ class ForeignArm(Node):
         if self.state == "ENABLED":
             self.goal = list(message.position)
 
-    def lying(self, dt: float):
+    def lying(self, dt: float) -> Any:
         """Joints and speeds as this arm tells them, a time after it told the last ones [s]."""
         self.past.append(list(self.q))
         before = self.past[-2] if len(self.past) > 1 else self.q

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -31,6 +31,7 @@ class Sender:
     """A program that knows nothing of the network: commands, and where a slave is."""
 
     def __init__(self, peer: "Peer") -> None:
+        self.sent_ns: dict[Any, Any]
         self.peer, self.sent_ns = peer, {}
 
     def send(self) -> None:
@@ -46,6 +47,7 @@ def test_a_foreign_publisher_is_behind_the_network_and_nothing_comes_before_its_
 ) -> None:
     came, back = peer.listen(NETWORK_SERVO_CP), peer.listen(NETWORK_SETPOINT_CP)
     peer.start("network", there__least_delay=DELAY)
+    ages: list[Any]
     sender, ages = Sender(peer), []
 
     def many() -> int:

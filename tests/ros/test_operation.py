@@ -83,7 +83,7 @@ def operation(peer: Any) -> Any:
     return peer.read or None
 
 
-def command(peer: "Peer", name: str):
+def command(peer: "Peer", name: str) -> Any:
     answer = peer.call(Trigger, f"/slave/{name}", Trigger.Request())
     return answer.success, answer.message
 

@@ -28,7 +28,7 @@ class Session:
         self.peer, self._stamp = peer, 0
         self.node = peer.start("recorder", **parameters)
 
-    def ask(self, service: str | int):
+    def ask(self, service: str | int) -> Any:
         answer = self.peer.call(Trigger, f"/recorder/{service}", Trigger.Request())
         return answer.success, answer.message
 

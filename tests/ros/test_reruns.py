@@ -36,7 +36,7 @@ def abort_outside_python():
 def run(tmp_path: Any) -> Callable[..., Any]:
     """Run a test of this body in a pytest of its own: its output, and how often the test ran."""
 
-    def result(body: Any, *options: object):
+    def result(body: Any, *options: object) -> Any:
         file = tmp_path / "test_it.py"
         file.write_text(HEAD + body)
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = ros\n")

@@ -50,7 +50,7 @@ def short_session(
     slave's own steps, of which a busy machine makes fewer.
     """
 
-    def run(setting: Any):
+    def run(setting: Any) -> Any:
         configuration = configure("free_motion", settings=[*SHORT, setting])
         begin = None
 

@@ -76,7 +76,7 @@ def witness(domain: int) -> Iterator[Callable[[], object]]:
 
 
 @contextmanager
-def arm(*others: Any):
+def arm(*others: Any) -> Iterator[Any]:
     """A domain in which the others run, and what the controller among them witnesses at the end."""
     env = environment() | {"ROS_DOMAIN_ID": free_domain()}
     started = [subprocess.Popen(command, env=env) for command in others]
@@ -90,7 +90,7 @@ def arm(*others: Any):
     assert set(codes) == {0}
 
 
-def led(tmp_path: Path, bridge: Any, seed: int, *settings: Any, operator: Any = ()):
+def led(tmp_path: Path, bridge: Any, seed: int, *settings: Any, operator: Any = ()) -> Any:
     """A recorded session that leads the arm, and what the controller witnessed."""
     out = tmp_path / f"bag_{seed}"
     live = [

@@ -52,7 +52,7 @@ def test_a_subscriber_that_never_reads_does_not_slow_the_session(watched: Any) -
     assert len(deaf) == len(STREAMS)
 
 
-def _ticks_and_lost_time(peer: Any):
+def _ticks_and_lost_time(peer: Any) -> Any:
     """Ticks of the slave so far, and the milliseconds that it gave up."""
     peer.wait_value("slave", "ticks", lambda ticks: ticks > 0)
     status = peer.status("slave")

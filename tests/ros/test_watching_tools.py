@@ -31,6 +31,8 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_path: Path) -> None:
     robot = load_robot("rcrt1")
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    described: list[Any]
+    drawn: list[Any]
     described, drawn = [], []
     joints = np.concatenate((robot.start, np.zeros(2 * robot.n)))
     tip = bodies_of(robot).poses(robot.start)[-1]

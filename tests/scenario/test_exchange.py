@@ -40,7 +40,7 @@ def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def imported(teleop: "Run", hand: Path, tmp_path_factory: pytest.TempPathFactory):
+def imported(teleop: "Run", hand: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The recording, and what the command said."""
     out = tmp_path_factory.mktemp("bags") / "hand"
     return out, teleop("import", hand, "--out", out).stdout

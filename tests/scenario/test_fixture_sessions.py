@@ -26,7 +26,7 @@ def session(kind: Any, **settings: object) -> Any:
     return tc.run("coarse_box", duration=SECONDS, fixture=kind, **more)
 
 
-def ways(recording: tc.Recording, kind: Any):
+def ways(recording: tc.Recording, kind: Any) -> Any:
     """Depths (N,) and ways (N, 3) [m] of the hand from its fixture while it is on, and pushes."""
     on = recording["teleop/state"]["is_fixture_on"] > 0
     begin = recording["teleop/state"].time[np.argmax(on)]

@@ -93,7 +93,7 @@ def record(path: Path, seed: int, fixture: dict[Any, Any] | None = None, count: 
     return path
 
 
-def opened(browser: str, page: Path, folder: Path):
+def opened(browser: str, page: Path, folder: Path) -> Any:
     """The page's body attributes after its scripts have run, console lines and requested URLs."""
     log = folder / "net.json"
     command = [browser, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}",

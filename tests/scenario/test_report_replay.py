@@ -52,7 +52,7 @@ def joints_of(robot: Robot, times: Array) -> Any:
     return robot.home + reach * np.sin(2.0 * np.pi * 0.25 * times[:, None] + phases)
 
 
-def record(path: Path, name: str, duration: float = DURATION, rate: int = RATE):
+def record(path: Path, name: str, duration: float = DURATION, rate: int = RATE) -> Any:
     """A recording of a robot whose joints move; returns times and places of the tip [mm]."""
     robot = load_robot(name)
     times = np.arange(int(duration * rate)) / rate
@@ -85,7 +85,7 @@ def record(path: Path, name: str, duration: float = DURATION, rate: int = RATE):
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory):
+def page(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A page with one recording of each robot, and where their tips were."""
     folder = tmp_path_factory.mktemp("replays")
     tips = [record(folder / name, name) for name in ROBOTS]

@@ -98,7 +98,7 @@ def noisy(count: int, seed: int) -> Recipe:
 
 
 @pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory):
+def short(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Two recordings on one page."""
     folder = tmp_path_factory.mktemp("short")
     recipes = {name: noisy(SHORT, seed) for seed, name in enumerate(("one", "two"))}
@@ -109,7 +109,7 @@ def short(tmp_path_factory: pytest.TempPathFactory):
 
 
 @pytest.fixture(scope="module")
-def long(tmp_path_factory: pytest.TempPathFactory):
+def long(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Ten minutes at 1 kHz with more noise than a device has."""
     folder = tmp_path_factory.mktemp("long")
     recipe = noisy(LONG, 3)
@@ -201,7 +201,7 @@ def drag(tab: Any, selector: Any, begin: Sequence[float] | Array, end: Any) -> N
     tab.settled()
 
 
-def curve(tab: object, title: str, name: str, recording: str = "one"):
+def curve(tab: object, title: str, name: str, recording: str = "one") -> Any:
     (trace,) = [t for t in plots(tab)[f"{recording}/{title}"]["traces"] if t["name"] == name]
     return np.array(trace["x"], float), np.array(trace["y"], float), trace["mode"]
 

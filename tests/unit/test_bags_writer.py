@@ -84,6 +84,7 @@ def test_rosbags_reads_every_value_that_was_written(
     written = block(rng, 5, 40)
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS, compression=compression) as writer:
         writer.write_block(written)
+    found: Any
     found = {topic.name: [] for topic in topics.STREAMS}
     with AnyReader([tmp_path / "bag"]) as reader:
         for connection, log_ns, data in reader.messages():
@@ -103,6 +104,7 @@ def test_messages_of_one_time_stand_in_the_order_of_their_topics(
     order = [topic.name for topic in topics.STREAMS]
     with mcap_file(tmp_path / "bag").open("rb") as file:
         stream = StreamReader(file)  # record by record, as they stand in the file
+        found: dict[Any, Any]
         names, found = {}, {}
         for record_ in stream.records:
             if isinstance(record_, Channel):

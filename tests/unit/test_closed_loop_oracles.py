@@ -43,6 +43,8 @@ class Mechanism:
     """Tree of joints with pins; ``x`` is pinocchio's configuration, q the robot's joint vector."""
 
     def __init__(self) -> None:
+        self.motors: list[Any]
+        self.pins: list[Any]
         self.model, self.pins, self.motors, self.tip_frame = pinocchio.Model(), [], [], 0
 
     def add(self, parent: int, joint: Any, place: SE3 | None = None) -> int:

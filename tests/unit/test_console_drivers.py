@@ -1,6 +1,7 @@
 """Drivers: of all open pages one drives, and who stands still while holding loses control."""
 
 from itertools import pairwise
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,6 +27,7 @@ class Clock:
 
 def pages(count: int, clock: Clock | None = None) -> tuple[Drivers, list[object]]:
     """Drivers with pages 0 to count - 1, and the changes that are heard from now on."""
+    changes: list[Any]
     drivers, changes = Drivers(clock=clock or Clock()), []
     for page in range(count):
         drivers.join(page)
@@ -38,6 +40,7 @@ def test_never_does_more_than_one_page_drive_nor_one_that_is_closed(
     steps: list[tuple[str, int]],
 ) -> None:
     clock = Clock()
+    told: list[Any]
     drivers, told = Drivers(clock=clock), []
     drivers.on_change(told.append)
     for word, page in steps:

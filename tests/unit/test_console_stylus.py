@@ -32,6 +32,7 @@ class Hand:
 
     def __init__(self, server: Server) -> None:
         server.scene.reset()
+        self.said: list[Any]
         self.server, self.drivers, self.said = server, {1, 2}, []
         scene = Scene(server, [Arm("", tc.load_robot("rcrt1"))])
         self.stylus = Stylus(

@@ -38,6 +38,7 @@ class Leader:
         n = self.robot.n
         self.names = [*(f"motor_{k}" for k in rng.permutation(n)), "gripper"]
         self.signs, self.offsets = rng.choice([-1.0, 1.0], n), offset * rng.uniform(0.3, 1.5, n)
+        self.said: list[Any]
         self.q, self.said = self.robot.home.copy(), []
 
     def joints(self) -> dict[str, float]:

@@ -55,6 +55,7 @@ class Bench:
         self._steps = self.server.load(), self.sim.load()
         self.row["slave_operation"][STATE] = ENABLED
         self.tip = np.array([*PLACE, 1.0, 0.0, 0.0, 0.0])
+        self.rows: list[Any]
         self.rows = []
         self.run(OPEN, 2)
 

@@ -24,6 +24,7 @@ class Gripper:
         self.bridge = JawBridge(JawBridgeParameters(joint="finger", **parameters))
         self.row, self.holds = self.bridge.signals, holds
         self.row["slave_operation"][OPERATION.index("state")] = float(State.ENABLED)
+        self.sent: list[Any]
         self.now_ns, self.position, self.sent, self.setpoint_age = 0, 0.8, [], 0.0
 
     def lead(

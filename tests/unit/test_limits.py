@@ -38,6 +38,7 @@ class Arm:
 
     def __init__(self, delay: int = 1, **values: Any) -> None:
         self.scaling = MotionScaling(MotionScalingParameters(**PLAIN, **values))
+        self.told: list[Any]
         self.row, self.delay, self.told = self.scaling.signals, delay, []
         self.hand, self.turn, self.stamp_ns = np.zeros(3), 0.0, TICK_NS
         self.step(0)

@@ -1,5 +1,7 @@
 """Sender: one owner per topic; losses, told by numbers; floods; stamps that say nothing."""
 
+from typing import Any
+
 import pytest
 
 from teleop_core.bags.messages import Refusal
@@ -20,6 +22,7 @@ def feed_in_turn(
     sender: Sender, first: list[int] | range, second: list[int] | range
 ) -> tuple[list[None], list[Refusal]]:
     """What is answered to two publishers that send in turn: to the first, to the second."""
+    answers: Any
     answers = [], []
     for i, pair in enumerate(zip(first, second, strict=True)):
         for name, number, known in zip((b"first", b"second"), pair, answers, strict=True):
