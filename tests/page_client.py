@@ -101,7 +101,7 @@ class PageClient:
     def _read(self) -> None:
         try:
             for data in self.socket:
-                size = int.from_bytes(data[8:16], "little")
+                size: Any = int.from_bytes(data[8:16], "little")
                 inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
                 for message in msgspec.msgpack.decode(inner)["messages"]:
                     self._take(message)

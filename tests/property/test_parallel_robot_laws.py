@@ -1,5 +1,7 @@
 """Laws that every parallel and hybrid robot keeps, whatever it is asked."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -84,7 +86,7 @@ def test_a_batch_is_the_same_as_its_single_questions(name: str, geometry: str) -
 def test_every_robot_is_led_through_the_graph_with_all_its_actuators(
     name: str, geometry: str
 ) -> None:
-    session = VirtualTime(configure(settings=[f"robot={name}", f"geometry=[{geometry}]"]))
+    session: Any = VirtualTime(configure(settings=[f"robot={name}", f"geometry=[{geometry}]"]))
     signals, robot = session.run(6000), session.stages["slave_sim"].robot
     measured = signals["slave_measured_cp"]
     assert np.isfinite(measured).all()

@@ -206,7 +206,7 @@ def test_a_clutch_stroke_beyond_reach_takes_the_slave_no_further_out() -> None:
 SPEED = 30e-3 * 1.875 / 1.2  # largest of a minimum-jerk move by 30 mm in 1.2 s
 
 
-def master_bag(stamps_ns: NDArray[np.int64]) -> MemoryBag:
+def master_bag(stamps_ns: Any) -> MemoryBag:
     """Recording of a hand that rests, moves by 30 mm within 1.2 s, and rests."""
     share = minimum_jerk((stamps_ns * 1e-9 - 1.3) / 1.2)
     poses = np.zeros((len(stamps_ns), 7))
@@ -220,7 +220,7 @@ def setpoints(stamps_ns: NDArray[np.int64], **values: str) -> tuple[Array, Array
 
     The reference filter, which lags behind any master, is off.
     """
-    values = {"slave.reference_filter.is_on": False} | values
+    values: Any = {"slave.reference_filter.is_on": False} | values
     session = VirtualTime(configuration(settings=values), played="haptic_master")
     rows = np.concatenate(list(replayed_blocks(session, master_bag(stamps_ns))[0]))
     last = rows["now_ns"][-1] - stamps_ns[-1]

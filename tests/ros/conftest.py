@@ -467,6 +467,7 @@ def run_until(
     On a busy machine nobody knows what a session comes to in a time: it lasts until it has come to
     what its test is about. The peer's domain must be that of the environment.
     """
+    show: Any
     show, interrupt = Console(file=io.StringIO(), width=200), Interrupt()
     with ThreadPoolExecutor() as pool:
         session = pool.submit(

@@ -83,7 +83,7 @@ rclpy.shutdown()
 def env(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Environment in which the package is found that was built just now, wherever others are."""
     prefix = tmp_path_factory.mktemp("crtk") / "prefix"
-    script = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", prefix]
+    script: Any = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", prefix]
     done = subprocess.run(script, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     (module,) = prefix.glob("lib/python*/site-packages")
@@ -94,7 +94,7 @@ def env(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 def run(env: Any, *arguments: object) -> Any:
     named = env | {"ROS_DOMAIN_ID": free_domain()}
-    command = [sys.executable, "-c", *arguments]
+    command: Any = [sys.executable, "-c", *arguments]
     done = subprocess.run(
         command, env=named, capture_output=True, text=True, timeout=100, check=False
     )
@@ -112,7 +112,7 @@ def test_built_messages_cross_the_middleware(env: dict[str, str]) -> None:
 
 
 def test_without_a_compiler_one_line_says_what_to_install(tmp_path: Path) -> None:
-    script = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", tmp_path]
+    script: Any = [sys.executable, SOURCE / "build_without_ament.py", "--prefix", tmp_path]
     named = environment() | {"CC": "no-such-compiler"}
     done = subprocess.run(
         script, env=named, capture_output=True, text=True, timeout=100, check=False

@@ -35,7 +35,7 @@ def pad() -> Iterator[VirtualPad]:
 
 
 def opened(hand: RemoteHand, force: float = 0.0, **parameters: object) -> DeviceHand:
-    operator = OPERATORS.find("gamepad")
+    operator: Any = OPERATORS.find("gamepad")
     return DeviceHand(
         NODE, hand, operator.opens, operator.parameters(**parameters), lambda: force
     )  # fmt: skip
@@ -53,7 +53,7 @@ class Clock:
         while not condition():
             assert time.monotonic() < deadline, what
             while self._ticks * 1e-3 < time.monotonic() - self._begin:
-                times = (self._ticks + 1 + np.arange(AHEAD)) * 1e-3
+                times: Any = (self._ticks + 1 + np.arange(AHEAD)) * 1e-3
                 self._ticks += AHEAD
                 self.row = self._hand.motion(times)[-1]
             time.sleep(0.002)

@@ -276,7 +276,7 @@ def test_the_master_feels_the_sum_of_all_sources_of_force(peer: "Peer") -> None:
 def test_a_source_of_force_that_falls_silent_acts_no_more(peer: "Peer", silent: int) -> None:
     felt = peer.listen(topics.MASTER_MEASURED_CF)
     peer.start("haptic_master", patience=0.0, links=FORCES)
-    sources = [0.5, 0.25]
+    sources: Any = [0.5, 0.25]
 
     def is_felt() -> int:
         push(peer, *sources)

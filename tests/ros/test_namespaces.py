@@ -15,7 +15,6 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import TF
 from teleop_core.evaluation import scores
 from teleop_core.graph import topics
-from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.start import taken_names
 from teleop_core.robots import load_robot
@@ -60,7 +59,7 @@ def parameter(peer: "Peer", node: str, name: str) -> Any:
     return peer.call(GetParameters, f"{node}/get_parameters", request).values[0]
 
 
-def recorded(peer: "Peer", process: Array, tmp_path: Any, *slaves: Any) -> Bag:
+def recorded(peer: "Peer", process: Any, tmp_path: Any, *slaves: Any) -> Bag:
     """Recording of a session, ended when these slaves have worked for two seconds."""
     for slave in slaves:
         peer.wait_value(slave, "ticks", lambda ticks: ticks > 2000)

@@ -421,7 +421,15 @@ def test_wrong_parameter_files_end_with_one_line_and_2(
 ) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text(f"{name}:\n  ros__parameters:\n    {content}\n")
-    command = [sys.executable, "-m", "teleop_core.nodes", name, "--ros-args", "--params-file", file]
+    command: Any = [
+        sys.executable,
+        "-m",
+        "teleop_core.nodes",
+        name,
+        "--ros-args",
+        "--params-file",
+        file,
+    ]
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=90, env=environment(), check=False
     )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.ros
 
-JS = topics.SLAVE_MEASURED_JS
+JS: Any = topics.SLAVE_MEASURED_JS
 
 
 def heard(peer: "Peer", topic: Topic, qos: QoSProfile) -> Any:
@@ -39,7 +39,7 @@ def spun(peer: "Peer", condition: Callable[..., object]) -> Callable[[], object]
 def test_a_stream_reaches_reliable_and_best_effort_subscribers(peer: "Peer") -> None:
     """The default of ROS's subscribers, and so of stock clients, is reliable."""
     streams = [t for t in STAGES.find("slave").writes if t.quality is Quality.STREAM]
-    reliable = {topic: heard(peer, topic, QoSProfile(depth=10)) for topic in streams}
+    reliable: Any = {topic: heard(peer, topic, QoSProfile(depth=10)) for topic in streams}
     best_effort = heard(peer, JS, qos_profile_sensor_data)
     peer.start("slave")
     for topic, found in {**reliable, JS.name: best_effort}.items():
@@ -50,7 +50,7 @@ def test_a_command_is_taken_from_senders_of_both_kinds(peer: "Peer") -> None:
     peer.start("slave")
     for qos in (QoSProfile(depth=10), qos_profile_sensor_data):
         kind = message_type(topics.SLAVE_SERVO_JP.kind.ros_type)
-        own = peer.node.create_publisher(kind, topics.SLAVE_SERVO_JP.name, qos)
+        own: Any = peer.node.create_publisher(kind, topics.SLAVE_SERVO_JP.name, qos)
         peer.wait(lambda own=own: own.get_subscription_count(), "the slave as a reader")
         peer.node.destroy_publisher(own)
 
@@ -75,7 +75,7 @@ def test_an_override_changes_what_a_subscription_asks_for(peer: "Peer") -> None:
     assert found.qos_profile.reliability is ReliabilityPolicy.RELIABLE
 
 
-def test_a_wrong_override_ends_the_node_in_one_line(peer: "Peer") -> None:
+def test_a_wrong_override_ends_the_node_in_one_line(peer: Any) -> None:
     name: dict[str, Any] = f"qos_overrides./{JS.name}.publisher.reliability"
     node = peer.start("slave_sim", wait="", **{name: "very"})
     assert node.wait() == 2
@@ -85,7 +85,7 @@ def test_a_wrong_override_ends_the_node_in_one_line(peer: "Peer") -> None:
     assert "one of reliable, best_effort" in said[0]
 
 
-def test_an_override_of_a_topic_that_is_not_open_is_told(peer: "Peer") -> None:
+def test_an_override_of_a_topic_that_is_not_open_is_told(peer: Any) -> None:
     name: dict[str, Any] = "qos_overrides./slave/measure_js.publisher.reliability"
     peer.start("slave", **{name: "reliable"})
     peer.wait(lambda: f"no effect of {name}" in peer.status("slave").message, "the warning")

@@ -40,7 +40,15 @@ def run(tmp_path: Any) -> Callable[..., Any]:
         file = tmp_path / "test_it.py"
         file.write_text(HEAD + body)
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = ros\n")
-        command = [sys.executable, "-m", "pytest", "-p", "middleware_faults", *options, str(file)]
+        command: Any = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-p",
+            "middleware_faults",
+            *options,
+            str(file),
+        ]
         done = subprocess.run(
             command, cwd=tmp_path, env=dict(os.environ) | {"PYTHONPATH": str(TESTS)},
             capture_output=True, text=True, timeout=120, check=False,

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,7 +53,9 @@ print(json.dumps({"told": told, "kilobytes": resource.getrusage(resource.RUSAGE_
 """
 
 
-def run_recorder(path: Path, compression: str, seconds: int, ending: str) -> tuple[int, dict]:
+def run_recorder(
+    path: Path, compression: str, seconds: int, ending: str
+) -> tuple[int, dict[str, Any]]:
     command = [sys.executable, "-c", RECORDER, str(path), compression, str(seconds), ending]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, timeout=600)
     return done.returncode, json.loads(done.stdout or "{}")

@@ -264,7 +264,7 @@ def test_message_that_is_drawn_just_before_its_reader_waits_is_sent() -> None:
     assert asyncio.run(read())
 
 
-class AfterDrawing(deque):
+class AfterDrawing(deque[Any]):
     """Who waits for an event; each comes only after another thread has drawn once."""
 
     def __init__(self, draw: partial[None]) -> None:

@@ -1,6 +1,7 @@
 """Control laws in sessions on the hardware plant, and their comparison as an experiment."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ def test_law_tracks_within_three_resolutions_on_the_plant_that_predicts_the_mach
 
 
 def test_tracking_is_what_its_definition_gives_of_the_recording() -> None:
-    law = {"plant": "hardware", "controller": "adaptive", "duration": 6.0}
+    law: dict[str, Any] = {"plant": "hardware", "controller": "adaptive", "duration": 6.0}
     bench = Bench(seed=2)
     found = tracking_of(bench.session("fine_box", settings=law))
     recording = tc.run("fine_box", seed=2, settings=law)
@@ -75,7 +76,7 @@ def test_sessions_compared_differ_in_their_hands_alone(bench: Bench) -> None:
 
 def test_law_that_learns_suffers_least_from_friction_that_is_not_as_known(bench: Bench) -> None:
     twice = tuple(2.0 * value for value in present(load_robot("rcrt1").hardware).coulomb)
-    settings = {"plant": "hardware", "plant.hardware.coulomb": twice}
+    settings: Any = {"plant": "hardware", "plant.hardware.coulomb": twice}
     known, learned = (
         tracking_of(bench.session("coarse_box", settings={**settings, **LAWS[law]})).rms
         for law in ("friction_compensation", "adaptive")

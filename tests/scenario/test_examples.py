@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -114,7 +115,7 @@ def test_a_block_is_carried_where_the_fingers_hold_it_and_lost_where_they_do_not
 
 def test_blocks_go_from_peg_to_peg_where_hand_hole_and_fingers_let_them(tmp_path: Path) -> None:
     text = run("peg_transfer", tmp_path)
-    rows = [row.split("  ") for row in text.replace("-", "0").splitlines()[1:]]
+    rows: Any = [row.split("  ") for row in text.replace("-", "0").splitlines()[1:]]
     rows = [[float(cell) for cell in row[1:] if cell.strip()] for row in rows]
     assert [row[:2] for row in rows] == [[3, 0], [0, 0], [2, 1], [0, 0]]
     pull = math.sqrt(3.86**2 - (0.05 * 9.81) ** 2)  # of a block of 50 g that slides; µ is 0.5

@@ -312,7 +312,7 @@ def test_other_axis_map_moves_the_slave_along_other_axes() -> None:
     axes = {"['-z', '-x', '+y']": (1, -1.0), "['+x', '+y', '+z']": (0, 1.0),
             "['+y', '+z', '+x']": (2, 1.0), "['-x', '-y', '+z']": (0, -1.0)}  # fmt: skip
     for text, (axis, sign) in axes.items():
-        block = VirtualTime(configure("coarse_box", settings=[*still, f"axes={text}"]))
+        block: Any = VirtualTime(configure("coarse_box", settings=[*still, f"axes={text}"]))
         block.run(block.lead)  # where it starts, all directions have room
         block = block.run(1200)
         command = block["slave_servo_cp"][:, :3] - block["slave_servo_cp"][0, :3]

@@ -90,12 +90,12 @@ def test_a_moved_recording_is_replayed_scored_and_drawn_as_ever_once_the_arms_fo
     looks, score = drawn(present(recording.path)), recording.score()
     assert score.value("touch.presses") == 0  # what is scored needs the arm
     assert len(looks[0]) == len(LINKS)
-    elsewhere = tmp_path / "elsewhere" / "copy"
+    elsewhere: Any = tmp_path / "elsewhere" / "copy"
     shutil.copytree(present(recording.path), elsewhere)
     shutil.rmtree(tmp_path / "mine")
     shutil.rmtree(present(recording.path))
     assert_same_looks(drawn(elsewhere), looks)
-    again = tc.open_recording(elsewhere).score()
+    again: Any = tc.open_recording(elsewhere).score()
     for key in ("touch.presses", "position_error_mm.rms"):
         assert again.value(key) == score.value(key)
     again = tc.replay(elsewhere, out=tmp_path / "again")

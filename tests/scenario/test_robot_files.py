@@ -95,7 +95,7 @@ def test_the_report_draws_the_arm_that_moved_when_its_file_is_gone(tmp_path: Pat
 
 def test_each_of_two_arms_keeps_its_own_file(tmp_path: Path) -> None:
     (tmp_path / "scara.yaml").write_text(TABLE)
-    right = {"right/robot": str(tmp_path / "scara.yaml"), "right/geometry": []}
+    right: Any = {"right/robot": str(tmp_path / "scara.yaml"), "right/geometry": []}
     recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
     before = replayed(present(recording.path)), replayed(present(recording.path), "right/")
     assert before[0].shape[1] != before[1].shape[1]
@@ -106,7 +106,7 @@ def test_each_of_two_arms_keeps_its_own_file(tmp_path: Path) -> None:
 
 
 def test_an_arm_of_a_name_has_no_file_of_the_arm_beside_it(tmp_path: Path) -> None:
-    right = {"right/robot": "puma560", "right/geometry": []}
+    right: Any = {"right/robot": "puma560", "right/geometry": []}
     recording, path = recorded(tmp_path, "arm.urdf", arms=["left", "right"], settings=right)
     assert recorded_files(of_arm(recording.bag, "left").metadata) == {str(path): str(path)}
     assert recorded_files(of_arm(recording.bag, "right").metadata) == {}

@@ -1,5 +1,7 @@
 """Layouts: the bytes of messages, against rosbags' serialiser."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -148,7 +150,7 @@ def padding_of(form: Layout) -> list[int]:
 def test_messages_serialised_by_rclpy_are_understood() -> None:
     # JointState(name=[a, bb], position=[1, 2]) in slave_base at 1 s 2 ns, from rclpy 7.1.6: it ends
     # with eight bytes that belong to no field.
-    positions = bytes.fromhex(
+    positions: Any = bytes.fromhex(
         "0001000001000000020000000b000000736c6176655f62617365000002000000020000006100000003000000"
         "6262000002000000000000000000f03f00000000000000400000000000000000000000007d127402"
     )

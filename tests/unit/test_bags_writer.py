@@ -172,7 +172,9 @@ def test_the_directory_says_what_rosbag2_says(tmp_path: Path, rng: np.random.Gen
     entries = {t["topic_metadata"]["name"]: t for t in about["topics_with_message_count"]}
     assert {name[1:]: t["message_count"] for name, t in entries.items()} == counts
     with Reader(tmp_path / "bag") as reader:
-        by_topic = {c.topic: c for c in reader.connections}
+        by_topic: Any = {c.topic: c for c in reader.connections}
+    pose: Any
+    state: Any
     state, pose = by_topic["/teleop/state"], by_topic["/slave/measured_cp"]
     assert pose.digest == ros_types.type_hash("geometry_msgs/msg/PoseStamped")
     assert pose.ext.offered_qos_profiles[0].reliability is QosReliability.RELIABLE

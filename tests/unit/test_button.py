@@ -138,6 +138,7 @@ def test_a_session_counts_what_its_score_counts() -> None:
     texts = {"world": "button", "world.material": "silicone"}
     session = VirtualTime(configure("palpation", settings=[f"{k}={v}" for k, v in texts.items()]))
     session.run(24_000)
+    stage: Any
     stage, score = session.stages["slave_sim"], tc.run("palpation", settings=texts).score()
     assert score.value("touch.presses") == stage.presses == 5
     stage.reset()

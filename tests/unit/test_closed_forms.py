@@ -156,7 +156,7 @@ def least_singular_value(arm: Robot, joints: Array) -> float:
     return np.linalg.svd(J, compute_uv=False)[:, -1].min()
 
 
-def check_path(arm: Robot, joints: Array) -> IkResult:
+def check_path(arm: Robot, joints: Array) -> IkResult[Any]:
     """Follow a path, then 1.5 s of its end: speeds, limits, and that what can be reached is."""
     tips = arm.fk(joints)
     tips = np.concatenate([tips, np.repeat(tips[-1:], 1500, axis=0)])

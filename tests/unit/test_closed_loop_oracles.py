@@ -186,7 +186,7 @@ def stewart(layout: Layout, height: float) -> Any:
 
 def hybrid(g: Mapping[str, float], heading: str) -> Any:
     """SCARA with six legs on its end, which a wrist keeps from turning or not."""
-    drawn = Mechanism()
+    drawn: Any = Mechanism()
     arm = [drawn.add(0, pinocchio.JointModelRZ(), at(0, 0, g["h1"]))]
     arm.append(drawn.add(arm[0], pinocchio.JointModelRZ(), at(g["l1"], 0, 0)))
     arm.append(drawn.add(arm[1], pinocchio.JointModelPZ(), at(g["l2"], 0, 0)))
@@ -241,7 +241,7 @@ def four_bar(l0: float, l1: float, l2: float, l3: float, a: float, mode: float) 
 
 def hand(g: Mapping[str, float]) -> Any:
     """Fingers of the hand pinned to the object; theta and psi are the motors."""
-    drawn = Mechanism()
+    drawn: Any = Mechanism()
     body, drawn.fingers = drawn.add(0, pinocchio.JointModelFreeFlyer()), []
     thumb = SE3(pinocchio.exp3(g["gamma"] * Y), np.zeros(3))
     places = (at(0, -g["d"], g["h"]), at(0, g["d"], g["h"]), thumb)
@@ -337,7 +337,7 @@ def test_pinned_loops_have_the_counted_mobility_and_the_motors_hold_them(name: s
 
 # -- legs ----------------------------------------------------------------------------------------
 
-SIXTHS = math.pi / 3.0 * np.arange(6)
+SIXTHS: Any = math.pi / 3.0 * np.arange(6)
 HEXAGONS = Layout.circular(0.2, SIXTHS, 0.1, SIXTHS)
 
 

@@ -1,6 +1,7 @@
 """Controls of the console: what a part must be, and what the built-in ones ask of a session."""
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -31,7 +32,7 @@ class Asked:
 
 
 def test_initialize_lets_the_stop_go_and_then_resets_enables_and_homes() -> None:
-    session = Asked()
+    session: Any = Asked()
     answers = CONTROLS.find("Initialize").act(session, "left")
     assert session.pressed == [False]
     assert session.words == [("reset", "left"), ("enable", "left"), ("home", "left")]
@@ -39,13 +40,13 @@ def test_initialize_lets_the_stop_go_and_then_resets_enables_and_homes() -> None
 
 
 def test_an_arm_that_is_coming_to_rest_is_asked_again() -> None:
-    session = Asked(moving=2)
+    session: Any = Asked(moving=2)
     assert commands("enable")(session, "") == [(True, "enable: done")]
     assert len(session.words) == 3
 
 
 def test_buttons_of_the_stylus_are_those_of_the_device() -> None:
-    session = Asked()
+    session: Any = Asked()
     for name in ("mode", "fixture"):
         CONTROLS.find(name).act(session, "")
     assert session.buttons == [("", "mode"), ("", "fixture")]

@@ -314,6 +314,8 @@ TURNED = {
 
 @pytest.mark.parametrize("kind", [name for name in FIXTURES if "mesh" not in name])
 def test_outlines_are_those_of_the_fixtures_with_their_parameters(kind: str) -> None:
+    part: Any
+    values: Any
     part, values, gain = FIXTURES.find(kind), TURNED.get(kind, {}), 0.2
     parameters = part.parameters(**values)
     unit = unit_outline(Look(kind, tuple(values.items())))
@@ -381,7 +383,7 @@ def test_without_an_object_none_is_drawn_and_one_without_a_place_lies_below_the_
     middle = 0.5 * (below.reshape(-1, 3).min(axis=0) + below.reshape(-1, 3).max(axis=0))
     np.testing.assert_allclose(middle, tip - [0.0, 0.0, 0.03], atol=1e-6)
     assert not len(object_outline({"kind": "not installed here"}, robot))
-    foreign = {"kind": "sphere", "elsewhere.radius": 0.1, "sphere.radius": 0.01}
+    foreign: dict[str, Any] = {"kind": "sphere", "elsewhere.radius": 0.1, "sphere.radius": 0.01}
     assert len(object_outline(foreign, robot))
 
 

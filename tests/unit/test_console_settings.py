@@ -55,7 +55,7 @@ def test_a_setting_text_is_read_by_the_session_as_the_value(
 
 
 def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back() -> None:
-    desk = Desk()
+    desk: Any = Desk()
     desk.known = {
         MODE: ParameterInfo(*MODE, "coarse", choices=("coarse", "fine")),
         GAIN: ParameterInfo(*GAIN, 0.1),

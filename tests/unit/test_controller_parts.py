@@ -192,6 +192,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_law_that_cannot_work_is_refused_before_anything_runs(own_parts: None, case: str) -> None:
+    values: Any
     values, expected = BAD[case]
     with pytest.raises(PartError) as error:
         register_controller(own(**values))

@@ -44,7 +44,7 @@ class Session:
             while self._looks * 0.01 <= len(self.rows) * DT:
                 self.pilot.step(reading, 0.01)
                 self._looks += 1
-            times = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
+            times: Any = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
             self.rows = np.vstack((self.rows, self.hand.motion(times)))
         return self.rows
 
@@ -140,7 +140,7 @@ def test_virtual_time_refuses_a_device_and_says_who_works(name: str) -> None:
 def test_no_device_is_told_in_one_line_that_lists_what_was_found(name: str) -> None:
     pytest.importorskip("pygame" if name == "gamepad" else "hid")
     operator = OPERATORS.find(name)
-    parameters = operator.parameters(device="no such thing")
+    parameters: Any = operator.parameters(device="no such thing")
     with pytest.raises(SessionError, match=r"^no .*'no such thing' in its name; found: [^\n]+$"):
         operator.opens(parameters)
 

@@ -221,7 +221,7 @@ def by_name(name: str) -> Exercise:
 
 NUMBERS = Numbers.of(api.configuration("free_motion"))
 ROBOT = NUMBERS.robot
-BEGIN = 1_500 * MS
+BEGIN: Any = 1_500 * MS
 
 
 def seen(

@@ -331,6 +331,7 @@ OPEN = {
 def test_walls_are_drawn_where_there_are_some_and_nowhere_else(
     recipe: Recipe, path: Path, kind: str, gain: float
 ) -> None:
+    values: Any
     values, walls = OPEN[kind]
     told = {"fixture": kind} | {f"fixture.{name}": repr(value) for name, value in values.items()}
     recipe.singles = [fixture_on(told, gain, at=200)]

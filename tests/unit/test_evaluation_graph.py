@@ -2,6 +2,7 @@
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -70,7 +71,7 @@ def _smoother(own_parts: None) -> None:
 def test_stage_of_a_user_has_its_own_latency(recipe: Recipe, path: Path) -> None:
     latency = evaluate(recipe.write(path)).latency_ms
     assert list(latency) == [*BUILT_IN[:2], "smoother", *BUILT_IN[2:4], "total"]
-    medians = [delay.median for delay in latency.values()]
+    medians: Any = [delay.median for delay in latency.values()]
     assert np.allclose(medians, [0.1, 0.1, 0.1, 0.1, 0.1, 0.5])
 
 

@@ -303,7 +303,7 @@ def test_another_robot_is_not_held_against_the_published_figures() -> None:
 
 def test_envelope_of_ten_minutes_is_the_recording() -> None:
     times = np.arange(600_000) * MS
-    values = np.random.default_rng(8).normal(size=(600_000, 2)).astype(np.float32)
+    values: Any = np.random.default_rng(8).normal(size=(600_000, 2)).astype(np.float32)
     envelope = Envelope(0, int(times[-1]), 2)
     for part in np.array_split(np.arange(600_000), 9):
         envelope.add(times[part], values[part])

@@ -1,5 +1,7 @@
 """Experiments: what the sources printed comes out, misprints do not, sessions run once."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.signal import dlti, dstep
@@ -107,7 +109,7 @@ def test_own_experiment_is_run_by_its_name() -> None:
 
 # -- bench -----------------------------------------------------------------------------------------
 
-SHORT = {"duration": 3.0, "approach_time": 0.5, "buttons.fixture": (0.6,)}
+SHORT: dict[str, Any] = {"duration": 3.0, "approach_time": 0.5, "buttons.fixture": (0.6,)}
 
 
 def test_bench_runs_the_same_session_once_and_another_seed_or_setting_anew() -> None:

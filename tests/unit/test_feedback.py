@@ -98,7 +98,7 @@ def test_it_goes_on_by_itself_once_it_speaks_again_before_that_is_a_fault() -> N
 
 
 def test_a_longer_silence_of_the_arm_is_a_fault_whose_setpoint_stands_still() -> None:
-    led = following(**{"operation.longest_silence": 0.5})
+    led: Any = following(**{"operation.longest_silence": 0.5})
     for _ in range(500):
         led.tick(speaks=False, follows=True)
     assert led.state is State.ENABLED

@@ -35,10 +35,10 @@ def own(name: str = "own", **more: Callable[..., object] | type[object] | None) 
 
 
 @given(places, st.floats(1e-3, 0.1))
-def test_depth_of_a_sphere_leads_to_its_nearest_point(offset: Array, diameter: float) -> None:
+def test_depth_of_a_sphere_leads_to_its_nearest_point(offset: Any, diameter: float) -> None:
     out = np.full(3, math.nan)
     length = sphere_depth(offset, np.array([diameter]), out)
-    distance = np.linalg.norm(offset)
+    distance: Any = np.linalg.norm(offset)
     assert math.isclose(length, max(distance - 0.5 * diameter, 0.0), abs_tol=ROUNDING)
     nearest = offset * min(1.0, 0.5 * diameter / distance) if distance else offset
     assert np.allclose(offset - out, nearest, rtol=0, atol=ROUNDING)
@@ -127,6 +127,7 @@ BAD = {
 def test_fixture_that_cannot_work_is_refused_before_anything_runs(
     own_parts: None, case: str
 ) -> None:
+    values: Any
     values, expected = BAD[case]
     with pytest.raises(PartError) as error:
         register_fixture(own(**values))

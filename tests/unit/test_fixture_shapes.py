@@ -68,7 +68,7 @@ def test_every_fixture_there_is_is_tried_here() -> None:
 def test_way_is_as_long_as_the_depth_and_leads_from_a_place_that_is_allowed(
     name: str, data: Any
 ) -> None:
-    parameters = data.draw(KINDS[name])
+    parameters: Any = data.draw(KINDS[name])
     offset = a_place(data, parameters)
     depth, way = found(name, parameters, offset)
     assert depth >= 0.0
@@ -88,7 +88,7 @@ def step_of(p: PathParameters) -> float:
 @pytest.mark.parametrize("name", [name for name in KINDS if name not in THIN])
 @given(st.data())
 def test_no_place_that_is_allowed_is_nearer_than_the_depth(name: str, data: Any) -> None:
-    parameters = data.draw(KINDS[name])
+    parameters: Any = data.draw(KINDS[name])
     offset = a_place(data, parameters)
     depth, _ = found(name, parameters, offset)
     assume(depth > SHALLOW)
@@ -129,6 +129,7 @@ def test_depth_changes_by_no_more_than_one_moves(name: str, data: st.DataObject)
 @pytest.mark.parametrize("name", KINDS)
 @given(st.data())
 def test_outline_is_drawn_where_the_wall_is(name: str, data: Any) -> None:
+    parameters: Any
     part, parameters = FIXTURES.find(name), data.draw(KINDS[name])
     points = part.outline(parameters)
     points = points[np.isfinite(points).all(axis=1)]
@@ -246,7 +247,7 @@ def digest() -> str:
     """Digest of depths and ways of all kinds at forty places."""
     seen = hashlib.sha256()
     for name in KINDS:
-        part = FIXTURES.find(name)
+        part: Any = FIXTURES.find(name)
         shape, out = numbers_of(part.parameters(**OBLIQUE.get(name, {}))), np.empty(3)
         for offset in np.random.default_rng(2).uniform(-0.06, 0.06, (40, 3)):
             seen.update(np.float64(part.depth(offset, shape, out)).tobytes() + out.tobytes())

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -203,9 +204,9 @@ def test_the_lines_of_all_parts_are_drawn_where_they_are(name: str, data: st.Dat
     numbers, parts = data.draw(combined(name))
     texts = tuple(text_of(part.kind, part.given, part.at.tolist()) for part in parts)
     part = FIXTURES.find(name)
-    points = part.outline(part.parameters(parts=texts))
+    points: Any = part.outline(part.parameters(parts=texts))
     points = points[np.isfinite(points).all(axis=1)]
-    wanted = [FIXTURES.find(p.kind).outline(p.given) + p.at for p in parts]
+    wanted: Any = [FIXTURES.find(p.kind).outline(p.given) + p.at for p in parts]
     wanted = np.concatenate(wanted)
     np.testing.assert_allclose(points, wanted[np.isfinite(wanted).all(axis=1)])
     assert len(numbers)

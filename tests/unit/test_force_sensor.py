@@ -66,7 +66,7 @@ def test_noise_is_the_same_for_one_seed_and_another_for_another() -> None:
 
 def test_noise_does_not_depend_on_how_many_ticks_are_made_at_once() -> None:
     texts = ["force_noise=0.1", "operator=line", "duration=1.0"]
-    blocks = []
+    blocks: Any = []
     for counts in ((1500,), (1, 700, 799)):
         session = VirtualTime(configure("free_motion", settings=texts))
         parts = [session.run(count)["slave_measured_cf"].copy() for count in counts]

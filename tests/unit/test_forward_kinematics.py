@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,7 +54,7 @@ def legal(robot: Robot, count: int, seed: int, share: float = 1.0) -> Array:
 def test_a_robot_without_loops_closes_exactly_everywhere(name: str) -> None:
     robot = load_robot(name)
     q = legal(robot, 20, 1)
-    answer = robot.solve_fk(q)
+    answer: Any = robot.solve_fk(q)
     assert (answer.status == FkStatus.CLOSED).all()
     assert (answer.residual == 0.0).all()
     assert (answer.mode == 0).all()
@@ -76,7 +77,7 @@ def test_home_is_closed_in_the_mode_of_home_and_first_of_all_assemblies(name: st
 def test_no_pose_of_fk_leaves_a_loop_open(name: str) -> None:
     robot = load_robot(name)
     q = legal(robot, 400, 2)
-    is_closed = robot.solve_fk(q).status < FkStatus.NOT_CLOSED
+    is_closed: Any = robot.solve_fk(q).status < FkStatus.NOT_CLOSED
     assert is_closed.sum() > 100
     for legs in q[is_closed]:
         assert TORN[name](robot.fk(legs), legs) <= CLOSED
@@ -92,9 +93,9 @@ def test_the_residual_is_the_error_of_the_loops_whatever_the_status(name: str) -
     robot = load_robot(name)
     q = legal(robot, 300, 3)
     for k, search in enumerate((True, False)):
-        answer = robot.solve_fk(q, search=search)
+        answer: Any = robot.solve_fk(q, search=search)
         torn = np.array([TORN[name](T, legs) for T, legs in zip(answer.T, q, strict=True)])
-        is_closed = answer.status < FkStatus.NOT_CLOSED
+        is_closed: Any = answer.status < FkStatus.NOT_CLOSED
         assert (torn[is_closed] <= CLOSED).all()
         assert (answer.residual[is_closed] <= CLOSED).all()
         assert (answer.residual[~is_closed] > CLOSED).all()
@@ -116,7 +117,7 @@ def test_the_triple_that_had_no_assembly_next_to_home_has_one() -> None:
 
 def test_every_legal_triple_of_the_3_rps_has_an_assembly_and_fk_finds_it() -> None:
     robot = load_robot("rps3")
-    answer = robot.solve_fk(legal(robot, 4000, 4))
+    answer: Any = robot.solve_fk(legal(robot, 4000, 4))
     assert (answer.status <= FkStatus.OTHER_MODE).all()
     assert 0.4 < (answer.status == FkStatus.OTHER_MODE).mean() < 0.6
 
@@ -141,12 +142,12 @@ def test_legs_of_a_real_pose_always_assemble() -> None:
     q = np.array([robot.ik_all(T)[0] for T in poses])
     is_legal = ((q >= robot.lower) & (q <= robot.upper)).all(axis=1)
     q, poses = q[is_legal], poses[is_legal]
-    answer = robot.solve_fk(q)
+    answer: Any = robot.solve_fk(q)
     assert is_legal.sum() > 300
     assert (answer.status < FkStatus.NOT_CLOSED).all()
     assert (answer.status == FkStatus.OTHER_MODE).any()
     # From its own pose as the seed, each is the pose itself.
-    own = robot.solve_fk(q, poses)
+    own: Any = robot.solve_fk(q, poses)
     assert (own.status <= FkStatus.NEAR_SINGULAR).all()
     assert np.allclose(own.T, poses, atol=SAME)
 

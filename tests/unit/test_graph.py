@@ -246,6 +246,7 @@ BAD_STAGES = {
 
 @pytest.mark.parametrize("case", BAD_STAGES)
 def test_stage_that_contradicts_itself_is_refused(case: str) -> None:
+    values: Any
     values, expected = BAD_STAGES[case]
     with pytest.raises(PartError) as error:
         stage(**values)

@@ -49,7 +49,7 @@ def rest(*without: str, **settings: Any) -> Any:
 def test_without_any_fault_the_hardware_is_the_ideal_plant_without_friction() -> None:
     none = slave(**{"plant.hardware.without": tuple(FAULTS)})
     ideal = slave("ideal", coulomb=(0.0,) * 6)
-    rests = [Mover(parameters).move(TARGET) for parameters in (none, ideal)]
+    rests: Any = [Mover(parameters).move(TARGET) for parameters in (none, ideal)]
     assert np.array_equal(*rests)
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -166,7 +167,7 @@ def test_no_motion_gains_energy_from_a_field(friction: float, folder: Path) -> N
 def test_a_recording_replays_to_the_bit_when_its_file_is_gone(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "ball.csv"
     path.write_bytes((folder / "ball.csv").read_bytes())
-    settings = {"world": "height_field", "world.height_field.file": str(path),
+    settings: Any = {"world": "height_field", "world.height_field.file": str(path),
                 "world.place": [0.241, -0.236, -0.077]}  # fmt: skip
     recording = tc.run("palpation", duration=8.0, out=tmp_path / "bag", settings=settings)
     before = recording["slave/true_cf"].values

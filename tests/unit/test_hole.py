@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import coal
 import numpy as np
@@ -157,7 +158,12 @@ def test_a_hole_that_is_none_is_refused(texts: list[str], expected: str) -> None
 
 def test_the_page_draws_its_edges() -> None:
     robot = load_robot("rcrt1")
-    values = {"kind": "hole", "place": (0.3, 0.0, 0.0), "hole.axis": TILTED, "tool_points": 5}
+    values: dict[str, Any] = {
+        "kind": "hole",
+        "place": (0.3, 0.0, 0.0),
+        "hole.axis": TILTED,
+        "tool_points": 5,
+    }
     drawn = object_outline(values, robot)
     assert len(drawn) == 5 * 40
     points = hole_outline(HoleParameters(axis=TILTED))

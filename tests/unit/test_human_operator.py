@@ -143,6 +143,7 @@ def test_hand_without_room_holds_still_but_for_its_tremor() -> None:
 
 
 def test_tremor_has_its_size_in_its_band_and_a_spectrum_that_falls_off_smoothly_beside_it() -> None:
+    density: Any
     times, density, size = np.arange(0.0, 100.0, 1e-3), 0.0, 0.0
     for seed in range(20):
         shaking = tremor(63e-6, np.random.default_rng(seed))(times)

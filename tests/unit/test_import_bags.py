@@ -217,7 +217,7 @@ def test_rows_are_those_of_the_rosbags_library(tmp_path: Path) -> None:
     expected = []
     with AnyReader([path], default_typestore=types_of(True)) as reader:
         for connection, log_ns, data in reader.messages():
-            message = reader.deserialize(data, connection.msgtype)
+            message: Any = reader.deserialize(data, connection.msgtype)
             p, q = message.pose.pose.position, message.pose.pose.orientation
             expected.append((log_ns, p.x, p.y, p.z, q.w, q.x, q.y, q.z))
     _, stream = imported(path, tmp_path, stamps="log")
@@ -398,7 +398,7 @@ def test_both_masters_of_the_da_vinci_kit_and_its_pedal_are_two_arms(
     tmp_path: Path, is_ros2: bool
 ) -> None:
     maker = Maker(is_ros2)
-    messages = []
+    messages: Any = []
     for i, (stamp, log) in enumerate(zip(STAMPS, LOGS, strict=True)):
         for arm in ("MTML", "MTMR", "PSM1"):
             messages.append((f"/{arm}/measured_cp", log, maker.pose(i, "PoseStamped", stamp)))

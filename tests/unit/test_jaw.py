@@ -679,7 +679,10 @@ JAWS = ("servo_jp", "setpoint_js", "measured_js", "grip", "object_cp", "board")
 
 
 def test_a_recorded_jaw_is_replayed_to_the_same_bits(tmp_path: Path) -> None:
-    settings = {"jaw_sim.object.friction": 0.05, "operator.buttons.jaw": [5.3, 12.9]}  # it slides
+    settings: dict[str, Any] = {
+        "jaw_sim.object.friction": 0.05,
+        "operator.buttons.jaw": [5.3, 12.9],
+    }  # it slides
     first = tc.run("pick", duration=8.0, settings=settings).save(tmp_path / "bag")
     again = tc.replay(tmp_path / "bag")
     for name in ("hand/jaw", "slave/measured_js", *(f"slave/jaw/{name}" for name in JAWS)):

@@ -146,7 +146,7 @@ def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions(
 
     def work() -> None:
         row = np.zeros(2)
-        total = call_with_row(function, row, 2_000)
+        total: Any = call_with_row(function, row, 2_000)
         try:
             raise_pending()
         except ValueError as error:

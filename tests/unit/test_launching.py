@@ -4,6 +4,7 @@ import runpy
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import pytest
 import yaml
@@ -83,6 +84,9 @@ def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(
 ) -> None:
     # Stand-ins for launch and launch_ros, which PyPI does not have, as far as they are used.
     declared, started = {}, []
+    launch: Any
+    actions: Any
+    ros: Any
     launch, actions, ros = ModuleType("launch"), ModuleType("launch.actions"), ModuleType("ros")
     launch.LaunchDescription = list
     actions.DeclareLaunchArgument = lambda name, default_value, description: declared.update(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio
@@ -17,7 +18,7 @@ from teleop_core.robots.visuals import mesh_file
 
 TEXT = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text(encoding="utf-8")
 CORNERS = np.array([(0, 0, 0), (30, 0, 0), (0, 20, 0), (0, 0, 10)], np.float64)  # mm
-FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+FACES: Any = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
 LINKS = ("base", "column", "upper_arm", "forearm", "wrist_1", "wrist_2", "flange", "camera")
 
 

@@ -81,6 +81,7 @@ def test_a_force_is_given_along_the_axes_of_the_device_and_never_above_its_bound
     stage.hear(pose(), NOW_NS, NOW_NS)
     for asked in ([1.0, 0.0, 0.0], [0.5, -1.0, 2.0], [30.0, 0.0, -40.0]):
         stage.signals["master_servo_cf"][:3] = asked
+        expected: Any
         given_force, expected = stage.force(0.01, NOW_NS), 0.5 * ROWS.T @ asked
         expected *= min(1.0, 2.0 / np.linalg.norm(expected))
         assert np.allclose(given_force, expected, rtol=0, atol=1e-15)

@@ -49,7 +49,7 @@ def joint_path(robot: Robot, start: Array, end: Array, samples: int = 2000) -> t
     return robot.fk(start + share[:, None] * (end - start)), start
 
 
-def assert_path_is_safe(robot: Robot, seed: Array, result: IkResult) -> None:
+def assert_path_is_safe(robot: Robot, seed: Array, result: IkResult[Any]) -> None:
     """Joint speeds inside the drives' limits, joints inside theirs, all finite."""
     steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
     assert (steps <= present(robot.drives).speed_limit * DT + 1e-15).all()

@@ -431,7 +431,7 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(
     bench.slave.reset()
     path.append(bench.run(3))
     for name, numbers, ticks in commands:
-        wild = np.array(numbers)
+        wild: Any = np.array(numbers)
         now_ns, motion = bench.now_ns, bench.motion
         if name == "stream":
             path.append(bench.follow(bench.setpoint + 0.02 * wild)[None])

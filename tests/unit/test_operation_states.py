@@ -1,6 +1,7 @@
 """Operating states: one table, every state with every event, and what only a reset ends."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -289,7 +290,7 @@ def test_a_silent_heartbeat_is_a_stop() -> None:
 
 def test_a_script_commands_at_its_times() -> None:
     arm = Arm(seconds=0.5, events=("pause@0.2", "resume@0.4", "stop@0.45"))
-    still = ~arm.steps.any(axis=1)
+    still: Any = ~arm.steps.any(axis=1)
     assert still[240:398].all()
     assert not still[100:195].any()
     assert arm.state is F

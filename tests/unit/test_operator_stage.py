@@ -1,6 +1,7 @@
 """Operator as a stage: what it sees, what the device does without it, and a replay of the hand."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,7 +120,12 @@ def test_an_operator_sees_the_slave_as_late_as_the_link_says(delay: int) -> None
     assert np.ptp(told[:, 0]) > 1e-3
 
 
-SESSION = {"duration": 1.5, "seed": 4, "buttons.fixture": [0.3], "operator": "human"}
+SESSION: dict[str, Any] = {
+    "duration": 1.5,
+    "seed": 4,
+    "buttons.fixture": [0.3],
+    "operator": "human",
+}
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from teleop_core.kernels.geometry import Array
 
 # Products of numbers below one.
 ROUNDING = 1e-15
-TICK = 1e-3
+TICK: Any = 1e-3
 CENTER, SIZE, TILT = (0.01, -0.02, 0.03), (0.03, 0.02, 0.04), (-0.5, 0.1, 0.2)
 POINTS = (0.01, 0.0, 0.0, 0.01, 0.02, 0.0, -0.01, 0.02, 0.03)
 TIMES = np.arange(0.0, 60.0, 0.01)
@@ -101,7 +101,7 @@ def test_seed_decides_the_path() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_path_does_not_depend_on_how_it_is_sampled(kind: str) -> None:
-    times = np.arange(1, 3001) * TICK
+    times: Any = np.arange(1, 3001) * TICK
     whole = path_of(kind)(times)
     path = path_of(kind)
     for start, stop in ((0, 1), (1, 8), (8, 1000), (1000, 3000)):
@@ -318,6 +318,7 @@ BAD_MOTIONS = {
 def test_operator_who_answers_wrongly_is_refused_before_the_first_tick(
     own_parts: None, case: str
 ) -> None:
+    motion: Any
     motion, expected = BAD_MOTIONS[case]
     register_operator("mine", motion)
     master = master_of("mine")

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -375,7 +376,7 @@ def test_batch_with_one_seed_or_one_for_each_equals_single_answers() -> None:
 
 
 def test_empty_batch_has_empty_answers() -> None:
-    answer = ARM.ik(np.empty((0, 4, 4)))
+    answer: Any = ARM.ik(np.empty((0, 4, 4)))
     assert answer.q.shape == (0, 6)
     assert answer.status.shape == (0,)
     assert ARM.fk(np.empty((0, 6))).shape == (0, 4, 4)

@@ -179,11 +179,14 @@ def symbolic_lagrangian() -> Callable[..., object]:
     return sympy.lambdify((q, dq), (D, h, c), "numpy", cse=True)
 
 
-LAGRANGIAN = symbolic_lagrangian()
+LAGRANGIAN: Any = symbolic_lagrangian()
 
 
 @given(states)
 def test_closed_form_is_the_lagrangian_of_three_rigid_bodies(state: Any) -> None:
+    D: Any
+    h: Any
+    c: Any
     D, h, c = LAGRANGIAN(state[:3], state[3:6])
     joints, speed = np.array([*state[:3], 0.0, 0.0, 0.0]), np.array([*state[3:6], 0.0, 0.0, 0.0])
     inertia, velocity, gravity = np.empty((3, 3)), np.empty(3), np.empty(6)
@@ -222,6 +225,7 @@ def test_free_motion_keeps_energy_and_the_momentum_of_axis_1() -> None:
         return np.concatenate((y[3:], ours([*y, 0.0, 0.0, 0.0])))
 
     def conserved(y: Array) -> tuple[float, float]:
+        D: Any
         D, _, _ = LAGRANGIAN(y[:3], y[3:])
         height = TABLE[1][0] * potential_height(y[1], TABLE[1][1])
         height += TABLE[2][0] * potential_height(y[1], np.add(TABLE[2][1], (0, 0, y[2])))

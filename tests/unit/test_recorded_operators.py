@@ -164,7 +164,7 @@ def test_a_session_lasts_as_long_as_what_it_follows_unless_told(
     given: Any, seconds: float, tmp_path: Path
 ) -> None:
     path = bag(tmp_path / "bag")
-    settings = {"operator.center": CENTER, "operator.approach_time": 3.0}
+    settings: dict[str, Any] = {"operator.center": CENTER, "operator.approach_time": 3.0}
     if duration := given.pop("duration", None):
         settings["teleop.duration"] = duration
     made = tc.configuration(operator=path, settings=settings, **given)
@@ -248,7 +248,7 @@ def test_a_missing_recording_is_told_before_anything_runs(tmp_path: Path) -> Non
 
 def test_hand_follows_a_recording_of_others_to_its_end(tmp_path: Path) -> None:
     path = bag(tmp_path / "bag")
-    options = {"operator.center": (0.0, 0.0, 0.03), "operator.approach_time": 1.0}
+    options: dict[str, Any] = {"operator.center": (0.0, 0.0, 0.03), "operator.approach_time": 1.0}
     recording = tc.run(operator=path, settings=options, tremor_amplitude=0.0)
     master = recording["master/measured_cp"]
     rows = np.searchsorted(master.time, master.time[-1] - 2.0 + T)

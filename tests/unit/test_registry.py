@@ -17,7 +17,7 @@ from teleop_core.slave.controllers import CONTROLLERS
 BUILT_IN = {"here": "teleop_core.graph.topics:ALL", "json": "json:loads"}
 
 
-def registry(trial: Callable[[object], None] | None = None, **builtin: Any) -> Registry:
+def registry(trial: Callable[[object], None] | None = None, **builtin: Any) -> Registry[Any]:
     return Registry("part", "parts_of_nobody", {**BUILT_IN, **builtin}, check, trial)
 
 
@@ -133,7 +133,7 @@ def test_installed_part_that_takes_a_built_in_name_is_refused(
     ("parts", "name"),
     [(FIXTURES, "box"), (CONTROLLERS, "pid"), (OPERATORS, "line"), (STAGES, "slave_sim")],
 )
-def test_name_of_a_built_in_part_is_taken_on_every_seam(parts: Registry, name: str) -> None:
+def test_name_of_a_built_in_part_is_taken_on_every_seam(parts: Registry[Any], name: str) -> None:
     other = next(parts.find(found) for found in parts if found != name)
     with pytest.raises(PartError) as error:
         parts.add(name, other)
@@ -141,13 +141,13 @@ def test_name_of_a_built_in_part_is_taken_on_every_seam(parts: Registry, name: s
 
 
 @pytest.mark.parametrize("parts", [FIXTURES, CONTROLLERS, OPERATORS, STAGES])
-def test_object_that_is_no_such_part_is_refused_on_every_seam(parts: Registry) -> None:
+def test_object_that_is_no_such_part_is_refused_on_every_seam(parts: Registry[Any]) -> None:
     with pytest.raises(PartError, match="int") as error:
         parts.add("mine", 5)
     assert (error.value.kind, error.value.name) == (parts.kind, "mine")
 
 
 @pytest.mark.parametrize("parts", [FIXTURES, CONTROLLERS, OPERATORS, STAGES])
-def test_every_built_in_part_is_one(parts: Registry) -> None:
+def test_every_built_in_part_is_one(parts: Registry[Any]) -> None:
     for name in parts:
         assert parts.find(name) is parts.find(name)

@@ -52,7 +52,7 @@ class Run:
                     self.hand.want(given)
                     self.last = self.time
                 due = self.time + period
-            times = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
+            times: Any = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
             self.rows = np.vstack((self.rows, self.hand.motion(times)))
         return self.rows
 
@@ -131,9 +131,9 @@ def test_the_stylus_never_goes_beyond_a_place_that_it_is_sent_to(
 def test_the_bounds_are_such_that_every_sample_is_plausible() -> None:
     upper = {spec.name: spec.upper for spec in specs(RemoteParameters)}
     hand = PlausibilityParameters()
-    assert upper["speed"] < hand.speed
-    assert upper["acceleration"] < hand.acceleration
-    assert upper["turn_speed"] < hand.turn
+    assert present(upper["speed"]) < hand.speed
+    assert present(upper["acceleration"]) < hand.acceleration
+    assert present(upper["turn_speed"]) < hand.turn
 
 
 @given(place)
@@ -315,7 +315,7 @@ def test_the_operator_gives_the_hand_within_the_workspace_of_its_device() -> Non
     assert master.ahead == AHEAD
     hand, device = master.hand, master._fixed.device
     assert isinstance(hand, RemoteHand)
-    times = np.arange(1, 5) * DT
+    times: Any = np.arange(1, 5) * DT
     for k in range(500):
         hand.want(pose([5.0 * (k > 0), 0.0, 0.0]))
         hand.motion(times + 4 * k * DT)

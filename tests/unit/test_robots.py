@@ -110,7 +110,7 @@ def test_no_kernel_is_compiled_a_second_time_for_arrays_that_cannot_be_written(n
 
 # Robots by name, by file, by hand.
 
-TABLE = {
+TABLE: Any = {
     "name": "my_arm",
     "convention": "modified",
     "angles": "degrees",

@@ -1,6 +1,7 @@
 """Runner: what a session in virtual time records, and under which stamps."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ def test_arms_that_begin_farther_away_are_waited_for_before_the_recorded_hand_mo
     again = api.replay(at_home)
     for topic in ("slave/setpoint_js", "slave/measured_cp"):
         assert np.array_equal(again[topic].values, at_home[topic].values)
-    elsewhere = {"slave.start": [], "slave.starts_at_home": False}
+    elsewhere: dict[str, Any] = {"slave.start": [], "slave.starts_at_home": False}
     later = api.replay(at_home, settings=elsewhere)
     state, first_ns = at_home["teleop/state"], int(at_home["master/measured_cp"].stamp_ns[0])
     follows_ns = int(state.stamp_ns[np.argmax(state["is_following"] > 0.0)])

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ EXAMPLE_LEGS = [0.223607, 0.267095, 0.267095, 0.223607, 0.191569, 0.191569]
 
 def assert_path_is_followed_within_the_drives(
     robot: Robot, path: Array, seed: Array, dt: float = 1e-3
-) -> IkResult:
+) -> IkResult[Any]:
     result = robot.follow(path, seed=seed, dt=dt)
     steps = np.abs(np.diff(np.vstack((seed, result.q)), axis=0))
     assert (steps <= present(robot.drives).speed_limit * dt * (1.0 + 1e-9)).all()

@@ -566,7 +566,7 @@ def test_gains_of_another_length_than_the_joints_are_refused(name: str) -> None:
 
 
 def test_refused_retuning_changes_nothing() -> None:
-    bench = Bench()
+    bench: Any = Bench()
     before, gains = bench.slave.simulated.parameters.copy(), bench.slave.simulated.arm.gains.copy()
     wrong = ArmParameters(viscous=(1.0,) * 6, controller=pid(kp=(1.0,) * 5))
     with pytest.raises(ParameterError):

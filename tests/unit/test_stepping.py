@@ -1,5 +1,7 @@
 """Stepping: a session that a program makes tick by tick, and begins again."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ import teleop_core as tc
 from present import present
 from teleop_core.slave.operation import State
 
-KINDS = {
+KINDS: Any = {
     "coarse": {},
     "delayed": {"delays": ["slave/servo_jp=0.02", "master/servo_cf=0.005"], "fixture": "box"},
     "hardware": {"plant": "hardware", "operator": "human"},
@@ -42,7 +44,7 @@ def test_a_session_that_is_begun_again_repeats_itself_to_the_bit(kind: str) -> N
 
 
 def test_what_a_program_says_between_two_steps_holds_from_the_next_one_on() -> None:
-    own = tc.VirtualTime(tc.configuration("coarse_box", starts_at_home=True))
+    own: Any = tc.VirtualTime(tc.configuration("coarse_box", starts_at_home=True))
     own.run(8000)
     moving = own.step()
     assert np.abs(own.step()["slave_setpoint_js"] - moving["slave_setpoint_js"]).max() > 1e-6

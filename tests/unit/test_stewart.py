@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,7 +133,7 @@ def test_a_pose_on_a_singularity_is_named() -> None:
 def test_robot_legs_and_poses_are_inverse_to_each_other() -> None:
     robot, rng = load_robot("stewart"), np.random.default_rng(5)
     wanted = np.array(list(poses(rng, 200)))
-    result = robot.ik(wanted)
+    result: Any = robot.ik(wanted)
     assert (result.status == IkStatus.FOLLOWED).all()
     assert np.allclose(robot.fk(result.q), wanted, atol=SOLVED)
     assert np.allclose(robot.ik_all(wanted[0]), result.q[:1], atol=1e-15)

@@ -1,5 +1,7 @@
 """Scenarios of touch: ``wall`` and ``contour`` from approach to retreat, by force and by score."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -37,7 +39,7 @@ def test_the_tip_approaches_slides_in_one_touch_and_retreats(
     session: tuple[str, tc.Recording, Array, Array],
 ) -> None:
     name, _, force, place = session
-    is_touching = force.any(axis=1)
+    is_touching: Any = force.any(axis=1)
     begin, end = np.flatnonzero(is_touching)[[0, -1]]
     assert is_touching[begin : end + 1].all()
     assert 4000 < begin < end < len(force) - 1000

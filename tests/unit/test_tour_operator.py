@@ -73,7 +73,7 @@ def motion(
     )  # fmt: skip
     part = OPERATORS.find("tour")
     phases = np.random.default_rng(1).uniform(0.0, 6.0, PHASES)
-    setting = Setting(common=common, phases=phases, seed=1)
+    setting: Any = Setting(common=common, phases=phases, seed=1)
     return part.make(common.kind.parameters, setting), part.length(common.kind.parameters, setting)
 
 

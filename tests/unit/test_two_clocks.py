@@ -56,7 +56,7 @@ def test_the_age_that_is_scored_is_the_true_one_whatever_the_slaves_clock_says(
     tmp_path: Path,
 ) -> None:
     given: dict[str, Any] = {"stages": "network", "duration": 5.0, "preset": "own"}
-    found = []
+    found: Any = []
     for name, clock in (("one", {}), ("two", {"clock_offset": 0.5, "clock_drift": 100.0})):
         settings = {f"network.{key}": value for key, value in clock.items()}
         settings |= {"network.there.least_delay": 0.03, "network.back.least_delay": 0.2}
