@@ -1,6 +1,6 @@
 """Link to a live session: what the page sees is what is recorded, what it asks for happens."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+def live(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A session behind a page, its link, and where it is recorded."""
     out = tmp_path_factory.mktemp("console") / "bag"
     texts = ["operator=remote", "teleop.duration=3600.0", "operator.patience=0.0", CALM]

@@ -130,6 +130,7 @@ def test_depth_changes_by_no_more_than_one_moves(name: str, data: st.DataObject)
 @given(st.data())
 def test_outline_is_drawn_where_the_wall_is(name: str, data: Any) -> None:
     parameters: Any
+    parameters: Any
     part, parameters = FIXTURES.find(name), data.draw(KINDS[name])
     points = part.outline(parameters)
     points = points[np.isfinite(points).all(axis=1)]
@@ -231,7 +232,7 @@ print(digest())
 """
 
 
-OBLIQUE = {
+OBLIQUE: Any = {
     "cylinder": {"direction": (0.3, 0.7, -0.5)},
     "half_space": {"normal": (-0.2, 0.9, 0.3)},
     "cone": {"axis": (0.1, 0.9, 0.2)},

@@ -30,9 +30,7 @@ def joy(*pressed: int) -> Any:
         ((1, 1), (-1, -1, -1), [0, 0, 0]),
     ],
 )
-def test_a_map_says_which_button_is_what(
-    pressed: tuple[int, ...], places: Any, expected: list[int]
-) -> None:
+def test_a_map_says_which_button_is_what(pressed: Any, places: Any, expected: list[int]) -> None:
     stamp_ns, values = read_values(Kind.BUTTONS, joy(*pressed), buttons=places)
     assert stamp_ns == 1_000_000_002
     assert np.array_equal(values, expected)

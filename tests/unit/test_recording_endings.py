@@ -23,7 +23,7 @@ SECONDS = 4
 MS = 1_000_000
 
 
-def second(number: int) -> dict[str, Any]:
+def second(number: int) -> Any:
     times = np.arange(number * 1000, (number + 1) * 1000) * MS
     values = np.random.default_rng(number).normal(size=(1000, TOPIC.width(6)))
     return {TOPIC: (times, values, times)}

@@ -72,6 +72,7 @@ def test_finger_is_the_chain_of_its_denavit_hartenberg_table() -> None:
 
 def test_fingers_stand_where_the_lecture_puts_them(robot: Any, hand: Any) -> None:
     q: Any = np.array([0.2, 0.3, -0.4] * 3)
+    g: Any
     points, g = hand.contact_points(q), robot.geometry
     local: Any
     local = np.array(finger_point(*q[:3], (g["l11"], g["l12"], g["l13"])))
