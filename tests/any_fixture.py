@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -121,7 +121,7 @@ def pieces(p: PathParameters) -> Array:
     return np.stack([a + share * (b - a) for a, b in itertools.pairwise(corners)])
 
 
-BEYOND = {
+BEYOND: dict[str, Callable[[Any, Array], Any]] = {
     "box": lambda p, x: (np.abs(x) - 0.5 * np.array(p.size)).max(axis=-1),
     "sphere": lambda p, x: np.linalg.norm(x, axis=-1) - 0.5 * p.diameter,
     "cylinder": beyond_cylinder,

@@ -72,6 +72,7 @@ def uses_the_keys_of_the_driver(watcher: PageClient, driver: PageClient) -> None
 
 
 def looks_from_nowhere(watcher: PageClient, driver: PageClient) -> None:
+    wrong: dict[str, Any]
     for wrong in (
         {"position": [NAN, 0, 0]}, {"position": [1.0]}, {"wxyz": [0, 0, 0, 0]}, {"fov": 0},
         {"image_height": 0}, {"image_width": -5}, {"look_at": [INF, 0, 0]}, {"near": "x"},
@@ -146,8 +147,9 @@ def sends_what_is_no_message(watcher: PageClient, driver: PageClient) -> None:
             b"\xdf\xff\xff\xff\xff",
         ):
             page.raw(data)
+        value: Any
         for value in (None, [], 7, {}, {"type": 3}, {"type": ["x"]}, [[[[]]]]):
-            page.say(present(value))
+            page.say(value)
         page.raw("a text")
 
 

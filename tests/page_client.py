@@ -15,6 +15,7 @@ import viser
 import zstandard
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
+from websockets.typing import Origin, Subprotocol
 
 from browser import until
 
@@ -38,8 +39,8 @@ class PageClient:
         self.values: dict[Any, Any]
         self.elements, self.gizmos, self.commands, self.values = {}, [], {}, {}
         self.socket = connect(
-            f"ws://127.0.0.1:{port}/", origin=f"http://127.0.0.1:{port}", compression=None,
-            subprotocols=[f"viser-v{viser.__version__}"], max_size=None, close_timeout=1,
+            f"ws://127.0.0.1:{port}/", origin=Origin(f"http://127.0.0.1:{port}"), compression=None,
+            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")], max_size=None, close_timeout=1,
         )  # fmt: skip
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -57,7 +58,7 @@ class PageClient:
         """Send a message, or bytes as they are; what has been cut off says nothing."""
         self.raw(msgspec.msgpack.encode(message))
 
-    def raw(self, data: bytes) -> None:
+    def raw(self, data: bytes | str) -> None:
         """Send bytes, or a text."""
         try:
             self.socket.send(data)
@@ -84,7 +85,7 @@ class PageClient:
         self.say({"type": "TransformControlsUpdateMessage", "name": self.gizmos[0],
                   "wxyz": wxyz, "position": position, "owner": ""} | more)  # fmt: skip
 
-    def ask(self, path: str, **headers: Any) -> tuple[int, bytes | dict[str, str | bool]]:
+    def ask(self, path: str, **headers: Any) -> tuple[int, Any]:
         """Status and body of an answer, as the page's own script asks."""
         return ask(self.port, path, Teleop_Page=self.name or "new", **headers)
 
@@ -101,7 +102,8 @@ class PageClient:
     def _read(self) -> None:
         try:
             for data in self.socket:
-                size: Any = int.from_bytes(data[8:16], "little")
+                assert isinstance(data, bytes)
+                size = int.from_bytes(data[8:16], "little")
                 inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
                 for message in msgspec.msgpack.decode(inner)["messages"]:
                     self._take(message)

@@ -56,7 +56,8 @@ def moves(person: Person, seconds: float, seed: int = 1) -> tuple[NDArray[np.int
         place = rng.uniform(-0.5, 0.5, 3) * person.extent
         axis = rng.normal(size=3)
         turn = person.turn * np.sqrt(rng.uniform()) * axis / np.linalg.norm(axis)
-        time = max(0.3, np.linalg.norm(place - places[-1]) / person.speed * rng.uniform(0.7, 1.5))
+        way = float(np.linalg.norm(place - places[-1]))
+        time = max(0.3, way / person.speed * rng.uniform(0.7, 1.5))
         for wait, is_moving in ((time, True), (rng.uniform(0.0, 0.6), False)):
             ends.append(ends[-1] + wait)
             places.append(place if is_moving else places[-1])

@@ -81,8 +81,8 @@ class Recipe:
             for i in range(0, longest, 1000):
                 writer.write_block(
                     {
-                        topic: tuple(column[i : i + 1000] for column in columns)
-                        for topic, columns in self.rows.items()
+                        topic: (a[i : i + 1000], b[i : i + 1000], c[i : i + 1000])
+                        for topic, (a, b, c) in self.rows.items()
                     }
                 )
         return Bag(path)

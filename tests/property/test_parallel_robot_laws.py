@@ -72,7 +72,7 @@ def test_residual_is_what_forward_kinematics_leaves(name: str, geometry: str) ->
 def test_a_batch_is_the_same_as_its_single_questions(name: str, geometry: str) -> None:
     robot, rng = load_robot_set(name, settings(geometry)), np.random.default_rng(3)
     poses = np.array([any_pose(rng) for _ in range(20)])
-    batch = robot.ik(poses)
+    batch: Any = robot.ik(poses)
     reached = robot.solve_fk_batch(batch.q).T
     for k, T in enumerate(poses):
         single = robot.ik(T)

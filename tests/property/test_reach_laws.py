@@ -169,7 +169,7 @@ def test_the_hand_feels_the_limit_up_to_a_bound_and_nothing_when_it_is_back(
     stiffness: float, largest: float
 ) -> None:
     force = {"is_on": True, "stiffness": stiffness, "max_force": largest}
-    values = MotionScalingParameters.__dataclass_fields__["reach_force"].default_factory()
+    values = MotionScalingParameters().reach_force
     chain, step = beyond(reach_force=type(values)(**force))
     way = step / np.linalg.norm(step)
     assert np.allclose(chain.force, -largest * way, rtol=0, atol=0.02 * largest)
@@ -182,7 +182,7 @@ def test_the_hand_feels_the_limit_up_to_a_bound_and_nothing_when_it_is_back(
 
 
 def test_the_force_can_be_switched_off_and_the_limit_is_told_nevertheless() -> None:
-    values = MotionScalingParameters.__dataclass_fields__["reach_force"].default_factory()
+    values = MotionScalingParameters().reach_force
     chain, _ = beyond(reach_force=type(values)(is_on=False))
     assert not chain.force.any()
     assert chain.state("limit") == Limit.JOINT
@@ -215,12 +215,12 @@ def master_bag(stamps_ns: Any) -> MemoryBag:
     return MemoryBag("hand", series, {}, {})
 
 
-def setpoints(stamps_ns: NDArray[np.int64], **values: str) -> tuple[Array, Array]:
+def setpoints(stamps_ns: NDArray[np.int64], **values: Any) -> tuple[Array, Array]:
     """Times of the hand (N,) [s] and the tip's setpoint (N, 3) [m] in a replay.
 
     The reference filter, which lags behind any master, is off.
     """
-    values: Any = {"slave.reference_filter.is_on": False} | values
+    values = {"slave.reference_filter.is_on": False} | values
     session = VirtualTime(configuration(settings=values), played="haptic_master")
     rows = np.concatenate(list(replayed_blocks(session, master_bag(stamps_ns))[0]))
     last = rows["now_ns"][-1] - stamps_ns[-1]

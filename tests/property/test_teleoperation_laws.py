@@ -395,6 +395,6 @@ def test_quaternions_stay_unit_over_a_long_session_of_turning_and_clutching() ->
     for topic in session.played_topics:
         samples[f"{topic.field}_ns"] = samples["now_ns"]
     block: Any = session.replay(samples)
-    for topic in ("slave_servo_cp", "slave_setpoint_cp", "slave_measured_cp"):
-        norms = np.linalg.norm(block[topic][:, 3:], axis=1)
-        assert np.abs(norms - 1.0).max() < 1e-15, topic
+    for field in ("slave_servo_cp", "slave_setpoint_cp", "slave_measured_cp"):
+        norms = np.linalg.norm(block[field][:, 3:], axis=1)
+        assert np.abs(norms - 1.0).max() < 1e-15, field

@@ -341,8 +341,8 @@ class Peer:
         data = layout(topic, JOINTS).encode_one(stamp_ns, np.asarray(values, np.float64))
         self.publisher(topic, readers).publish(data)
 
-    def spin(self) -> None:
-        """Serve what has come for the test's own node."""
+    def spin(self) -> Any:
+        """Serve what has come for the test's own node; returns nothing, in front of an ``or``."""
         self._executor.spin_once(0.01)
 
     def slave_holds(self) -> bool:

@@ -42,7 +42,7 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Any:
             yield session, link, out
 
 
-def state(link: int) -> Any:
+def state(link: LiveLink) -> Any:
     """State of the arm as the page sees it."""
     return link.view().arms[""].operation_text.split(",")[0].split(":")[0]
 
@@ -97,7 +97,7 @@ def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_paramet
     for mode in ("fine", "coarse"):
         link.changes()
         link.press_button("", "mode")
-        wait_until(lambda mode=mode: link.changes().get(("motion_scaling", "mode")) == mode, mode)
+        wait_until(lambda: link.changes().get(("motion_scaling", "mode")) == mode, mode)
 
 
 def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(live: Any) -> None:

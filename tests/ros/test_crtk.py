@@ -162,7 +162,7 @@ def test_a_single_servo_jp_without_names_is_gone_to_all_the_way(client: StockCli
     while not received:  # the first may be lost: the slave need not know its sender yet
         client.send("servo_jp", JointState(position=goal))
         sent: Any = peer.status("slave").number("ticks")
-        peer.wait_value("slave", "ticks", lambda ticks, sent=sent: ticks > sent + 1500)
+        peer.wait_value("slave", "ticks", lambda ticks: ticks > sent + 1500)
         received = peer.status("slave").number("received.slave/servo_jp")
     assert received == 1
     client.wait(lambda: np.allclose(client.joints(), goal, atol=1e-6), "the reference")

@@ -176,10 +176,10 @@ def test_three_motions_write_what_the_bridge_needs(peer: "Peer", tmp_path: Path)
 
         # To the right, up and towards the person: the device's y, z and x, a decimetre each.
         for k, way in enumerate(100.0 * ROWS + 3.0):
-            peer.wait(lambda k=k: asks("hold the stylus still", k), "the begin of a motion")
+            peer.wait(lambda: asks("hold the stylus still", k), "the begin of a motion")
             present(asking.stdin).write("\n")
             present(asking.stdin).flush()
-            peer.wait(lambda k=k: asks("hold it there", k), "the end of a motion")
+            peer.wait(lambda: asks("hold it there", k), "the end of a motion")
             device.place = device.place + way
             for _ in range(50):  # messages of the place before are on the way
                 peer.spin()

@@ -94,13 +94,17 @@ def test_a_button_that_was_pressed_and_released_while_the_node_stood_still_was_p
         ):
             peer.send(topic, stamp, values)
 
+    def sent_and_answered() -> int:
+        send(0.0, 0.0, 0.0)
+        return answers.take()
+
     def is_fine() -> Any:
         send(0.0, 0.0, 0.0)
         asked = GetParameters.Request(names=["mode"])
         answer = peer.call(GetParameters, "/motion_scaling/get_parameters", asked)
         return answer.values[0].string_value == "fine"
 
-    peer.wait(lambda: (send(0.0, 0.0, 0.0), answers.take())[1], "an answer")
+    peer.wait(sent_and_answered, "an answer")
     (node,) = peer.nodes
     node.process.send_signal(signal.SIGSTOP)
     for is_pressed in (0.0, 1.0, 0.0, 0.0):
@@ -299,7 +303,7 @@ def test_parameters_are_described_with_unit_and_bounds(peer: "Peer") -> None:
 def test_parameters_are_accepted_or_refused_with_the_reason(peer: "Peer") -> None:
     peer.start("slave")
     accepted, refused, wrong_type, read_only, length, unknown = (
-        peer.set(node, **{name: value})[0]
+        peer.set(node, False, **{name: value})[0]
         for node, name, value in (
             ("slave", "command_timeout", 0.2), ("slave", "command_timeout", 50.0),
             ("slave", "command_timeout", 1), ("slave", "robot", "scara"),

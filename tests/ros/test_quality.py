@@ -51,7 +51,7 @@ def test_a_command_is_taken_from_senders_of_both_kinds(peer: "Peer") -> None:
     for qos in (QoSProfile(depth=10), qos_profile_sensor_data):
         kind = message_type(topics.SLAVE_SERVO_JP.kind.ros_type)
         own: Any = peer.node.create_publisher(kind, topics.SLAVE_SERVO_JP.name, qos)
-        peer.wait(lambda own=own: own.get_subscription_count(), "the slave as a reader")
+        peer.wait(lambda: own.get_subscription_count(), "the slave as a reader")
         peer.node.destroy_publisher(own)
 
 
@@ -68,16 +68,18 @@ def test_an_override_changes_what_a_publisher_offers(peer: "Peer") -> None:
 
 
 def test_an_override_changes_what_a_subscription_asks_for(peer: "Peer") -> None:
-    name: dict[str, Any] = f"/{topics.SLAVE_SERVO_JP.name}"
-    peer.start("slave", **{f"qos_overrides.{name}.subscription.reliability": "reliable"})
+    name = f"/{topics.SLAVE_SERVO_JP.name}"
+    peer.start(
+        "slave", **dict[str, Any]({f"qos_overrides.{name}.subscription.reliability": "reliable"})
+    )
     peer.wait(lambda: peer.node.get_subscriptions_info_by_topic(name), "the subscription")
     (found,) = peer.node.get_subscriptions_info_by_topic(name)
     assert found.qos_profile.reliability is ReliabilityPolicy.RELIABLE
 
 
 def test_a_wrong_override_ends_the_node_in_one_line(peer: Any) -> None:
-    name: dict[str, Any] = f"qos_overrides./{JS.name}.publisher.reliability"
-    node = peer.start("slave_sim", wait="", **{name: "very"})
+    name = f"qos_overrides./{JS.name}.publisher.reliability"
+    node = peer.start("slave_sim", wait="", **dict[str, Any]({name: "very"}))
     assert node.wait() == 2
     said = node.stderr.read_text().strip().splitlines()
     assert len(said) == 1
@@ -86,8 +88,8 @@ def test_a_wrong_override_ends_the_node_in_one_line(peer: Any) -> None:
 
 
 def test_an_override_of_a_topic_that_is_not_open_is_told(peer: Any) -> None:
-    name: dict[str, Any] = "qos_overrides./slave/measure_js.publisher.reliability"
-    peer.start("slave", **{name: "reliable"})
+    name = "qos_overrides./slave/measure_js.publisher.reliability"
+    peer.start("slave", **dict[str, Any]({name: "reliable"}))
     peer.wait(lambda: f"no effect of {name}" in peer.status("slave").message, "the warning")
 
 

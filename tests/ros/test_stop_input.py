@@ -103,12 +103,18 @@ def test_a_button_that_was_released_before_it_was_found_is_released_after_a_stan
     button = StopButton(peer.node)
     button.say(is_pressed=True)
     button.say(is_pressed=False)
-    stop, heard = StopInput(peer.node), []
+    heard: list[Any] = []
+    stop = StopInput(peer.node)
+
+    def take() -> bool:
+        heard.extend(stop.take())
+        return False
+
     try:
         stop.take()
         since = time.monotonic()
         peer.wait(lambda: button.listeners == 3 and time.monotonic() > since + 0.3, "a while")
-        peer.wait(lambda: heard.extend(stop.take()) or heard, "its state")
+        peer.wait(lambda: take() or heard, "its state")
     finally:
         stop.close()
     assert heard == [False]
@@ -121,15 +127,21 @@ def test_what_a_button_said_before_it_was_heard_counts_after_a_standstill_alone(
     button = peer.node.create_publisher(Bool, STOP_TOPIC, 10)
     for _ in range(3):
         button.publish(Bool(data=False))
-    stop, heard, begin = StopInput(peer.node), [], time.monotonic()
+    heard: list[Any] = []
+    stop, begin = StopInput(peer.node), time.monotonic()
+
+    def take() -> bool:
+        heard.extend(stop.take())
+        return False
+
     try:
         peer.wait(lambda: button.get_subscription_count() == 2, "both who hear reliable senders")
         heard += stop.take()
-        peer.wait(lambda: (not stood_still and heard.extend(stop.take()))
+        peer.wait(lambda: (not stood_still and take())
                   or time.monotonic() > begin + 0.4, "a while")  # fmt: skip
         assert not heard
         button.publish(Bool(data=False))
-        peer.wait(lambda: heard.extend(stop.take()) or heard, "the fourth message")
+        peer.wait(lambda: take() or heard, "the fourth message")
     finally:
         stop.close()
     assert heard == [True, False] if stood_still else heard == [False]

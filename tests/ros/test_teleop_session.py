@@ -96,14 +96,15 @@ def test_an_outside_master_takes_over_when_the_inside_one_is_off(
     clock = peer.node.get_clock()
     publisher = peer.publisher(topics.MASTER_MEASURED_CP, readers=2)  # scaling and recorder
 
+    step = [0]
+
     def moved() -> bool:
-        moved.step += 1
+        step[0] += 1
         now = clock.now().nanoseconds
-        pose = rest + np.array([0.0, 1e-5 * moved.step, 0.0, 0, 0, 0, 0])
+        pose = rest + np.array([0.0, 1e-5 * step[0], 0.0, 0, 0, 0, 0])
         peer.send(topics.MASTER_MEASURED_CP, now, pose)
         return commands.take() > 200 and np.ptp(np.array(commands.values)[:, 2]) > 1e-3
 
-    moved.step = 0
     assert publisher.get_subscription_count() >= 2
     peer.wait(moved, "slave commands that follow the outside master")
 

@@ -17,8 +17,8 @@ import teleop_drill
 import teleop_lab
 from present import present
 from teleop_core.cli import _parser
+from teleop_core.graph.layers import parse_setting
 from teleop_core.session.api import configuration
-from teleop_core.session.configuration import parse_setting
 from teleop_core.session.virtual import VirtualTime
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -6,10 +6,11 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from present import present
 from teleop_core.bags.reader import Bag
@@ -140,7 +141,7 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(
     expected = sum(len(study(Bag(path)).figures()) for path in bags)
     assert expected == 27  # nine of each
     page = tmp_path / "report.html"
-    evaluate_bags(bags, None, page, _Silent())
+    evaluate_bags(bags, None, page, cast(Console, _Silent()))
     assert page.stat().st_size < LARGEST_PAGE
     attributes, said, urls = opened(browser, page, tmp_path)
     assert attributes.get("errors", "") == ""
@@ -174,7 +175,7 @@ def test_page_of_a_session_shows_both_arms_with_their_fixtures(
 @pytest.mark.slow
 def test_page_tells_when_a_plot_cannot_be_drawn(browser: str, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
-    evaluate_bags([record(tmp_path / "live", 1)], None, page, _Silent())
+    evaluate_bags([record(tmp_path / "live", 1)], None, page, cast(Console, _Silent()))
     text = page.read_text()
     data = present(
         re.search(r'id="page-data" type="application/json">(.*?)</script>', text, re.DOTALL)

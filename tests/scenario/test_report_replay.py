@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from rich.console import Console
 
 from browser import Tab
 from headless import Headless
@@ -89,7 +90,9 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A page with one recording of each robot, and where their tips were."""
     folder = tmp_path_factory.mktemp("replays")
     tips = [record(folder / name, name) for name in ROBOTS]
-    evaluate_bags([folder / name for name in ROBOTS], None, folder / "page.html", _Silent())
+    evaluate_bags(
+        [folder / name for name in ROBOTS], None, folder / "page.html", cast(Console, _Silent())
+    )
     return folder / "page.html", tips
 
 
@@ -180,14 +183,14 @@ def test_recording_without_joints_or_of_an_unknown_robot_has_no_replay(tmp_path:
         recipe = Recipe()
         recipe.metadata["robot"] = robot
         recipe.write(tmp_path / name)
-        evaluate_bags([tmp_path / name], None, tmp_path / f"{name}.html", _Silent())
+        evaluate_bags([tmp_path / name], None, tmp_path / f"{name}.html", cast(Console, _Silent()))
         assert "<h3>Replay</h3>" not in (tmp_path / f"{name}.html").read_text()
 
 
 def test_long_replay_stays_within_its_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metric, "RATE", 250.0)  # as many moments as ten minutes have
     record(tmp_path / "long", "stewart", duration=20.0, rate=250)
-    evaluate_bags([tmp_path / "long"], None, tmp_path / "page.html", _Silent())
+    evaluate_bags([tmp_path / "long"], None, tmp_path / "page.html", cast(Console, _Silent()))
     page = tmp_path / "page.html"
     assert "<h3>Replay</h3>" in page.read_text()
     assert page.stat().st_size < 4_000_000 + ROOM

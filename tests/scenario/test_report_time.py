@@ -5,10 +5,11 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from headless import Headless
 from recipes import START_NS, Recipe, state
@@ -104,7 +105,9 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Any:
     recipes = {name: noisy(SHORT, seed) for seed, name in enumerate(("one", "two"))}
     for name, recipe in recipes.items():
         recipe.write(folder / name)
-    evaluate_bags([folder / name for name in recipes], None, folder / "page.html", _Silent())
+    evaluate_bags(
+        [folder / name for name in recipes], None, folder / "page.html", cast(Console, _Silent())
+    )
     return folder / "page.html", recipes
 
 
@@ -115,7 +118,7 @@ def long(tmp_path_factory: pytest.TempPathFactory) -> Any:
     recipe = noisy(LONG, 3)
     recipe.values(SLAVE_MEASURED_CP)[432_100, :3] += 0.004  # a single sample
     recipe.write(folder / "long")
-    evaluate_bags([folder / "long"], None, folder / "page.html", _Silent())
+    evaluate_bags([folder / "long"], None, folder / "page.html", cast(Console, _Silent()))
     return folder / "page.html", recipe
 
 
@@ -129,7 +132,9 @@ def tabs() -> Iterator[dict[Any, Any]]:
 
 
 @pytest.fixture
-def opened(chromium: str, tabs: int, tmp_path_factory: Any) -> Iterator[Callable[..., Any]]:
+def opened(
+    chromium: str, tabs: dict[tuple[Path, int], Headless], tmp_path_factory: Any
+) -> Iterator[Callable[..., Any]]:
     """Opens a page at a width; whatever goes wrong in it fails the test."""
     used = []
 
@@ -389,8 +394,8 @@ def test_paths_show_the_visible_time(opened: Callable[..., object], short: Any, 
         assert len(times) == 2001
     for trace in traces:
         if trace["isWhole"]:
-            times = [time for time in trace["times"] if time is not None]
-            assert np.allclose((min(times), max(times)), (0.0, 19.999), atol=1e-4)
+            known = [time for time in trace["times"] if time is not None]
+            assert np.allclose((min(known), max(known)), (0.0, 19.999), atol=1e-4)
 
 
 def test_long_path_in_a_plane_becomes_the_time_that_was_spent(

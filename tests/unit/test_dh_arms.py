@@ -1,6 +1,7 @@
 """Serial arms of the D-H sources: the laws that every one of them obeys."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -93,7 +94,7 @@ def test_single_and_batched_answers_are_bit_equal(name: str) -> None:
     arm = ARMS[name]
     q, seeds = drawn(name, 50), drawn(name, 50, seed=2)
     poses = arm.fk(q)
-    batch = arm.ik(poses, seeds)
+    batch: Any = arm.ik(poses, seeds)
     for i in range(50):
         assert np.array_equal(arm.fk(q[i]), poses[i])
         single = arm.ik(poses[i], seeds[i])

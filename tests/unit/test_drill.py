@@ -237,7 +237,7 @@ def seen(
     tips = [np.append(ROBOT.fk(row)[:3, 3], [1.0, 0.0, 0.0, 0.0]) for row in joints]
     end = 1_000 * MS + len(joints) * MS
     heard = [trace(values) for values in (joints, measured, tips)]
-    return Seen(BEGIN, end, *heard, told, warned, Scheduling(late, late))
+    return Seen(BEGIN, end, heard[0], heard[1], heard[2], told, warned, Scheduling(late, late))
 
 
 def round_and_round(speed: float = 1.0, count: int = 2000) -> Array:

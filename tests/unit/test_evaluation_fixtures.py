@@ -250,7 +250,7 @@ def test_fixture_of_an_unknown_shape_leaves_the_rest_of_the_score(
     assert np.isclose(present(score.position_error_mm.max), 0.5, atol=ROUNDING_MM)
     assert score.fixture.penetration_max_mm is score.fixture.outside_share is None
     assert np.isclose(score.fixture.on_s, 2.0)
-    assert told in score.fixture.unscored
+    assert told in present(score.fixture.unscored)
     (row,) = [row for row in summary(score) if row.label == "shape not known"]
     assert row.value == described["fixture"]
     assert f"not scored: {score.fixture.unscored}" in figures(bag)["Path in space"].sentence

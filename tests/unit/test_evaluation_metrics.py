@@ -305,7 +305,7 @@ def test_installed_packages_add_metrics_through_their_own_group() -> None:
     assert METRICS.group == "teleop_core.metrics"
 
 
-def fail(self, *arguments: Context | Window) -> None:
+def fail(self: object, *arguments: Context | Window) -> None:
     raise ZeroDivisionError("by\nzero")
 
 

@@ -130,7 +130,6 @@ def test_depth_changes_by_no_more_than_one_moves(name: str, data: st.DataObject)
 @given(st.data())
 def test_outline_is_drawn_where_the_wall_is(name: str, data: Any) -> None:
     parameters: Any
-    parameters: Any
     part, parameters = FIXTURES.find(name), data.draw(KINDS[name])
     points = part.outline(parameters)
     points = points[np.isfinite(points).all(axis=1)]

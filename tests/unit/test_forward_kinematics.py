@@ -284,7 +284,7 @@ def test_the_hybrid_in_pairs_has_the_assemblies_of_its_platform() -> None:
 def test_a_batch_is_its_single_questions(name: str) -> None:
     robot = load_robot(name)
     q = legal(robot, 30, 12)
-    batch = robot.solve_fk(q)
+    batch: Any = robot.solve_fk(q)
     for k, legs in enumerate(q):
         one = robot.solve_fk(legs)
         assert np.array_equal(one.T, batch.T[k])

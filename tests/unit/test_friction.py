@@ -127,7 +127,7 @@ def test_a_second_step_size_gives_the_same_motion() -> None:
 
 
 def test_smooth_friction_creeps_under_the_load_that_sticking_friction_holds() -> None:
-    joint = Joint(**{"plant.hardware.without": ("wandering", "sticking")})
+    joint = Joint(**dict[str, Any]({"plant.hardware.without": ("wandering", "sticking")}))
     path = joint.step(0.7 * joint.dry, 5000)
     assert path[-1] - path[-1000] > 1e-3
 
@@ -184,7 +184,7 @@ def test_friction_wanders_alike_for_one_seed_and_otherwise_for_another() -> None
 
 
 def test_friction_of_a_joint_that_sticks_does_not_wander() -> None:
-    joint = Joint(**{"plant.hardware.without": ()})
+    joint = Joint(**dict[str, Any]({"plant.hardware.without": ()}))
     for _ in range(300):
         joint.step(3.0 * joint.dry)
         wander_once(joint.p, joint.s)

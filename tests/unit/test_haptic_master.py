@@ -67,7 +67,7 @@ def wanted_places(wanted: OperatorParameters, ticks: int, seed: int = 1) -> Arra
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * math.pi, PHASES)
     setting = Setting(wanted, phases, seed)
     motion = OPERATORS.find(wanted.kind.kind).make(wanted.kind.parameters, setting)
-    return motion(1e-3 * np.arange(1, ticks + 1))[:, :3] + REST_POSITION
+    return motion(np.asarray(1e-3 * np.arange(1, ticks + 1), np.float64))[:, :3] + REST_POSITION
 
 
 def run(master: HeldMaster, ticks: int, force: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:

@@ -42,12 +42,12 @@ def slave(
 
 def rest(*without: str, **settings: Any) -> Any:
     """Mover after a move to the target, and the encoders' rest less the target (6,)."""
-    mover = Mover(slave(**{"plant.hardware.without": without}, **settings))
+    mover = Mover(slave(**dict[str, Any]({"plant.hardware.without": without}), **settings))
     return mover, mover.move(TARGET) - TARGET
 
 
 def test_without_any_fault_the_hardware_is_the_ideal_plant_without_friction() -> None:
-    none = slave(**{"plant.hardware.without": tuple(FAULTS)})
+    none = slave(**dict[str, Any]({"plant.hardware.without": tuple(FAULTS)}))
     ideal = slave("ideal", coulomb=(0.0,) * 6)
     rests: Any = [Mover(parameters).move(TARGET) for parameters in (none, ideal)]
     assert np.array_equal(*rests)
@@ -81,7 +81,7 @@ def test_bias_and_weight_push_a_joint_without_friction_off_by_their_size_over_kp
 def test_a_law_that_can_hold_bias_and_weight_begins_in_balance(law: str) -> None:
     # Without friction whatever is not held moves axis 1, of the bias, or 2, of the weight, at once.
     made = SimulatedArm(slave(controller=law, starts_at_home=True,
-                          **{"plant.hardware.without": ("friction", "wandering")}))  # fmt: skip
+                          **dict[str, Any]({"plant.hardware.without": ("friction", "wandering")})))  # fmt: skip
     for tick in range(1, 301):
         made.signals["now_ns"] = tick * TICK_NS
         made.step()
@@ -118,7 +118,7 @@ def test_true_tip_is_that_of_the_arm_as_built_behind_its_play() -> None:
 
 
 def test_drives_give_efforts_in_steps_of_their_converter() -> None:
-    mover = Mover(slave(**{"plant.hardware.drive_bits": 8}))
+    mover = Mover(slave(**dict[str, Any]({"plant.hardware.drive_bits": 8})))
     mover.move(TARGET)
     step = 2.0 * present(ARM.drives).effort_limit / 256
     effort = mover.slave.simulated.arm.effort - faults_of(ARM).bias
@@ -127,7 +127,7 @@ def test_drives_give_efforts_in_steps_of_their_converter() -> None:
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_every_fault_can_be_left_out_alone(fault: str) -> None:
-    parameters = slave(**{"plant.hardware.without": (fault,)})
+    parameters = slave(**dict[str, Any]({"plant.hardware.without": (fault,)}))
     kind = parameters.plant.kind
     with_it = HARDWARE.physics(slave().plant.kind.parameters, ARM)
     without = HARDWARE.physics(kind.parameters, ARM)

@@ -179,7 +179,6 @@ def test_turn_at_the_singularity_goes_to_joint_6_alone() -> None:
 
 def test_pose_far_away_is_limited_and_approached_at_full_speed_of_one_joint() -> None:
     stage: Any
-    stage: Any
     stage, goal = Stage(), ARM.fk(np.array([1.0, 1.6, 0.3, 0.5, 0.6, 0.7]))
     stage.settle(ARM.fk(START))
     before = stage.step(ARM.fk(START))

@@ -73,7 +73,7 @@ def test_a_robot_is_that_of_all_stages_of_its_arm() -> None:
 )
 def test_an_argument_of_no_meaning_is_refused(name: str, value: str) -> None:
     with pytest.raises(ParameterError, match=name):
-        processes(given(**{name: value}))
+        processes(given(**dict[str, Any]({name: value})))
 
 
 @pytest.mark.parametrize(

@@ -208,7 +208,7 @@ def test_class_for_lerobot_has_what_its_documents_ask_for(
     device = next(c for c in classes.values() if [ast.unparse(b) for b in c.bases] == bases)
     defined = {node.name for node in device.body if isinstance(node, ast.FunctionDef)}
     defined |= set(vars(sides.Connection))
-    defined |= {n.targets[0].id for n in device.body if isinstance(n, ast.Assign)}
+    defined |= {ast.unparse(n.targets[0]) for n in device.body if isinstance(n, ast.Assign)}
     assert defined >= names
     assert f"{device.name}Config" in classes  # LeRobot finds the class by this name
 

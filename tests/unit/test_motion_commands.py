@@ -193,7 +193,7 @@ def test_nothing_is_moved_outside_enabled(bench: Bench, state: State) -> None:
 
 
 def test_before_homing_is_done_no_motion_command_is_taken() -> None:
-    bench = Bench(**{"operation.starts_enabled": False})
+    bench = Bench(**dict[str, Any]({"operation.starts_enabled": False}))
     bench.slave.server.request("enable")
     assert bench.motion.move(MIDDLE)[0] is Answer.REFUSED
     assert "home first" in bench.motion.drive_joints(SMALL, bench.now_ns)[1]
@@ -459,13 +459,13 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(
     assert math.isfinite(np.abs(joined).sum())
 
 
-SHARED = Bench(**{"operation.longest_outage": 0.0})
+SHARED = Bench(**dict[str, Any]({"operation.longest_outage": 0.0}))
 
 
 def test_the_parameters_that_bound_motion_are_those_of_the_operation() -> None:
     slow = build(OperationParameters, {"tool_speed": 0.01})
     assert slow.tool_speed == 0.01
-    bench = Bench(**{"operation.tool_speed": 0.01})
+    bench = Bench(**dict[str, Any]({"operation.tool_speed": 0.01}))
     bench.motion.drive_tip([0.5, 0, 0, 0, 0, 0], bench.now_ns)
     tips = np.array([ARM.fk(q)[:3, 3] for q in bench.run(95)])
     fastest = np.linalg.norm(np.diff(tips, axis=0), axis=1).max() / DT

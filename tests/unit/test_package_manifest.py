@@ -21,7 +21,7 @@ NAMED_BY = {"pyyaml": "python3-yaml", "teleop_core": "teleop_core"}
 def manifest(package: str) -> tuple[set[str], str]:
     text = (SOURCES / package / "package.xml").read_text()
     root = ElementTree.fromstring(text)
-    return {node.text for node in root if node.tag.endswith("depend")}, text
+    return {node.text or "" for node in root if node.tag.endswith("depend")}, text
 
 
 def imported(package: str) -> Iterator[str]:

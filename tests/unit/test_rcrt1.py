@@ -367,7 +367,7 @@ def test_batch_with_one_seed_or_one_for_each_equals_single_answers() -> None:
     batch, seeds = inside_limits(50, seed=2), inside_limits(50, seed=3)
     poses = ARM.fk(batch)
     for seed_of, given_seeds in ((lambda i: seeds[i], seeds), (lambda i: seeds[0], seeds[0])):
-        together = ARM.ik(poses, given_seeds)
+        together: Any = ARM.ik(poses, given_seeds)
         for i, pose in enumerate(poses):
             alone = ARM.ik(pose, seed_of(i))
             assert np.array_equal(together.q[i], alone.q)

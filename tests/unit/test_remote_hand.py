@@ -335,7 +335,7 @@ def test_a_hand_draws_for_the_operator_what_its_motion_says() -> None:
             present(hand).want(pose([1e-4 * k, 0.0, -2e-5 * k], [0.0, 2e-3 * k, 0.0]))
         master.prepare(1)
         wanted = np.array(master._wanted[1 : AHEAD + 1])
-        rows = twin.motion((AHEAD * k + 1 + np.arange(AHEAD)) * DT)
+        rows = twin.motion(np.asarray((AHEAD * k + 1 + np.arange(AHEAD)) * DT, np.float64))
         np.testing.assert_allclose(wanted["wanted"] - REST[:3], rows[:, :3], atol=1e-15)
         np.testing.assert_array_equal(wanted["buttons"], rows[:, 6:9])
         start = Rotation.from_quat(REST[[4, 5, 6, 3]])

@@ -554,7 +554,7 @@ def test_gains_that_change_before_the_first_tick_count_from_the_begin(law: str) 
 @pytest.mark.parametrize("name", ["viscous", "coulomb"])
 def test_list_of_another_length_than_the_joints_is_refused(name: str, length: int) -> None:
     with pytest.raises(ParameterError) as error:
-        SimulatedArm(ArmParameters(**{name: (1.0,) * length}))
+        SimulatedArm(ArmParameters(**dict[str, Any]({name: (1.0,) * length})))
     assert error.value.name == f"slave_sim.{name}"
 
 
