@@ -55,6 +55,9 @@ class Tab(Headless):
     ``answers`` the status of each answer.
     """
 
+    def __enter__(self) -> "Tab":
+        return self
+
     def __init__(self, folder: Path, width: int = 1400, height: int = 900) -> None:
         self.answers: dict[Any, Any]
         self.asked: list[Any]

@@ -170,7 +170,7 @@ def test_the_hand_feels_the_limit_up_to_a_bound_and_nothing_when_it_is_back(
 ) -> None:
     force = {"is_on": True, "stiffness": stiffness, "max_force": largest}
     values = MotionScalingParameters().reach_force
-    chain, step = beyond(reach_force=type(values)(**force))
+    chain, step = beyond(reach_force=type(values)(**dict[str, Any](force)))
     way = step / np.linalg.norm(step)
     assert np.allclose(chain.force, -largest * way, rtol=0, atol=0.02 * largest)
     depth = largest / stiffness

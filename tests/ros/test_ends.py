@@ -153,7 +153,12 @@ def test_the_domain_that_others_need_and_the_place_of_the_recording_are_said_fir
     lines = [line for line in session.text.splitlines() if not line.startswith("note: ")]
     assert lines[1] == f"recording to {session.bag}"
     with Observer(int(lines[0].rpartition("ROS_DOMAIN_ID=")[2])) as observer:
-        wait_until(lambda: observer.listen(0.1) or "slave" in observer.statuses, "its nodes there")
+
+        def is_heard() -> bool:
+            observer.listen(0.1)
+            return "slave" in observer.statuses
+
+        wait_until(is_heard, "its nodes there")
     session.signal(signal.SIGINT)
     assert session.wait() == 0
 

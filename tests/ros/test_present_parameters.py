@@ -75,7 +75,11 @@ def test_a_clock_of_others_is_refused_at_run_time(peer: "Peer") -> None:
 
 def test_a_played_recording_tells_its_time_on_clock(peer: "Peer") -> None:
     bag, came = Bag(EXAMPLE), []
-    peer.node.create_subscription(Clock, "/clock", lambda m: came.append(m.clock), 1000)
+
+    def take_clock(message: Any) -> None:
+        came.append(message.clock)
+
+    peer.node.create_subscription(Clock, "/clock", take_clock, 1000)
     command = [sys.executable, "-m", "teleop_core.cli", "play", str(EXAMPLE), "--rate", "2"]
     command += ["--topics", topics.MASTER_MEASURED_CP.name, "--clock", "50"]
     env = environment() | {"ROS_DOMAIN_ID": peer.domain}

@@ -58,7 +58,11 @@ def witness(domain: int) -> Iterator[Callable[[], object]]:
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     said = []
-    node.create_subscription(Float64MultiArray, "witness", lambda m: said.append(list(m.data)), 10)
+
+    def take_data(message: Any) -> None:
+        said.append(list(message.data))
+
+    node.create_subscription(Float64MultiArray, "witness", take_data, 10)
 
     def newest() -> list[Any]:
         while not said or np.isnan(said[-1][0]):

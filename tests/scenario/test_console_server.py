@@ -256,7 +256,8 @@ def test_other_addresses_than_the_loopback_are_served_with_a_token_alone() -> No
 def test_message_that_is_drawn_just_before_its_reader_waits_is_sent() -> None:
     async def read() -> bool:
         # As viser makes its buffers, once the console's hooks are in place.
-        buffer = _infra.AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
+        infra: Any = _infra
+        buffer = infra.AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
         message = _messages.RunJavascriptMessage("drawn")
         buffer.message_event._waiters = AfterDrawing(partial(buffer.push, message))
         return await asyncio.wait_for(anext(buffer.window_generator(0)), 20) == [message]

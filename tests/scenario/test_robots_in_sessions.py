@@ -1,5 +1,6 @@
 """Every robot in the whole graph: as slave, as master's handle, with options, in virtual time."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,7 @@ def test_the_mma_reads_the_hand_as_well_as_its_encoders_allow(model: str) -> Non
 def test_an_option_of_a_robot_reaches_both_stages_that_need_it() -> None:
     session = VirtualTime(configure(settings=["robot=scara_stewart", "geometry=[heading=carried]"]))
     fixed = load_robot("scara_stewart")
-    solver, slave = (session.stages[name].robot for name in ("inverse_kinematics", "slave"))
+    stages: Mapping[str, Any] = session.stages
+    solver, slave = (stages[name].robot for name in ("inverse_kinematics", "slave"))
     assert solver.geometry != fixed.geometry
     assert slave.geometry == solver.geometry

@@ -157,7 +157,7 @@ def test_messages_serialised_by_rclpy_are_understood() -> None:
     found = discover(Kind.JOINTS, positions)
     assert found is not None
     assert (found.joint_names, found.frame_id) == (("a", "bb"), "slave_base")
-    stamp_ns, values = found.decode_one(positions)
+    stamp_ns, values = present(found.decode_one(positions))
     assert stamp_ns == 1_000_000_002
     assert values.tolist() == [1.0, 2.0]
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -228,7 +228,7 @@ def test_a_joint_at_its_limit_is_drawn_in_another_colour(server: Server) -> None
         scene.draw(View(arms={"": ArmView({"slave/measured_js": state})}))
         name = bodies.bodies[bodies.joint_body[1]].name
         return {
-            mesh.color
+            cast(Any, mesh).color
             for role in ROLES
             if (mesh := server.scene.get_handle_by_name(f"/arm/robot/{name}/{role}")) is not None
         }
@@ -287,7 +287,7 @@ SOLIDS = {
 def test_meshes_are_closed_look_outwards_and_have_the_volume_of_their_solid(kind: str) -> None:
     size, volume = SOLIDS[kind]
     pose = np.array([0.3, -0.2, 0.1, 0.5, 0.5, 0.5, 0.5])
-    mesh = trimesh.Trimesh(*mesh_of(Solid(kind, size, pose, "link")))
+    mesh = trimesh.Trimesh(*mesh_of(Solid(cast(Any, kind), size, pose, "link")))
     mesh.merge_vertices()
     mesh.update_faces(mesh.nondegenerate_faces())
     assert mesh.is_watertight

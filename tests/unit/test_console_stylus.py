@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -49,7 +49,9 @@ class Hand:
         self.time += dt
         self.stylus.draw(View(time=self.time, arms={"": ArmView({"master/measured_cp": pose})}))
 
-    def drag(self, phase: str, client: int = 1, x: Any = None) -> None:
+    def drag(
+        self, phase: Literal["start", "update", "end"], client: int = 1, x: Any = None
+    ) -> None:
         """What viser does when a browser says that the gizmo was dragged."""
         if x is not None:
             present(self.gizmo).position = (x, *POSE[1:3])

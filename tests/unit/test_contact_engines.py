@@ -56,7 +56,7 @@ class Other:
     def __init__(
         self,
         begin: tuple[float, float, float],
-        ways: Sequence[float] | Array = ((0, 0, 0),),
+        ways: Sequence[Sequence[float]] | Array = ((0, 0, 0),),
         radius: float = 0.01,
         stiffness: float | None = None,
         damping: float = 0.0,

@@ -10,6 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from present import present
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.chain.devices import NOTHING, Reading
 from teleop_core.chain.devices.gamepad import Gamepad
@@ -142,7 +143,7 @@ def test_no_device_is_told_in_one_line_that_lists_what_was_found(name: str) -> N
     operator = OPERATORS.find(name)
     parameters: Any = operator.parameters(device="no such thing")
     with pytest.raises(SessionError, match=r"^no .*'no such thing' in its name; found: [^\n]+$"):
-        operator.opens(parameters)
+        present(operator.opens)(parameters)
 
 
 # -- the jaw ---------------------------------------------------------------------------------------

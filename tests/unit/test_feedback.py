@@ -103,7 +103,8 @@ def test_a_longer_silence_of_the_arm_is_a_fault_whose_setpoint_stands_still() ->
         led.tick(speaks=False, follows=True)
     assert led.state is State.ENABLED
     still = led.tick(speaks=False, follows=True)
-    assert led.state is State.FAULT
+    now: State = led.state
+    assert now is State.FAULT
     assert Fault(int(led.slave.operation["fault"])) is Fault.FEEDBACK
     assert led.slave.operation["fault_bound"] == 0.5
     assert np.array_equal(led.tick(follows=True), still)

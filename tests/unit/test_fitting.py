@@ -37,7 +37,7 @@ def published() -> Any:
 
 
 @pytest.fixture(scope="module")
-def found(published: str) -> FitResult:
+def found(published: RestTable) -> FitResult:
     return fit(published, slave())
 
 

@@ -136,7 +136,7 @@ def test_product_may_be_written_over_either_factor(a: Array, b: Array) -> None:
 @given(quaternions, vectors)
 def test_rotation_vector_turns_in_the_frame_of_the_quaternion(quaternion: Any, turn: Array) -> None:
     out = np.empty(4)
-    geometry.rotate_by_vector(quaternion, *turn, out)
+    geometry.rotate_by_vector(quaternion, turn[0], turn[1], turn[2], out)
     expected = scipy_matrix(quaternion) @ Rotation.from_rotvec(turn).as_matrix()
     assert np.allclose(matrix_of(out), expected, rtol=0, atol=TWICE_ROUNDED)
 

@@ -168,7 +168,7 @@ def test_tremor_has_its_peak_in_the_band_with_the_wanted_amplitude(middle: float
 def test_axes_tremble_independently() -> None:
     hand = {"tremor_amplitude": 0.5e-3}
     motion = places(run(held(parameters(device=QUIET, hand=hand)), 20_000))[1000:]
-    between = np.corrcoef(motion.T)[np.triu_indices(3, 1)]
+    between = np.asarray(np.corrcoef(motion.T))[np.triu_indices(3, 1)]
     # Lines that wander over ±2 Hz forget their phase in about 0.2 s: 100 independent pieces.
     assert np.abs(between).max() < 0.4
 

@@ -54,7 +54,7 @@ def assert_same_motion(
     assert np.abs((stream.stamp_ns - stream.stamp_ns[0]) * 1e-9 - (times - times[0])).max() < 1e-9
 
 
-FORMS = {
+FORMS: dict[str, dict[str, Any]] = {
     "comma.csv": {"sep": ","},
     "semicolon.csv": {"sep": ";"},
     "decimal_comma.csv": {"sep": ";", "decimal": ","},
@@ -325,6 +325,8 @@ def test_unit_of_the_place_is_given_or_stands_in_the_names(
     unit: str, metres: float, tmp_path: Path
 ) -> None:
     rows = np.column_stack((TIMES, PLACES / metres))
+    head: list[str]
+    options: dict[str, Any]
     for number, (head, options) in enumerate(
         ((["t", "x", "y", "z"], {"unit": unit}), (["t", *(f"{a} [{unit}]" for a in "xyz")], {}))
     ):

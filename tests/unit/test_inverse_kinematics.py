@@ -187,7 +187,8 @@ def test_pose_far_away_is_limited_and_approached_at_full_speed_of_one_joint() ->
     assert stage.residual.max() > 0.1
     assert math.isclose((np.abs(after - before) / STEP).max(), 1.0, rel_tol=1e-9)
     stage.settle(goal)
-    assert stage.status is IkStatus.FOLLOWED
+    now: IkStatus = stage.status
+    assert now is IkStatus.FOLLOWED
 
 
 def test_pose_out_of_reach_is_unreachable_and_the_arm_points_there() -> None:

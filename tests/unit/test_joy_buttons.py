@@ -31,7 +31,9 @@ def joy(*pressed: int) -> Any:
     ],
 )
 def test_a_map_says_which_button_is_what(pressed: Any, places: Any, expected: list[int]) -> None:
-    stamp_ns, values = read_values(Kind.BUTTONS, joy(*pressed), buttons=places)
+    taken = read_values(Kind.BUTTONS, joy(*pressed), buttons=places)
+    assert not isinstance(taken, Refusal)
+    stamp_ns, values = taken
     assert stamp_ns == 1_000_000_002
     assert np.array_equal(values, expected)
 

@@ -142,7 +142,7 @@ def test_plain_functions_run_in_threads_and_each_thread_gets_its_own_exceptions(
         return x
 
     function = pointer(plain, types.float64(ROW, types.float64))
-    found = {}
+    found: dict[str, tuple[Any, Any, str | None]] = {}
 
     def work() -> None:
         row = np.zeros(2)

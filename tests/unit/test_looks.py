@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pinocchio
@@ -78,7 +78,7 @@ def test_plain_shapes_are_drawn_too_and_a_length_in_millimetres_is_read_as_such(
     inch = '<visual><geometry><mesh filename="../meshes/part.dae"/></geometry></visual>'
     text = path.read_text().replace('"base"></link>', f'"base">{ball}{inch}</link>')
     path.write_text(text)
-    part = trimesh.Trimesh(CORNERS + 100.0, FACES).export(file_type="dae").decode()
+    part = cast(bytes, trimesh.Trimesh(CORNERS + 100.0, FACES).export(file_type="dae")).decode()
     assert "<asset>" in part
     unit = '<unit name="millimeter" meter="0.001"/>'
     meshes = path.parents[1] / "meshes"

@@ -60,7 +60,7 @@ def assert_path_is_safe(robot: Robot, seed: Array, result: IkResult[Any]) -> Non
 @pytest.mark.parametrize("model", ["A", "C"])
 def test_every_reachable_pose_is_solved_from_home(model: str) -> None:
     robot = load_robot("mma", model=model)
-    result = robot.ik(robot.fk(readings(robot, 500)))
+    result: Any = robot.ik(robot.fk(readings(robot, 500)))
     assert set(result.status) <= SOLVED
     assert result.residual.max() <= REACHED
     assert (result.q >= robot.lower).all()

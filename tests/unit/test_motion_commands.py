@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -436,16 +437,17 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(
         if name == "stream":
             path.append(bench.follow(bench.setpoint + 0.02 * wild)[None])
         elif name in {"move", "pose", "joints", "tip", "step", "hold"}:
-            {
-                "move": lambda w=wild: motion.move(bench.setpoint + w),
-                "pose": lambda w=wild: move_to_pose(
-                    motion, bench.tip @ transform(rotation("z", w[3]), 0.1 * w[:3])
+            acts: dict[str, Callable[[], object]] = {
+                "move": lambda: motion.move(bench.setpoint + wild),
+                "pose": lambda: move_to_pose(
+                    motion, bench.tip @ transform(rotation("z", wild[3]), 0.1 * wild[:3])
                 ),
-                "joints": lambda w=wild, n=now_ns: motion.drive_joints(20.0 * w, n),
-                "tip": lambda w=wild, n=now_ns: motion.drive_tip(5.0 * w, n),
-                "step": lambda w=wild, n=now_ns: motion.servo_by(0.1 * w, n),
+                "joints": lambda: motion.drive_joints(20.0 * wild, now_ns),
+                "tip": lambda: motion.drive_tip(5.0 * wild, now_ns),
+                "step": lambda: motion.servo_by(0.1 * wild, now_ns),
                 "hold": motion.hold,
-            }[name]()
+            }
+            acts[name]()
         else:
             bench.slave.server.request(name)
         path.append(bench.run(ticks))

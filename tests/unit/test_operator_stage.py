@@ -1,7 +1,7 @@
 """Operator as a stage: what it sees, what the device does without it, and a replay of the hand."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -135,7 +135,7 @@ def recorded() -> tc.Recording:
 
 @pytest.mark.parametrize("begin", ["hand", "device"])
 def test_a_replay_of_the_hand_is_that_of_the_device_to_the_bit(
-    recorded: tc.Recording, begin: str
+    recorded: tc.Recording, begin: Literal["hand", "device"]
 ) -> None:
     again = tc.replay(recorded, begin=begin)
     for topic in ("hand/servo_cp", "hand/tremor", "master/measured_cp", "slave/measured_cp"):

@@ -17,7 +17,7 @@ from teleop_core.chain.operators import OPERATORS, Setting
 from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.chain.operators.rest import REST_TILT
 from teleop_core.chain.operators.shapes import PHASES
-from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP
+from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
 from teleop_core.kernels.geometry import Array
 
 START_NS = 1_700_000_000_000_000_000
@@ -39,8 +39,8 @@ def bag(
     rows = np.rint(times * 100.0).astype(int)
     stamps = START_NS + np.rint(times * 1e9).astype(np.int64)
     poses = np.column_stack((PLACES[rows], TURNS[rows].as_quat(scalar_first=True)))
-    changes = {MASTER_BUTTONS: pressed, HAND_JAW: closed}
-    changes = {topic: found for topic, found in changes.items() if found is not None}
+    given: dict[Topic, Any] = {MASTER_BUTTONS: pressed, HAND_JAW: closed}
+    changes = {topic: found for topic, found in given.items() if found is not None}
     with BagWriter(path, [MASTER_MEASURED_CP, *changes], ()) as writer:
         block = {MASTER_MEASURED_CP: (stamps, poses, stamps)}
         for topic, found in changes.items():

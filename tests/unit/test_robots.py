@@ -205,7 +205,7 @@ def crank_ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     return 1
 
 
-def crank(reach: float = 0.3, **kernels: Callable[..., None]) -> Robot:
+def crank(reach: float = 0.3, **kernels: Callable[..., object]) -> Robot:
     plain: dict[str, Any] = {
         "fk": crank_fk,
         "jacobian": crank_jacobian,
@@ -213,7 +213,8 @@ def crank(reach: float = 0.3, **kernels: Callable[..., None]) -> Robot:
         "ik_all": crank_ik_all,
     }
     return Robot(
-        name="crank", joint_names=("q",), lower=[-1.0], upper=[1.0], home=[0.0],
+        name="crank", joint_names=("q",), lower=np.array([-1.0]),
+        upper=np.array([1.0]), home=np.array([0.0]),
         geometry={"reach": reach}, kernels=Kernels(**(plain | kernels)), drives=geared_motors(1),
     )  # fmt: skip
 

@@ -140,7 +140,7 @@ def test_a_follower_and_its_leader_do_the_work_that_a_wrench_does(tmp_path: Path
     assert arm.n == 5
     q = np.random.default_rng(2).uniform(arm.lower, arm.upper)
     zero, wrench = np.zeros(arm.n), np.array([3.0, -5.0, 8.0, 0.4, 0.2, -0.3])
-    M_inverse = [arm.forward_dynamics(q, zero, e) for e in np.eye(arm.n)]
+    M_inverse = np.array([arm.forward_dynamics(q, zero, e) for e in np.eye(arm.n)])
     M_inverse -= arm.forward_dynamics(q, zero, zero)
     change = arm.forward_dynamics(q, zero, zero, wrench) - arm.forward_dynamics(q, zero, zero)
     np.testing.assert_allclose(change, (arm.jacobian(q).T @ wrench) @ M_inverse, atol=1e-9)
@@ -331,7 +331,7 @@ def changed(old: str, new: str, **options: str) -> tuple[str, dict[str, str]]:
     return TEXT.replace(old, new, 1), options or TOOL
 
 
-MISTAKES = {
+MISTAKES: dict[str, tuple[tuple[str, dict[str, Any]], str]] = {
     "no tip": ((TEXT, {}), "tip is '', must be one of camera, tool0"),
     "unknown tip": ((TEXT, {"tip": "tool1"}), "tool1"),
     "tip before every joint": ((TEXT, {"tip": "base"}), "some joint between"),

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ ROOMY = ("scara", "planar_3r", "five_axis", "stewart", "rps3", "three_finger_han
 ONE_AXIS = ("four_bar", "parallelogram")
 # Constants are written with four digits.
 ROUNDED = 6e-5
-ARM = {
+ARM: dict[str, Any] = {
     "name": "arm",
     "convention": "modified",
     "angles": "degrees",

@@ -154,7 +154,8 @@ def test_without_integral_action_the_weight_leaves_the_law_as_it_is() -> None:
     efforts = []
     for weight in (1.0, THIRD):
         gains, memory, effort = np.array([[50.0, 0.0, 2.0, weight]]), np.zeros((1, 4)), np.zeros(1)
-        pid_control(gains, memory, *np.array([[0.3], [0.1], [0.2], [9.0]]), DT, effort)
+        a, b, c, d = np.array([[0.3], [0.1], [0.2], [9.0]])
+        pid_control(gains, memory, a, b, c, d, DT, effort)
         efforts.append(effort[0])
     assert efforts[0] == efforts[1]
 

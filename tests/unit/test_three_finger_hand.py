@@ -51,7 +51,7 @@ def test_three_distances_between_contacts_leave_six_freedoms(robot: Robot, hand:
 
 
 def test_finger_of_the_specification() -> None:
-    point = finger_point(*np.radians([20.0, 35.0, -50.0]), (1.0, 0.6, 0.4))
+    point = finger_point(np.radians(20.0), np.radians(35.0), np.radians(-50.0), (1.0, 0.6, 0.4))
     assert np.allclose(point, [1.764613, 0.642266, 0.240618], atol=6e-7)
 
 
@@ -66,7 +66,7 @@ def test_finger_is_the_chain_of_its_denavit_hartenberg_table() -> None:
                 rtb.RevoluteMDH(a=links[1]),
             ]
         )
-        point = finger_point(*q, tuple(links))
+        point = finger_point(q[0], q[1], q[2], tuple(links))
         assert np.allclose(point, (chain.fkine(q).A @ [links[2], 0.0, 0.0, 1.0])[:3], atol=1e-14)
 
 
@@ -75,7 +75,7 @@ def test_fingers_stand_where_the_lecture_puts_them(robot: Any, hand: Any) -> Non
     g: Any
     points, g = hand.contact_points(q), robot.geometry
     local: Any
-    local = np.array(finger_point(*q[:3], (g["l11"], g["l12"], g["l13"])))
+    local = np.array(finger_point(q[0], q[1], q[2], (g["l11"], g["l12"], g["l13"])))
     assert np.allclose(points[0], local + np.array([0.0, -g["d"], g["h"]]), atol=1e-15)
     assert np.allclose(points[1], local + np.array([0.0, g["d"], g["h"]]), atol=1e-15)
     assert np.allclose(points[2], rotation("y", g["gamma"]) @ local, atol=1e-15)

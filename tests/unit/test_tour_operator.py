@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
+from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.base.parameters import build
 from teleop_core.chain.operators import OPERATORS, Setting
@@ -74,7 +75,9 @@ def motion(
     part = OPERATORS.find("tour")
     phases = np.random.default_rng(1).uniform(0.0, 6.0, PHASES)
     setting: Any = Setting(common=common, phases=phases, seed=1)
-    return part.make(common.kind.parameters, setting), part.length(common.kind.parameters, setting)
+    return part.make(common.kind.parameters, setting), present(part.length)(
+        common.kind.parameters, setting
+    )
 
 
 def test_turning_of_the_stylus_does_not_depend_on_the_time_of_a_leg_nor_places_on_its_period() -> (
