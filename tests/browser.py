@@ -78,7 +78,7 @@ class Tab(Headless):
         self.call("Page.reload")
         self.until("!window.isOld && document.querySelector('canvas')")
 
-    def shows(self, text: Any, seconds: int = 60) -> None:
+    def shows(self, text: Any, seconds: float = 60) -> None:
         """Wait until a text can be read on the page."""
         self.until(f"document.body.innerText.includes({json.dumps(text)})", seconds)
 

@@ -209,6 +209,8 @@ def fly(
     thing, body = needle(name, parameters, JOINTS), np.array([mass, inertia, *gravity])
     state = record(SimulationState, JOINTS)
     _fly(p, state, contacts, thing, FREE, body, q, dq, np.array(axis, float), found)
-    keys: dict[str, Any] = {"place": slice(3), "turn": slice(3, 6), "speed": slice(6, 12), "felt": slice(12, 18),
-            "stored": 18, "axis": slice(19, 22)}  # fmt: skip
+    keys: dict[str, Any] = {
+        "place": slice(3), "turn": slice(3, 6), "speed": slice(6, 12), "felt": slice(12, 18),
+        "stored": 18, "axis": slice(19, 22),
+    }  # fmt: skip
     return {key: found[:, part] for key, part in keys.items()} | {"time": DT * np.arange(ticks)}

@@ -113,7 +113,7 @@ class Headless:
             "document.body && (document.body.dataset.finished || document.body.dataset.errors)"
         )
 
-    def until(self, condition: object, seconds: int = 60) -> None:
+    def until(self, condition: object, seconds: float = 60) -> None:
         """Wait until an expression is true, but not for ever."""
         self.value(
             "new Promise((done, fail) => { const end = performance.now() + "

@@ -241,9 +241,9 @@ def reads_files(watcher: PageClient, driver: PageClient) -> None:
 
 def drives_to_where_no_stylus_is(watcher: PageClient, driver: PageClient) -> None:
     for position in ([NAN, 0, 0], [0, INF, 0], [1.0], [0] * 4, [1e308] * 3, [5, 0, 0], "xyz", None):
-        driver.drag(position=position)
+        driver.drag(position=position)  # type: ignore[arg-type]
     for turn in ([0, 0, 0, 0], [NAN, 0, 0, 0], [1, 0, 0], [2, 0, 0, 0], [1] * 5, {"w": 1}):
-        driver.drag(wxyz=turn)
+        driver.drag(wxyz=turn)  # type: ignore[arg-type]
     driver.drag(owner="another")
     driver.drag(owner=3)
     driver.drag(more=1)

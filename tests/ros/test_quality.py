@@ -51,7 +51,7 @@ def test_a_command_is_taken_from_senders_of_both_kinds(peer: "Peer") -> None:
     for qos in (QoSProfile(depth=10), qos_profile_sensor_data):
         kind = message_type(topics.SLAVE_SERVO_JP.kind.ros_type)
         own: Any = peer.node.create_publisher(kind, topics.SLAVE_SERVO_JP.name, qos)
-        peer.wait(lambda: own.get_subscription_count(), "the slave as a reader")
+        peer.wait(own.get_subscription_count, "the slave as a reader")
         peer.node.destroy_publisher(own)
 
 

@@ -52,7 +52,7 @@ def test_buttons_of_the_stylus_are_those_of_the_device() -> None:
     assert session.buttons == [("", "mode"), ("", "fixture")]
 
 
-@pytest.mark.parametrize("part", [len, tc.Control("x", "", None), tc.Control("x", "", len, "", 3)])
+@pytest.mark.parametrize("part", [len, tc.Control("x", "", None), tc.Control("x", "", len, "", 3)])  # type: ignore[arg-type]
 def test_what_is_no_control_is_refused(part: Callable[..., object] | tc.Control) -> None:
     with pytest.raises(PartError) as told:
         CONTROLS.add("x", part)

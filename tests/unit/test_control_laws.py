@@ -335,7 +335,7 @@ def test_wish_for_the_model_that_is_no_yes_or_no_is_refused() -> None:
                 COMPUTED_TORQUE.gains,
                 COMPUTED_TORQUE.control,
                 COMPUTED_TORQUE.memory,
-                uses_model="yes",
+                uses_model="yes",  # type: ignore[arg-type]
             )
         )
     assert "odd" not in CONTROLLERS.names()

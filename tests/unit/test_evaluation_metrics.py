@@ -4,7 +4,7 @@ import io
 import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ class JerkMetric(Metric):
         Key("jerk.rms|max", "m/s³", "jerk of slave/measured_cp along x"),
         Key("jerk.samples", "1", "from so many samples"),
     )
-    topics = (SLAVE_MEASURED_CP,)
+    topics: ClassVar[tuple[Topic, ...]] = (SLAVE_MEASURED_CP,)
 
     def __init__(self, context: Context) -> None:
         self._jerk, self._begin_ns = Moments(), context.bag.start_ns
@@ -361,7 +361,7 @@ def test_accumulator_that_is_asked_for_too_late_is_refused(bag: Bag) -> None:
             self._context = context
 
         def values(self) -> dict[Any, Any]:
-            return {"rms": self._context.shared(Late)}
+            return {"rms": self._context.shared(Late)}  # type: ignore[type-var]
 
     with pytest.raises(EvaluationError, match="Late is asked for too late"):
         evaluate(bag, further=[LateMetric])

@@ -160,6 +160,6 @@ def test_experiment_that_returns_something_else_is_named() -> None:
     from teleop_core.base.errors import PartError
     from teleop_lab.experiments import Bench
 
-    wrong = Experiment("mine", "mine", "me", lambda bench: None)
+    wrong = Experiment("mine", "mine", "me", lambda bench: None)  # type: ignore[arg-type, return-value]
     with pytest.raises(PartError, match="mine"):
         wrong.run(Bench())

@@ -1,6 +1,6 @@
 """Experiments: what the sources printed comes out, misprints do not, sessions run once."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -104,7 +104,7 @@ def test_own_experiment_is_run_by_its_name() -> None:
     finally:
         experiments.EXPERIMENTS.remove("seeds")
     with pytest.raises(PartError):
-        experiments.register_experiment("mine", lambda bench: None)
+        experiments.register_experiment("mine", lambda bench: None)  # type: ignore[arg-type]
 
 
 # -- bench -----------------------------------------------------------------------------------------
@@ -252,7 +252,7 @@ class Perfect:
         return Stream(topic, ("x", "y", "z"), ns, ns, self.path * 1e-3, 0)
 
     def visits(self) -> Visits:
-        return visits_of(self, self.p, self.center, self.approach)
+        return visits_of(cast(Any, self), self.p, self.center, self.approach)
 
 
 def test_tip_that_is_where_the_points_are_misses_none() -> None:

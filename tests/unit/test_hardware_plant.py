@@ -80,8 +80,10 @@ def test_bias_and_weight_push_a_joint_without_friction_off_by_their_size_over_kp
 @pytest.mark.parametrize("law", ["pid", "friction_compensation", "adaptive"])
 def test_a_law_that_can_hold_bias_and_weight_begins_in_balance(law: str) -> None:
     # Without friction whatever is not held moves axis 1, of the bias, or 2, of the weight, at once.
-    made = SimulatedArm(slave(controller=law, starts_at_home=True,
-                          **dict[str, Any]({"plant.hardware.without": ("friction", "wandering")})))  # fmt: skip
+    made = SimulatedArm(slave(
+        controller=law, starts_at_home=True,
+        **dict[str, Any]({"plant.hardware.without": ("friction", "wandering")}),
+    ))  # fmt: skip
     for tick in range(1, 301):
         made.signals["now_ns"] = tick * TICK_NS
         made.step()
@@ -177,9 +179,9 @@ def test_a_plant_of_ones_own_moves_the_slave() -> None:
     ("plant", "needed"),
     [
         ("no plant", "a Plant"),
-        (Plant("bad", int, lambda p, r: None), "dataclass"),
-        (Plant("bad", HARDWARE.parameters, lambda p, r: None), "gives Physics"),
-        (Plant("bad", HARDWARE.parameters, lambda p, r: 1 / 0), "ZeroDivisionError"),
+        (Plant("bad", int, lambda p, r: None), "dataclass"),  # type: ignore[arg-type, return-value]
+        (Plant("bad", HARDWARE.parameters, lambda p, r: None), "gives Physics"),  # type: ignore[arg-type, return-value]
+        (Plant("bad", HARDWARE.parameters, lambda p, r: 1 / 0), "ZeroDivisionError"),  # type: ignore[arg-type, return-value]
     ],
 )
 def test_what_is_no_plant_is_refused_with_the_reason(plant: str | Plant, needed: str) -> None:

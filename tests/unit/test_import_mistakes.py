@@ -185,7 +185,7 @@ def test_options_that_mean_nothing_are_refused(
 
 
 def test_options_say_what_they_are_on_the_command_line() -> None:
-    options = ImportOptions(position="2-4", unit="mm", euler=("xyz", "a", "b", "c"), rate=30.0)
+    options = ImportOptions(position="2-4", unit="mm", euler=("xyz", "a", "b", "c"), rate=30.0)  # type: ignore[arg-type]
     assert options.as_arguments() == [
         "--rate", "30.0", "--position", "2", "3", "4", "--unit", "mm", "--euler", "xyz", "a", "b",
         "c",

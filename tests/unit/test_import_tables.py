@@ -331,7 +331,9 @@ def test_unit_of_the_place_is_given_or_stands_in_the_names(
         ((["t", "x", "y", "z"], {"unit": unit}), (["t", *(f"{a} [{unit}]" for a in "xyz")], {}))
     ):
         frame(head, rows).to_csv(tmp_path / "a.csv", index=False)
-        report = tc.import_recording(tmp_path / "a.csv", tmp_path / str(number), **options)
+        report = tc.import_recording(
+            tmp_path / "a.csv", tmp_path / str(number), **dict[str, Any](options)
+        )
         got = report.recording["master/measured_cp"][["x", "y", "z"]]
         assert np.allclose(got, PLACES, rtol=0, atol=1e-15)
 

@@ -126,9 +126,10 @@ def test_first_exception_of_a_plain_function_waits_until_the_block_is_over() -> 
 
 @compiled_only
 def test_result_of_another_type_counts_as_an_exception() -> None:
-    call_with_row(
-        pointer(lambda row, x: "three", types.float64(ROW, types.float64)), np.zeros(1), 1
-    )
+    def wrong(row: Array, x: float) -> str:
+        return "three"
+
+    call_with_row(pointer(wrong, types.float64(ROW, types.float64)), np.zeros(1), 1)
     with pytest.raises(ValueError, match="three"):
         raise_pending()
 

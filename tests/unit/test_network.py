@@ -512,7 +512,7 @@ def test_a_kind_of_ones_own_is_one_call_and_a_wrong_one_is_refused() -> None:
         lambda n, m, c, now: m.base[4:].fill(0.0) or 0.0,  # behind what it may remember
     ):
         with pytest.raises(PartError):
-            register_network(Network("wrong", NoParameters, wrong))
+            register_network(Network("wrong", NoParameters, wrong))  # type: ignore[arg-type]
     assert "wrong" not in NETWORKS.names()
 
 

@@ -159,6 +159,6 @@ def test_a_replayed_hand_feels_another_fixture(recorded: tc.Recording) -> None:
 
 def test_a_replay_that_cannot_begin_there_says_so(recorded: tc.Recording) -> None:
     with pytest.raises(ParameterError, match="device or hand"):
-        tc.replay(recorded, begin="slave")
+        tc.replay(recorded, begin="slave")  # type: ignore[arg-type]
     with pytest.raises(RecordingError, match="hand/servo_cp"):
         tc.replay("bags/example", begin="hand")

@@ -47,7 +47,7 @@ def motion_of(
     kind: str, seed: int, **values: float | tuple[float, float, float]
 ) -> Callable[..., Any]:
     if kind == "recorded":
-        return following("recorded", *RECORDED).make(NoParameters(), None)
+        return following("recorded", *RECORDED).make(NoParameters(), None)  # type: ignore[arg-type]
     given = {"center": CENTER, "size": SIZE, "tilt": TILT, "approach_time": 2.0, "period": 4.0}
     extra = {"points": POINTS} if kind == "points" else {}
     parameters = build(OperatorParameters, {"kind": kind, **given, **extra, **values})
@@ -198,7 +198,7 @@ def samples(count: int = 5, columns: int = 9) -> Any:
 @pytest.mark.parametrize("columns", [3, 6, 9])
 def test_given_samples_are_followed_linearly_and_their_buttons_held(columns: int) -> None:
     times, rows = samples(columns=columns)
-    motion = following("mine", times, rows).make(NoParameters(), None)
+    motion = following("mine", times, rows).make(NoParameters(), None)  # type: ignore[arg-type]
     assert np.allclose(motion(times), rows, rtol=0, atol=ROUNDING)
     between = motion(times[:-1] + 0.25)
     middle = 0.5 * (rows[:-1] + rows[1:])
@@ -210,7 +210,7 @@ def test_given_samples_are_followed_linearly_and_their_buttons_held(columns: int
 
 def test_given_samples_are_kept_whatever_their_owner_does_with_the_arrays() -> None:
     times, rows = samples()
-    motion = following("mine", times, rows).make(NoParameters(), None)
+    motion = following("mine", times, rows).make(NoParameters(), None)  # type: ignore[arg-type]
     before = motion(np.array([1.0]))
     rows[:] = 0.0
     assert np.array_equal(motion(np.array([1.0])), before)
@@ -310,7 +310,7 @@ BAD_MOTIONS = {
     "answers one row": (lambda times: np.zeros(3), "not (3,)"),
     "answers no number": (lambda times: np.full((len(times), 3), np.nan), "at 0.001 s"),
     "answers words": (lambda times: "up", "numbers"),
-    "raises": (lambda times: {}["up"], "KeyError"),
+    "raises": (lambda times: {}["up"], "KeyError"),  # type: ignore[index]
 }
 
 
@@ -344,6 +344,6 @@ def test_operator_that_is_put_together_wrongly_is_refused(
 
 
 def test_maker_of_another_signature_is_refused_with_the_one_expected(own_parts: None) -> None:
-    register_operator("mine", Operator("mine", lambda parameters: None))
+    register_operator("mine", Operator("mine", lambda parameters: None))  # type: ignore[arg-type, misc]
     with pytest.raises(PartError, match=r"make\(parameters, setting\)"):
         master_of("mine")

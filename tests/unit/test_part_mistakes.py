@@ -85,7 +85,7 @@ def test_wrong_declaration_of_a_parameter_is_refused_before_it_is_used(group: ty
 WAYS_IN = {
     "fixture": lambda group: register_fixture(replace(SPHERE, name="own", parameters=group)),
     "controller": lambda group: register_controller(replace(PID, name="own", parameters=group)),
-    "operator": lambda group: register_operator("own", Operator("own", lambda p, s: None, group)),
+    "operator": lambda group: register_operator("own", Operator("own", lambda p, s: None, group)),  # type: ignore[arg-type, return-value]
     "stage": lambda group: stage("own", group),
 }
 
@@ -253,7 +253,7 @@ class Nameless(Metric):
         return {}
 
 
-@pytest.mark.parametrize("part", [Nameless, Nameless(None), object()], ids=["class", "one", "none"])
+@pytest.mark.parametrize("part", [Nameless, Nameless(None), object()], ids=["class", "one", "none"])  # type: ignore[arg-type]
 def test_metric_class_without_a_name_or_no_class_is_refused(part: Any) -> None:
     with pytest.raises(PartError, match=r"^metric '\w+' must be .*(own name|a class below)"):
         evaluation.register_metric(part)

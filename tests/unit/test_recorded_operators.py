@@ -172,7 +172,7 @@ def test_a_session_lasts_as_long_as_what_it_follows_unless_told(
 
 
 def test_a_length_that_cannot_be_asked_is_refused() -> None:
-    part = tc.Operator("endless", lambda parameters, setting: lambda times: times, length=3.0)
+    part = tc.Operator("endless", lambda parameters, setting: lambda times: times, length=3.0)  # type: ignore[arg-type]
     with pytest.raises(tc.PartError, match="length"):
         tc.register_operator("endless", part)
 

@@ -83,7 +83,7 @@ def test_tables_of_a_robot_are_read_only(name: str) -> None:
     for entry in set(arrays) - {"geometry_row", "limits()", "limits(dt)"}:
         assert not arrays[entry].flags.writeable, entry
     with pytest.raises(TypeError):
-        load_robot(name).geometry["L6"] = 1.0
+        load_robot(name).geometry["L6"] = 1.0  # type: ignore[index]
 
 
 def test_a_table_of_drives_keeps_what_it_was_made_with() -> None:

@@ -1,7 +1,7 @@
 """SCARA + Stewart hybrid: the published example, both elbows and headings, paths, way back."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,12 @@ PRINTED_M, PRINTED_DEG = 1e-6, 2e-4
 # Leg errors of rounding, over the square of the tilt by which similar hexagons see a turn.
 SOLVED = 1e-9
 PAIRS = {"sigma_b": math.radians(15.0), "sigma_m": math.radians(15.0)}
-ROBOTS = [{}, {"heading": "carried"}, PAIRS, {**PAIRS, "heading": "carried"}]
+ROBOTS: Sequence[dict[str, Any]] = [
+    {},
+    {"heading": "carried"},
+    PAIRS,
+    {**PAIRS, "heading": "carried"},
+]
 
 
 def attitude(alpha: float, beta: float, gamma: float) -> Array:
@@ -382,9 +387,9 @@ def test_bad_options_and_lengths_are_refused() -> None:
     with pytest.raises(UnknownNameError):
         load_robot("scara_stewart", r_s=0.1)
     for symbol in ("l1", "r_b", "w_z"):
-        with pytest.raises(ParameterError) as refusal:
+        with pytest.raises(ParameterError) as refused:
             load_robot("scara_stewart", **{symbol: 0.0})
-        assert refusal.value.name == symbol
+        assert refused.value.name == symbol
     with pytest.raises(ParameterError):
         load_robot("scara_stewart", sigma_b=1.0)
     with pytest.raises(ParameterError):

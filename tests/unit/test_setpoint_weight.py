@@ -55,7 +55,7 @@ class Axis:
 
 
 @kernel
-def answer(gains: Any, step: int, limit: Array, count: float, goal: float, trace: Array) -> None:
+def answer(gains: Any, step: Array, limit: Array, count: float, goal: float, trace: Array) -> None:
     """Write positions of one axis under the law, tick by tick; a count of 0 rounds nothing."""
     memory, effort, setpoint = np.zeros((1, 4)), np.zeros(1), np.full(1, goal)
     seen, zero, q, dq = np.zeros(1), np.zeros(1), 0.0, 0.0

@@ -554,7 +554,7 @@ def test_a_filter_of_ones_own_is_one_call_and_a_wrong_one_is_refused(own_parts: 
     wrong = {
         "not finite": lambda n, m, v, t: math.nan if v else 0.0,
         "not at rest": lambda n, m, v, t: v + 1.0,
-        "raises": lambda n, m, v, t: {}["none"],
+        "raises": lambda n, m, v, t: {}["none"],  # type: ignore[index]
         "writes": lambda n, m, v, t: m[40],
     }
     for name, broken in wrong.items():

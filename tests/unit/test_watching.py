@@ -105,11 +105,11 @@ def test_kernels_that_are_compiled_are_counted() -> None:
     before = compiled_count()
 
     @njit
-    def inner(x: float) -> float:
+    def inner(x: float) -> Any:
         return x + 1.0
 
     @njit
-    def outer(x: float) -> float:
+    def outer(x: float) -> Any:
         return inner(x) * 2.0
 
     assert not is_compiling()
