@@ -47,7 +47,7 @@ def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess
 
 
 @pytest.fixture(scope="module")
-def page(console: Any, tmp_path_factory: Any) -> Iterator[Headless]:
+def page(console: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     """The page in a browser that drives."""
     with Tab(tmp_path_factory.mktemp("browser"), *SIZE) as tab:
         tab.visit(console.url)

@@ -33,7 +33,7 @@ def abort_outside_python():
 
 
 @pytest.fixture
-def run(tmp_path: Any) -> Callable[..., Any]:
+def run(tmp_path: Path) -> Callable[..., Any]:
     """Run a test of this body in a pytest of its own: its output, and how often the test ran."""
 
     def result(body: Any, *options: object) -> Any:

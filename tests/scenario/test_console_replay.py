@@ -25,7 +25,7 @@ STILL = 3e-5  # poses that differ less from what is drawn are not sent [m]
 
 
 @pytest.fixture(scope="module")
-def page(recording: Path, tmp_path_factory: Any) -> Iterator[Headless]:
+def page(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
     """Page of a recording in a browser."""
     console = ConsoleProcess(tmp_path_factory.mktemp("console"), recording)
     try:

@@ -15,7 +15,6 @@ import pytest
 import teleop_core
 import teleop_drill
 import teleop_lab
-from present import present
 from teleop_core.cli import _parser
 from teleop_core.graph.layers import parse_setting
 from teleop_core.session.api import configuration
@@ -92,9 +91,7 @@ def test_every_session_of_a_documented_command_can_be_begun(
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "my_arm.urdf").symlink_to(ROOT / "examples/ur5e.urdf")  # "yours" of a document
     monkeypatch.chdir(tmp_path)
-    parsers = present(
-        next(action.choices for action in _parser()._actions if action.dest == "command")
-    )
+    parsers: Any = next(action.choices for action in _parser()._actions if action.dest == "command")
     helps = "\n".join(parser.format_help() for parser in parsers.values())
     shown = re.findall(r"^ +teleop (.+?)(?:  .*)?$", helps, re.MULTILINE)
     begun = set()

@@ -133,7 +133,7 @@ def tabs() -> Iterator[dict[Any, Any]]:
 
 @pytest.fixture
 def opened(
-    chromium: str, tabs: dict[tuple[Path, int], Headless], tmp_path_factory: Any
+    chromium: str, tabs: dict[tuple[Path, int], Headless], tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[..., Any]]:
     """Opens a page at a width; whatever goes wrong in it fails the test."""
     used = []

@@ -54,7 +54,7 @@ def arrivals(network: NetworkLink, sent: Any, ticks: int) -> NDArray[np.int64]:
         network.step()
         if network.state["arrived"][0]:
             came.append((row["network_servo_cp_ns"] // MS, tick))
-    return np.array(came)
+    return np.array(came, np.int64).reshape(-1, 2)
 
 
 def departures(sent: NDArray[np.int64], service: float) -> Array:

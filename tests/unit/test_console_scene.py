@@ -332,7 +332,7 @@ def test_the_scene_draws_a_fixture_where_its_parameters_have_it(server: Server) 
                      fixture__half_space__room=0.02)  # fmt: skip
     scene, view = drawn(server, RecordedLink(session.bag), 4.5)
     assert view.arms[""].state["is_fixture_on"]
-    line = present(scene.arms[""].master.outline.line)
+    line: Any = scene.arms[""].master.outline.line
     below = line.scale[1] * line.points.reshape(-1, 3)[:, 1]
     np.testing.assert_allclose(below, -0.02, atol=1e-6)
 

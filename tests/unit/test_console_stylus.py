@@ -40,7 +40,7 @@ class Hand:
             lambda arm, pose: self.said.append(pose.tolist()),
             lambda arm: self.said.append("let go"),
         )  # fmt: skip
-        self.gizmo = server.scene.get_handle_by_name(f"{scene.masters['']}/grip")
+        self.gizmo: Any = server.scene.get_handle_by_name(f"{scene.masters['']}/grip")
         self.time = 0.0
         self.see(POSE)
 
@@ -54,9 +54,9 @@ class Hand:
     ) -> None:
         """What viser does when a browser says that the gizmo was dragged."""
         if x is not None:
-            present(self.gizmo).position = (x, *POSE[1:3])
-        event = viser.TransformControlsEvent(None, client, present(self.gizmo), phase)
-        for listen in present(self.gizmo)._impl_aux.update_cb:
+            self.gizmo.position = (x, *POSE[1:3])
+        event = viser.TransformControlsEvent(None, client, self.gizmo, phase)
+        for listen in self.gizmo._impl_aux.update_cb:
             asyncio.run(listen(event))
 
     def take(self) -> Any:

@@ -147,7 +147,7 @@ def test_an_unknown_parameter_and_another_plant_are_refused(published: RestTable
         fit(published, slave(**{"plant.kind": "ideal"}))
 
 
-def changed(tmp_path: Any, change: Any) -> Path:
+def changed(tmp_path: Path, change: Any) -> Path:
     table = pd.read_csv(PUBLISHED)
     file = tmp_path / "rests.csv"
     change(table).to_csv(file, index=False)

@@ -47,7 +47,8 @@ def followed(seed: int, *, is_upstream: bool = False) -> Any:
             texts = {"multiplier": repr(factor), "offset": repr(offset)}
             ElementTree.SubElement(joint, "mimic", texts, joint=leader)
         limit = present(joint.find("limit"))
-        limit.set("lower", "-3.1"), limit.set("upper", "3.0"), limit.set("effort", "1e5")
+        for key, value in (("lower", "-3.1"), ("upper", "3.0"), ("effort", "1e5")):
+            limit.set(key, value)
     return ElementTree.tostring(root, encoding="unicode"), tip, found
 
 

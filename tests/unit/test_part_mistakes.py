@@ -7,11 +7,10 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
-from present import present
 from teleop_core import evaluation
 from teleop_core.base.errors import ParameterError, PartError
 from teleop_core.base.parameters import NoParameters, build, parameter, specs
@@ -109,7 +108,7 @@ def test_name_that_keys_and_files_cannot_hold_is_refused(
     own_parts: None, name: str | int | None
 ) -> None:
     with pytest.raises(PartError, match="named by letters, digits, _ and -") as error:
-        register_fixture(replace(SPHERE, name=present(name)))
+        register_fixture(replace(SPHERE, name=cast(str, name)))
     assert (error.value.kind, error.value.name) == ("fixture", name)
 
 

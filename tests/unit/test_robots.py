@@ -40,8 +40,8 @@ def arrays_of(robot: Robot) -> dict[str, Array]:
     """Every public array of a robot, by name."""
     found = {name: getattr(robot, name) for name in ("lower", "upper", "home", "geometry_row")}
     found |= {"limits()": robot.limits(), "limits(dt)": robot.limits(1e-3)}
-    for part in (robot.drives, robot.dynamics):
-        values = {entry.name: getattr(part, entry.name) for entry in fields(present(part))}
+    for part in (present(robot.drives), present(robot.dynamics)):
+        values = {entry.name: getattr(part, entry.name) for entry in fields(part)}
         found |= {k: value for k, value in values.items() if isinstance(value, np.ndarray)}
     return found
 

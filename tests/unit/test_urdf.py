@@ -37,7 +37,9 @@ def placed(xml: str, joints: dict[str, float], poses: dict[str, np.ndarray]) -> 
     for index in range(1, model.njoints):
         name, at = model.names[index], model.joints[index].idx_q
         if tree[name].get("type") == "floating":
-            ends = [present(tree[name].find(end)).get("link") for end in ("parent", "child")]
+            ends = [
+                present(present(tree[name].find(end)).get("link")) for end in ("parent", "child")
+            ]
             q[at : at + 7] = relative(*(poses[end] for end in ends))
         elif tree[name].find("mimic") is None:
             q[at] = joints[name]
